@@ -1,0 +1,4 @@
+"""What travels between the host and the MA2000's motor controller: memory map, units, frames, commands.
+
+Pure: bytes in, bytes out. Nothing here opens a port, waits or keeps time.
+"""

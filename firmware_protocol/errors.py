@@ -1,0 +1,13 @@
+"""The error types of the wire. Decoding raises nothing else, whatever bytes arrive."""
+
+
+class ProtocolError(ValueError):
+    """Something on the wire, or meant for it, breaks the protocol."""
+
+
+class UnitsError(ProtocolError):
+    """A value that its register, or the joint's range, cannot hold."""
+
+
+class MemoryMapError(ProtocolError):
+    """A memory map that contradicts itself or lacks what the protocol needs."""

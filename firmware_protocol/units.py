@@ -1,0 +1,126 @@
+"""Posture units, ADC counts, radians, DAC counts and volts, and the one rounding rule between them.
+
+The source gives 1000 posture units over each axis' range (section 6.2) and a 12-bit reading (section 6.3).
+A posture unit is therefore range/1000 and an ADC count range/4096. Wherever a quantity becomes an integer the
+rule is the same: round half up, `floor(x + 1/2)`. Between posture units and counts it is done in integers, so
+that a controller of 8 bits and a host of 64 agree on every value.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from firmware_protocol.errors import UnitsError
+
+POSTURE_UNITS = 1000
+"""Posture units over a joint's range; valid set points are 0 to 999 (section 6.2)."""
+ADC_COUNTS = 4096
+"""Counts of the 12-bit converter over a joint's range (section 6.3)."""
+GAIN_MAX = 20
+"""Adjustable P, I and D run from 0 to 20; they are not the physical gains (section 6.4)."""
+DAC_MAX = 127
+"""Largest magnitude of the 8-bit DAC's signed input."""
+FOLLOWING_ERROR_LIMIT = 127
+"""ADC counts of positional error at which the source's host stops sending set points (section 6.5)."""
+
+
+def posture_to_counts(posture: int) -> int:
+    """ADC counts of a set point in posture units (0–999), rounded half up.
+
+    Raises UnitsError outside 0–999.
+    """
+    if not 0 <= posture < POSTURE_UNITS:
+        raise UnitsError(f"set point of {posture} posture units: allowed are 0 to {POSTURE_UNITS - 1}")
+    return (2 * posture * ADC_COUNTS + POSTURE_UNITS) // (2 * POSTURE_UNITS)
+
+
+def counts_to_posture(counts: int) -> int:
+    """Posture units nearest to an ADC reading (0–4095), rounded half up and never above 999.
+
+    Raises UnitsError outside 0–4095.
+    """
+    if not 0 <= counts < ADC_COUNTS:
+        raise UnitsError(f"reading of {counts} ADC counts: allowed are 0 to {ADC_COUNTS - 1}")
+    return min((2 * counts * POSTURE_UNITS + ADC_COUNTS) // (2 * ADC_COUNTS), POSTURE_UNITS - 1)
+
+
+@dataclass(frozen=True)
+class JointCalibration:
+    """How one joint's counts and posture units stand for an angle.
+
+    angle = angle_at_zero + direction · range · counts / 4096  (rad)
+    """
+
+    joint: int
+    range_rad: float
+    angle_at_zero_rad: float
+    direction: int = 1
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.range_rad) and self.range_rad > 0):
+            raise UnitsError(f"joint {self.joint}: range of {self.range_rad} rad: must be finite and above 0")
+        if not math.isfinite(self.angle_at_zero_rad):
+            raise UnitsError(
+                f"joint {self.joint}: angle at zero of {self.angle_at_zero_rad} rad: must be finite"
+            )
+        if self.direction not in (-1, 1):
+            raise UnitsError(f"joint {self.joint}: direction {self.direction}: allowed are 1 and -1")
+
+    @property
+    def rad_per_count(self) -> float:
+        """Radians per ADC count, with the sign of the joint's direction."""
+        return self.direction * self.range_rad / ADC_COUNTS
+
+    @property
+    def rad_per_posture_unit(self) -> float:
+        """Radians per posture unit, with the sign of the joint's direction."""
+        return self.direction * self.range_rad / POSTURE_UNITS
+
+    def counts_to_rad(self, counts: float) -> float:
+        """Angle (rad) of an ADC reading."""
+        return self.angle_at_zero_rad + self.rad_per_count * counts
+
+    def posture_to_rad(self, posture: float) -> float:
+        """Angle (rad) of a set point in posture units."""
+        return self.angle_at_zero_rad + self.rad_per_posture_unit * posture
+
+    def rad_to_counts(self, angle_rad: float) -> float:
+        """ADC counts, not rounded, of an angle (rad)."""
+        return (angle_rad - self.angle_at_zero_rad) / self.rad_per_count
+
+    def rad_to_posture(self, angle_rad: float) -> int:
+        """Set point in posture units for an angle (rad), rounded half up.
+
+        Raises UnitsError when the angle is not finite or lies outside postures 0–999: a set point is never clipped.
+        """
+        if not math.isfinite(angle_rad):
+            raise UnitsError(f"joint {self.joint}: set point of {angle_rad} rad: must be finite")
+        posture = math.floor((angle_rad - self.angle_at_zero_rad) / self.rad_per_posture_unit + 0.5)
+        if not 0 <= posture < POSTURE_UNITS:
+            low, high = sorted((self.posture_to_rad(0), self.posture_to_rad(POSTURE_UNITS - 1)))
+            raise UnitsError(
+                f"joint {self.joint}: set point of {math.degrees(angle_rad):.2f}° is outside its range of "
+                f"{math.degrees(low):.2f}° to {math.degrees(high):.2f}°"
+            )
+        return posture
+
+
+@dataclass(frozen=True)
+class DriveScale:
+    """Volts for the controller's DAC counts.
+
+    `full_scale_v` is the DAC's output at 127 counts (not given by the source: an assumption of whoever makes the
+    object); `amplifier_gain` is 28 on joints 1–3 (section 6.2).
+    """
+
+    full_scale_v: float
+    amplifier_gain: float
+
+    def counts_to_volts(self, counts: float) -> float:
+        """Volts at the motor for DAC counts, before any supply limit."""
+        return counts * self.full_scale_v * self.amplifier_gain / DAC_MAX
+
+    def volts_to_counts(self, volts: float) -> float:
+        """DAC counts, not rounded, for volts at the motor."""
+        return volts * DAC_MAX / (self.full_scale_v * self.amplifier_gain)
