@@ -1,0 +1,82 @@
+# What a developer types; `make help` lists it. Set-up happens by itself: a command that needs .venv makes it and brings it
+# up to date with the pinned requirements, and says nothing when there is nothing to do.
+
+PYTHON ?= python3
+
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+FOR_USE := .venv/installed-for-use
+FOR_DEVELOPMENT := .venv/installed-for-development
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo test test-all lint format requirements bench clean distclean
+
+help: ## list these commands
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: $(FOR_USE) ## record a ramp-step on joints 1-3 of the mock controller, and show it
+	@$(BIN)/daq demo
+
+test: lint ## lint, types, import contracts, then the tests
+	@echo "== tests"
+	@$(BIN)/python -m pytest -q -m "not slow"
+
+test-all: lint ## the same, with the slow tests
+	@echo "== tests, the slow ones too"
+	@$(BIN)/python -m pytest -q
+
+lint: $(FOR_DEVELOPMENT) ## lint, format, types and import contracts, without the tests
+	@echo "== lint"
+	@$(BIN)/ruff check --quiet
+	@echo "== format"
+	@$(BIN)/ruff format --quiet --check --diff
+	@echo "== types"
+	@$(BIN)/mypy --no-error-summary
+	@echo "== import contracts"
+	@$(BIN)/lint-imports >.venv/import-contracts.log 2>&1 || { cat .venv/import-contracts.log; exit 1; }
+
+format: $(FOR_DEVELOPMENT) ## format the sources and mend what ruff can mend
+	@$(BIN)/ruff check --fix-only --quiet
+	@$(BIN)/ruff format --quiet
+
+bench: $(FOR_DEVELOPMENT) ## measure the figures the guide quotes
+	@$(BIN)/python -m benchmarks
+
+clean: ## remove caches and what was built
+	@rm -rf build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	@find . -name __pycache__ -type d -not -path './.venv/*' -prune -exec rm -rf {} +
+
+distclean: clean ## the same, and .venv
+	@rm -rf .venv
+
+# ---- the virtual environment
+
+$(FOR_USE): requirements.txt pyproject.toml | $(BIN)/pip
+	@echo "Installing the pinned requirements into .venv"
+	@$(PIP) install --require-hashes --requirement requirements.txt
+	@$(PIP) install --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(FOR_DEVELOPMENT): requirements-dev.txt $(FOR_USE)
+	@echo "Installing the pinned requirements of development into .venv"
+	@$(PIP) install --require-hashes --requirement requirements-dev.txt
+	@touch $@
+
+# ensurepip writes pip last, so that a .venv whose making was interrupted is made again.
+$(BIN)/pip:
+	@command -v $(PYTHON) >/dev/null || { echo "No $(PYTHON) found: install Python 3.11 or newer, or name one: make PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -c 'import sys; v = sys.version_info; v >= (3, 11) or sys.exit("Python 3.11 or newer is needed and $(PYTHON) is %d.%d: name a newer one: make PYTHON=python3.12" % v[:2])'
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "$(PYTHON) cannot make virtual environments: install its venv package (Debian, Ubuntu: apt install python3-venv)"; exit 1; }
+	@$(PYTHON) -m venv .venv
+
+# ---- the pinned requirements: with hashes, for every platform, and without the address of any package index
+
+UPGRADE ?=
+COMPILE = $(BIN)/uv pip compile --quiet $(UPGRADE) --universal --python-version 3.11 --generate-hashes \
+	--no-emit-index-url --custom-compile-command "make requirements" pyproject.toml --group build
+
+requirements: $(FOR_DEVELOPMENT) ## pin what pyproject.toml asks for (UPGRADE=--upgrade: the newest of everything)
+	@$(COMPILE) --output-file requirements.txt
+	@$(COMPILE) --group dev --constraint requirements.txt --output-file requirements-dev.txt
+	@$(MAKE) --no-print-directory $(FOR_DEVELOPMENT)
