@@ -91,7 +91,7 @@ class MemoryMap(BaseModel):
                     raise ValueError(f"register {name} has {found} addresses, needs {count}")
         unknown = self.registers.keys() - set(PER_JOINT_REGISTERS) - set(SINGLE_REGISTERS)
         if unknown:
-            raise ValueError(f"register {sorted(unknown)[0]} is not one that the protocol knows")
+            raise ValueError(f"register {min(unknown)} is not one that the protocol knows")
         owner: dict[int, str] = {}
         for name, register in self.registers.items():
             for address in register.addresses:

@@ -61,9 +61,7 @@ class JointCalibration:
         if not (math.isfinite(self.range_rad) and self.range_rad > 0):
             raise UnitsError(f"joint {self.joint}: range of {self.range_rad} rad: must be finite and above 0")
         if not math.isfinite(self.angle_at_zero_rad):
-            raise UnitsError(
-                f"joint {self.joint}: angle at zero of {self.angle_at_zero_rad} rad: must be finite"
-            )
+            raise UnitsError(f"joint {self.joint}: angle at zero of {self.angle_at_zero_rad} rad: must be finite")
         if self.direction not in (-1, 1):
             raise UnitsError(f"joint {self.joint}: direction {self.direction}: allowed are 1 and -1")
 
@@ -92,7 +90,7 @@ class JointCalibration:
     def rad_to_posture(self, angle_rad: float) -> int:
         """Set point in posture units for an angle (rad), rounded half up.
 
-        Raises UnitsError when the angle is not finite or lies outside postures 0–999: a set point is never clipped.
+        A set point is never clipped: raises UnitsError when the angle is not finite or outside postures 0–999.
         """
         if not math.isfinite(angle_rad):
             raise UnitsError(f"joint {self.joint}: set point of {angle_rad} rad: must be finite")
@@ -110,8 +108,8 @@ class JointCalibration:
 class DriveScale:
     """Volts for the controller's DAC counts.
 
-    `full_scale_v` is the DAC's output at 127 counts (not given by the source: an assumption of whoever makes the
-    object); `amplifier_gain` is 28 on joints 1–3 (section 6.2).
+    `full_scale_v` is the DAC's output at 127 counts (not given by the source: an assumption of whoever makes
+    the object); `amplifier_gain` is 28 on joints 1–3 (section 6.2).
     """
 
     full_scale_v: float

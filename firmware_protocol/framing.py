@@ -1,0 +1,145 @@
+"""Frames: how bytes on the line become numbered messages, and back.
+
+    00 | COBS( length, sequence low, sequence high, opcode, payload …, CRC high, CRC low ) | 00
+
+A zero byte stands only between frames (consistent overhead byte stuffing), so that a receiver which lost its place
+finds it again at the next zero. `length` counts the payload. The CRC is CRC-16/CCITT (polynomial 1021, start FFFF)
+over everything before it. The largest frame is 57 bytes: 4.95 ms of a line at 115200 baud.
+"""
+
+from __future__ import annotations
+
+import binascii
+from dataclasses import dataclass, field
+
+from firmware_protocol.errors import ProtocolError
+
+DELIMITER = 0
+MAX_PAYLOAD = 48
+"""Bytes of payload in one frame; six joints' full snapshot fits exactly."""
+HEADER = 4
+CRC_BYTES = 2
+MAX_BODY = HEADER + MAX_PAYLOAD + CRC_BYTES
+MAX_ENCODED = MAX_BODY + 1
+"""COBS adds one byte to anything shorter than 254."""
+FRAME_OVERHEAD = 2 + 1 + HEADER + CRC_BYTES
+"""Bytes that a frame adds to its payload: two delimiters, one of stuffing, header and CRC."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One message on the line. A reply carries the sequence number of its request."""
+
+    sequence: int
+    opcode: int
+    payload: bytes
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.sequence <= 0xFFFF:
+            raise ProtocolError(f"sequence number {self.sequence}: allowed are 0 to 65535")
+        if not 0 <= self.opcode <= 0xFF:
+            raise ProtocolError(f"opcode {self.opcode}: allowed are 0 to 255")
+        if len(self.payload) > MAX_PAYLOAD:
+            raise ProtocolError(f"payload of {len(self.payload)} bytes: at most {MAX_PAYLOAD} fit in a frame")
+
+
+def crc16(data: bytes) -> int:
+    """CRC-16/CCITT-FALSE of `data`; crc16(b"123456789") is 0x29B1."""
+    return binascii.crc_hqx(data, 0xFFFF)
+
+
+def stuff(body: bytes) -> bytes:
+    """COBS: `body` (at most 253 bytes) without zeros, one byte longer."""
+    encoded = bytearray()
+    for block in body.split(b"\0"):
+        encoded.append(len(block) + 1)
+        encoded += block
+    return bytes(encoded)
+
+
+def unstuff(encoded: bytes) -> bytes:
+    """The bytes that `stuff` was given. Raises ProtocolError when a code byte points past the end."""
+    body = bytearray()
+    position = 0
+    while position < len(encoded):
+        code = encoded[position]
+        end = position + code
+        if code == 0 or end > len(encoded):
+            raise ProtocolError(f"byte stuffing broken at byte {position}")
+        body += encoded[position + 1 : end]
+        if end < len(encoded):
+            body.append(0)
+        position = end
+    return bytes(body)
+
+
+def encode_frame(frame: Frame) -> bytes:
+    """The frame as it travels, delimiters included."""
+    body = bytes((len(frame.payload), frame.sequence & 0xFF, frame.sequence >> 8, frame.opcode)) + frame.payload
+    return b"\0" + stuff(body + crc16(body).to_bytes(2, "big")) + b"\0"
+
+
+def decode_body(encoded: bytes) -> Frame:
+    """The frame between two delimiters.
+
+    Raises ProtocolError when stuffing, length or CRC do not agree; nothing else, whatever the bytes.
+    """
+    body = unstuff(encoded)
+    if len(body) < HEADER + CRC_BYTES:
+        raise ProtocolError(f"frame of {len(body)} bytes is too short: at least {HEADER + CRC_BYTES}")
+    if body[0] != len(body) - HEADER - CRC_BYTES:
+        raise ProtocolError(f"frame says {body[0]} bytes of payload and has {len(body) - HEADER - CRC_BYTES}")
+    if crc16(body[:-2]) != int.from_bytes(body[-2:], "big"):
+        raise ProtocolError("CRC does not match")
+    return Frame(body[1] | body[2] << 8, body[3], body[HEADER:-CRC_BYTES])
+
+
+@dataclass
+class FrameDecoder:
+    """Turns a stream of bytes, in any pieces, into frames. Holds at most one frame's bytes, whatever arrives."""
+
+    damaged: int = 0
+    """Pieces between delimiters that were not a frame: stuffing, length or CRC wrong."""
+    oversized: int = 0
+    """Pieces longer than any frame, thrown away without being stored."""
+    _partial: bytearray = field(default_factory=bytearray)
+    _overrun: bool = False
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """The frames that `data` completes, in order. Damage is counted, never raised."""
+        frames: list[Frame] = []
+        pieces = data.split(b"\0")
+        for piece in pieces[:-1]:
+            self._take(piece)
+            frame = self._finish()
+            if frame is not None:
+                frames.append(frame)
+        self._take(pieces[-1])
+        return frames
+
+    def reset(self) -> None:
+        """Forgets an unfinished frame (after a reconnection); counters stay."""
+        self._partial.clear()
+        self._overrun = False
+
+    def _take(self, piece: bytes) -> None:
+        if self._overrun or len(self._partial) + len(piece) > MAX_ENCODED:
+            self._overrun = True
+            self._partial.clear()
+        else:
+            self._partial += piece
+
+    def _finish(self) -> Frame | None:
+        encoded = bytes(self._partial)
+        overrun = self._overrun
+        self.reset()
+        if overrun:
+            self.oversized += 1
+            return None
+        if not encoded:
+            return None
+        try:
+            return decode_body(encoded)
+        except ProtocolError:
+            self.damaged += 1
+            return None
