@@ -1,0 +1,90 @@
+"""Rules for all tests: nothing is left running, and where everything is installed nothing is skipped quietly."""
+
+import os
+from collections.abc import Generator, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.left_running import Running, mark_this_process
+
+ROOT = Path(__file__).parent.parent
+SKIPS_ARE_ERRORS = os.environ.get("CI", "").lower() in ("1", "true")
+MAY_ALWAYS_SKIP = ("hardware", "lab_data")
+"""Marks of tests that need what nobody can install: a real arm, and traces that are kept outside the repository."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--port", metavar="URL", help="run the hardware tests on the real controller at this port")
+    parser.addoption(
+        "--lab-data",
+        type=Path,
+        default=ROOT.parent / "shared" / "data",
+        metavar="FOLDER",
+        help="measured traces of real rigs (default: shared/data beside the repository)",
+    )
+
+
+@pytest.fixture(scope="session")
+def hardware_port(request: pytest.FixtureRequest) -> str:
+    """The port of the real controller (`--port`); a test that asks for it is marked `hardware`."""
+    port: str = request.config.getoption("--port")
+    return port
+
+
+@pytest.fixture(scope="session")
+def lab_data(request: pytest.FixtureRequest) -> Path:
+    """The folder of measured traces (`--lab-data`); a test that asks for it is marked `lab_data`."""
+    folder: Path = request.config.getoption("--lab-data")
+    return folder
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("hardware") and not item.config.getoption("--port"):
+        pytest.skip("needs a real controller: --port URL")
+    folder: Path = item.config.getoption("--lab-data")
+    if item.get_closest_marker("lab_data") and not folder.is_dir():
+        pytest.skip("needs measured traces that are kept outside the repository: --lab-data FOLDER")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item,
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    may_skip = any(item.get_closest_marker(mark) for mark in MAY_ALWAYS_SKIP)
+    if SKIPS_ARE_ERRORS and report.skipped and not may_skip and not hasattr(report, "wasxfail"):
+        report.outcome = "failed"
+        report.longrepr = f"Skipped where everything is installed (CI is set): {report.longrepr}"
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    report = yield
+    if SKIPS_ARE_ERRORS and report.skipped:
+        report.outcome = "failed"
+        report.longrepr = f"A whole file skipped where everything is installed (CI is set): {report.longrepr}"
+    return report
+
+
+def _check_nothing_left_running() -> Iterator[None]:
+    before = Running.now()
+    yield
+    left = Running.now() - before
+    if left and (left := left.wait()):
+        left.kill_processes()
+        pytest.fail(f"left running: {left}")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def nothing_left_running_at_the_end() -> Iterator[None]:
+    """Fail when a fixture shared by many tests leaves a thread or a process behind."""
+    mark_this_process()
+    yield from _check_nothing_left_running()
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_running(nothing_left_running_at_the_end: None) -> Iterator[None]:
+    """Fail a test that leaves a thread or a process behind."""
+    yield from _check_nothing_left_running()

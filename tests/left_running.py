@@ -1,0 +1,108 @@
+"""What a test, or a program it started, has left running: threads of this process, and processes anywhere below it."""
+
+import multiprocessing
+import os
+import select
+import signal
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+MARK = "MA2000_DAQ_TESTS"
+"""Environment variable that the tests' processes inherit, so that they are known again even when their parent has gone."""
+
+GRACE_S = 2.0
+"""How long what is about to end may still take."""
+
+
+def mark_this_process() -> None:
+    """Let every process that is started from now on, at any depth, carry the mark of this test run."""
+    os.environ[MARK] = str(os.getpid())
+
+
+@dataclass(frozen=True)
+class Running:
+    """The threads and the ids of the processes of this test run, at one moment."""
+
+    threads: frozenset[threading.Thread]
+    processes: frozenset[int]
+
+    @classmethod
+    def now(cls) -> "Running":
+        return cls(frozenset(threading.enumerate()), frozenset(_marked_processes() | _forked_processes()))
+
+    def __sub__(self, earlier: "Running") -> "Running":
+        return Running(self.threads - earlier.threads, self.processes - earlier.processes)
+
+    def __bool__(self) -> bool:
+        return bool(self.threads or self.processes)
+
+    def wait(self, grace_s: float = GRACE_S) -> "Running":
+        """What of this still runs when all has ended, or `grace_s` seconds have passed."""
+        deadline = time.monotonic() + grace_s
+        for thread in self.threads:
+            thread.join(max(0.0, deadline - time.monotonic()))
+        for process in self.processes:
+            _wait_for_end(process, max(0.0, deadline - time.monotonic()))
+        still = Running.now()
+        return Running(self.threads & still.threads, self.processes & still.processes)
+
+    def kill_processes(self) -> None:
+        """End the processes, so that a test that failed for leaving them does not disturb the next."""
+        for process in self.processes:
+            try:
+                os.kill(process, signal.SIGKILL)
+            except ProcessLookupError:
+                continue
+
+    def __str__(self) -> str:
+        lines = [f"thread {thread.name!r} (daemon: {thread.daemon})" for thread in self.threads]
+        lines += [f"process {process}: {_command_line(process)}" for process in self.processes]
+        return ", ".join(sorted(lines))
+
+
+def _marked_processes() -> set[int]:
+    mark = f"{MARK}={os.getpid()}\0".encode()
+    found = set()
+    for entry in os.scandir("/proc"):
+        if not entry.name.isdigit():
+            continue
+        try:
+            environment = Path(entry.path, "environ").read_bytes()
+        except OSError:  # it has ended meanwhile, or belongs to another user
+            continue
+        if mark in environment and not _serves_multiprocessing(entry.name):
+            found.add(int(entry.name))
+    return found - {os.getpid()}
+
+
+def _forked_processes() -> set[int]:
+    """Processes forked without a new program: their environment in /proc is older than the mark."""
+    return {child.pid for child in multiprocessing.active_children() if child.pid is not None}
+
+
+def _serves_multiprocessing(process: int | str) -> bool:
+    """Whether it is the standard library's own helper, which lives as long as the process that first needed it."""
+    command = _command_line(process)
+    return "multiprocessing.resource_tracker" in command or "multiprocessing.forkserver" in command
+
+
+def _command_line(process: int | str) -> str:
+    try:
+        return Path(f"/proc/{process}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
+    except OSError:
+        return "(ended)"
+
+
+def _wait_for_end(process: int, timeout_s: float) -> None:
+    try:
+        handle = os.pidfd_open(process)
+    except ProcessLookupError:
+        return
+    try:
+        poll = select.poll()
+        poll.register(handle, select.POLLIN)
+        poll.poll(timeout_s * 1000)
+    finally:
+        os.close(handle)

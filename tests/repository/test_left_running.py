@@ -1,0 +1,58 @@
+"""What a test leaves running is found, named, waited for, and ended."""
+
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from tests.left_running import Running
+
+SLEEPER = "import time; time.sleep(60)"
+GRANDPARENT = f"import subprocess, sys; subprocess.Popen([sys.executable, '-c', {SLEEPER!r}], start_new_session=True)"
+
+
+@contextmanager
+def a_thread() -> Iterator[threading.Thread]:
+    go = threading.Event()
+    thread = threading.Thread(target=go.wait, name="forgotten", daemon=True)
+    thread.start()
+    try:
+        yield thread
+    finally:
+        go.set()
+        thread.join()
+
+
+def test_it_names_a_thread_that_was_left() -> None:
+    before = Running.now()
+    with a_thread():
+        left = (Running.now() - before).wait(grace_s=0.01)
+    assert "'forgotten'" in str(left)
+
+
+def test_it_waits_for_a_thread_that_is_about_to_end() -> None:
+    before = Running.now()
+    threading.Thread(target=time.sleep, args=(0.05,)).start()
+    assert not (Running.now() - before).wait()
+
+
+def test_it_names_a_process_that_was_left_and_can_end_it() -> None:
+    before = Running.now()
+    with subprocess.Popen([sys.executable, "-c", SLEEPER]) as process:
+        left = (Running.now() - before).wait(grace_s=0.01)
+        assert left.processes == {process.pid}
+        assert SLEEPER in str(left)
+        left.kill_processes()
+        assert process.wait(timeout=10) < 0
+    assert not Running.now() - before
+
+
+def test_it_finds_a_process_whose_parent_has_ended() -> None:
+    before = Running.now()
+    subprocess.run([sys.executable, "-c", GRANDPARENT], check=True)
+    left = (Running.now() - before).wait(grace_s=0.01)
+    assert len(left.processes) == 1
+    left.kill_processes()
+    assert not left.wait()

@@ -1,0 +1,95 @@
+"""The rules of tests/conftest.py hold: each is shown a file of tests that breaks it."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+SKIPPING = """
+import pytest
+
+@pytest.mark.hardware
+def test_of_hardware():
+    pass
+
+@pytest.mark.lab_data
+def test_of_lab_data():
+    pass
+
+def test_that_lacks_something():
+    pytest.skip("no browser here")
+
+@pytest.mark.xfail(reason="known")
+def test_that_is_expected_to_fail():
+    assert False
+"""
+
+SKIPPING_AS_A_WHOLE = """
+import pytest
+pytest.importorskip("a_module_that_does_not_exist")
+"""
+
+LEAVING = """
+import subprocess, sys, threading, time
+import pytest
+
+@pytest.fixture(scope="module")
+def shared_process():
+    return subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+
+def test_that_leaves_a_thread():
+    threading.Thread(target=time.sleep, args=(60,), name="forgotten", daemon=True).start()
+
+def test_that_uses_what_its_module_shares(shared_process):
+    pass
+
+def test_that_leaves_nothing():
+    thread = threading.Thread(target=time.sleep, args=(0.01,))
+    thread.start()
+"""
+
+
+def outcomes(folder: Path, tests: str, *, ci: str = "") -> tuple[dict[str, int], str]:
+    """Run a file of tests under this repository's rules; the counts of pytest's last line, and all it printed."""
+    file = folder / "test_example.py"
+    file.write_text(tests)
+    command = [sys.executable, "-m", "pytest", "-p", "tests.conftest", "-p", "no:cacheprovider"]
+    command += ["-c", str(ROOT / "pyproject.toml"), "--rootdir", str(folder)]
+    command += ["--lab-data", str(folder / "absent"), str(file)]
+    run = subprocess.run(
+        command, cwd=ROOT, env=os.environ | {"CI": ci}, capture_output=True, text=True, check=False, timeout=60
+    )
+    last_line = run.stdout.strip().splitlines()[-1]
+    return {word: int(count) for count, word in re.findall(r"(\d+) ([a-z]+)", last_line)}, run.stdout
+
+
+@pytest.mark.parametrize(
+    ("ci", "expected"),
+    [("true", {"failed": 1, "skipped": 2, "xfailed": 1}), ("", {"skipped": 3, "xfailed": 1})],
+    ids=["where everything is installed", "at a desk"],
+)
+def test_a_skip_is_an_error_only_where_everything_is_installed(
+    tmp_path: Path, ci: str, expected: dict[str, int]
+) -> None:
+    counts, printed = outcomes(tmp_path, SKIPPING, ci=ci)
+    assert expected.items() <= counts.items(), printed
+    assert "no browser here" in printed
+    assert "passed" not in counts
+
+
+def test_a_file_that_skips_as_a_whole_is_an_error_where_everything_is_installed(tmp_path: Path) -> None:
+    counts, printed = outcomes(tmp_path, SKIPPING_AS_A_WHOLE, ci="true")
+    assert counts.get("error") == 1, printed
+
+
+def test_a_test_or_a_shared_fixture_that_leaves_something_running_fails(tmp_path: Path) -> None:
+    counts, printed = outcomes(tmp_path, LEAVING)
+    assert counts["passed"] == 3, printed
+    assert counts["errors"] == 2, printed
+    assert "left running: thread 'forgotten'" in printed
+    assert "time.sleep(60)" in printed
