@@ -1,0 +1,33 @@
+"""The names of physical effects that everyone shares."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+
+UNKNOWN_EFFECT = "unknown_effect"
+"""What an effect is called whose name is not in the shared list."""
+
+
+@dataclass(frozen=True)
+class EffectName:
+    """One effect: the field's term, where it acts, the family in which effects are easily confused, one line."""
+
+    name: str
+    acts_on: str
+    family: str
+    line: str
+
+
+@cache
+def effect_names() -> dict[str, EffectName]:
+    """Every shared effect by name, in the order of `effects.toml`."""
+    text = resources.files("daq.contracts").joinpath("effects.toml").read_text("utf-8")
+    return {name: EffectName(name=name, **entry) for name, entry in tomllib.loads(text).items()}
+
+
+def shared_name(name: str) -> str:
+    """`name` where it is a shared one, else UNKNOWN_EFFECT."""
+    return name if name in effect_names() else UNKNOWN_EFFECT

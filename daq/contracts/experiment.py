@@ -1,0 +1,218 @@
+"""What to run: a trajectory on some joints from a start posture, with gains, holds and repeats. Angles in rad."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+
+from daq.contracts.errors import SpecError
+
+JOINTS = 6
+DEFAULT_AMPLITUDE = math.radians(21.6)
+"""21.6°, that is 80 posture units (section 6.5 of the source)."""
+DEFAULT_RAMP_TIME = 0.65
+"""Duration of the ramp in s (section 6.5)."""
+
+Duration = Annotated[FiniteFloat, Field(gt=0, le=3600)]
+Hold = Annotated[FiniteFloat, Field(ge=0, le=3600)]
+JointNumber = Annotated[int, Field(ge=1, le=JOINTS)]
+Angle = Annotated[FiniteFloat, Field(ge=-2 * math.pi, le=2 * math.pi)]
+GainValue = Annotated[int, Field(ge=0, le=20)]
+Gain = tuple[GainValue, GainValue, GainValue]
+"""P, I, D of one joint, each 0–20 (section 6.2)."""
+Amplitude = Angle | dict[JointNumber, Angle]
+"""One value for all joints of the experiment, or one a joint."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Ramp(_Part):
+    """Equal small increments through `amplitude` in `duration`, all joints arriving together (section 6.5)."""
+
+    kind: Literal["ramp"] = "ramp"
+    amplitude: Amplitude = DEFAULT_AMPLITUDE
+    duration: Duration = DEFAULT_RAMP_TIME
+
+
+class Step(_Part):
+    """The whole amplitude in one set point."""
+
+    kind: Literal["step"] = "step"
+    amplitude: Amplitude = math.radians(5.4)
+
+
+class Staircase(_Part):
+    """`steps` equal steps up through `amplitude` and, if `back`, down again, `dwell` s on each."""
+
+    kind: Literal["staircase"] = "staircase"
+    amplitude: Amplitude = DEFAULT_AMPLITUDE
+    steps: Annotated[int, Field(ge=1, le=200)] = 8
+    dwell: Duration = 0.5
+    back: bool = True
+
+
+class SlowRamp(_Part):
+    """Constant speed out to `amplitude` and back, `reversals` changes of direction: friction shows at low speed."""
+
+    kind: Literal["slow_ramp"] = "slow_ramp"
+    amplitude: Amplitude = math.radians(10.8)
+    speed: Annotated[FiniteFloat, Field(gt=0, le=3)] = math.radians(4.0)
+    reversals: Annotated[int, Field(ge=0, le=200)] = 3
+
+
+class Sine(_Part):
+    """`cycles` of a sine about the start posture; joint k of the list lags by k · `phase` rad."""
+
+    kind: Literal["sine"] = "sine"
+    amplitude: Amplitude = math.radians(10.8)
+    period: Duration = 3.0
+    cycles: Annotated[FiniteFloat, Field(gt=0, le=1000)] = 3.0
+    phase: Angle = 0.0
+
+
+class Multisine(_Part):
+    """Sum of `tones` sines between two frequencies with seeded phases, scaled to the amplitude, faded in and out."""
+
+    kind: Literal["multisine"] = "multisine"
+    amplitude: Amplitude = math.radians(10.8)
+    duration: Duration = 10.0
+    lowest: Annotated[FiniteFloat, Field(gt=0, le=25)] = 0.1
+    highest: Annotated[FiniteFloat, Field(gt=0, le=25)] = 2.0
+    tones: Annotated[int, Field(ge=1, le=100)] = 10
+    seed: Annotated[int, Field(ge=0)] = 1
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.lowest > self.highest:
+            raise ValueError(f"lowest frequency {self.lowest} Hz is above the highest {self.highest} Hz")
+        return self
+
+
+class Cubic(_Part):
+    """Cubic in time through `amplitude` in `duration`, at rest at both ends (section 3.7)."""
+
+    kind: Literal["cubic"] = "cubic"
+    amplitude: Amplitude = DEFAULT_AMPLITUDE
+    duration: Duration = 1.0
+
+
+class Path(_Part):
+    """A recorded or designed path: absolute angles (rad) of the experiment's joints at times (s), linear between.
+
+    The first point is the start: the arm is brought there by a slow move.
+    """
+
+    kind: Literal["path"] = "path"
+    times: Annotated[tuple[FiniteFloat, ...], Field(min_length=2)]
+    positions: Annotated[tuple[tuple[Angle, ...], ...], Field(min_length=2)]
+    """One row a time, one column a joint."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if len(self.times) != len(self.positions):
+            raise ValueError(f"{len(self.times)} times for {len(self.positions)} rows of positions")
+        if self.times[0] != 0 or any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
+            raise ValueError("times must start at 0 and increase strictly")
+        return self
+
+
+class Pause(_Part):
+    """No motion for `duration`: a piece of a sequence."""
+
+    kind: Literal["pause"] = "pause"
+    duration: Duration
+
+
+Simple = Annotated[
+    Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Pause, Field(discriminator="kind")
+]  # fmt: skip
+
+
+class Segment(_Part):
+    """One piece of a sequence, on its own joints (all of the experiment's when None)."""
+
+    move: Simple
+    joints: tuple[JointNumber, ...] | None = None
+
+
+class Sequence(_Part):
+    """Pieces one after the other, each from where the one before ended."""
+
+    kind: Literal["sequence"] = "sequence"
+    segments: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=1000)]
+
+
+Trajectory = Annotated[
+    Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Path | Pause | Sequence, Field(discriminator="kind")
+]  # fmt: skip
+
+
+class ExperimentSpec(_Part):
+    """One experiment. The same model serves the command line, the service and the trace's metadata.
+
+    `start` gives angles (rad) of joints to be brought to before the record; joints not named go to the machine's rest
+    posture. `settle` s are held before the motion and `hold` s after it, both recorded.
+    """
+
+    trajectory: Trajectory = Ramp()
+    joints: Annotated[tuple[JointNumber, ...], Field(min_length=1, max_length=JOINTS)] = (1, 2, 3)
+    start: dict[JointNumber, Angle] = {}
+    gains: dict[JointNumber, Gain] = {}
+    settle: Hold = 0.5
+    hold: Hold = 2.0
+    repeats: Annotated[int, Field(ge=1, le=1000)] = 1
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")] | None = None
+    operator: Annotated[str, Field(max_length=100)] | None = None
+    notes: Annotated[str, Field(max_length=10000)] = ""
+
+    @model_validator(mode="after")
+    def _joints_agree(self) -> Self:
+        if list(self.joints) != sorted(set(self.joints)):
+            raise ValueError(f"joints {list(self.joints)}: must be different and ascending")
+        moves: list[tuple[object, tuple[int, ...]]] = [(self.trajectory, self.joints)]
+        if isinstance(self.trajectory, Sequence):
+            moves = [(segment.move, segment.joints or self.joints) for segment in self.trajectory.segments]
+        for move, joints in moves:
+            if not set(joints) <= set(self.joints):
+                raise ValueError(f"a segment moves joints {list(joints)}, the experiment has {list(self.joints)}")
+            amplitude = getattr(move, "amplitude", None)
+            if isinstance(amplitude, dict) and set(amplitude) != set(joints):
+                raise ValueError(f"amplitude is given for joints {sorted(amplitude)}, the motion is on {list(joints)}")
+        if isinstance(self.trajectory, Path) and len(self.trajectory.positions[0]) != len(self.joints):
+            columns = len(self.trajectory.positions[0])
+            raise ValueError(f"the path has {columns} columns for {len(self.joints)} joints")
+        return self
+
+
+def parse_spec(data: object, origin: str = "experiment") -> ExperimentSpec:
+    """An experiment from plain data. Raises SpecError with one line that names the field and what is allowed."""
+    try:
+        return ExperimentSpec.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or origin
+        value = "" if isinstance(first["input"], dict | BaseModel) else f" (got {first['input']!r})"
+        raise SpecError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}{value}") from error
+
+
+def parse_joints(text: str) -> tuple[int, ...]:
+    """Joint numbers from `1-3`, `1,3` or `1-2,5`. Raises SpecError for anything else."""
+    joints: set[int] = set()
+    for part in text.split(","):
+        match = re.fullmatch(r"\s*(\d+)\s*(?:-\s*(\d+)\s*)?", part)
+        if match is None:
+            raise SpecError(f"joints {text!r}: write 1-3, 1,3 or 2; joints are 1 to {JOINTS}")
+        first = int(match[1])
+        last = int(match[2]) if match[2] else first
+        if last < first:
+            raise SpecError(f"joints {text!r}: {first}-{last} runs backwards, write {last}-{first}")
+        for joint in (first, last):
+            if not 1 <= joint <= JOINTS:
+                raise SpecError(f"joints {text!r}: there is no joint {joint}, joints are 1 to {JOINTS}")
+        joints.update(range(first, last + 1))
+    return tuple(sorted(joints))

@@ -1,0 +1,46 @@
+"""What an arm may do. A limit that is not set is None, never 0: nothing is guessed, and nothing is free by accident."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+
+
+class JointLimits(BaseModel):
+    """Limits of one joint, in rad and s (m and s on a prismatic joint)."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    low: FiniteFloat | None = None
+    high: FiniteFloat | None = None
+    speed: Positive | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.low is not None and self.high is not None and not self.low < self.high:
+            raise ValueError(f"low {self.low} must be below high {self.high}")
+        return self
+
+
+class Limits(BaseModel):
+    """Limits of the whole arm; `joints[i]` belongs to joint i+1.
+
+    `floor_height` is the lowest z (m, in the base frame) that any link's end may reach; `following_error_counts` is
+    the magnitude of positional error (ADC counts) at which set points pause (127 in the source, section 6.5), and
+    `following_error_time` how long (s) it may last before the run ends in a fault.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    joints: tuple[JointLimits, ...] = ()
+    floor_height: FiniteFloat | None = None
+    reach: Positive | None = None
+    following_error_counts: Annotated[int, Field(ge=1, le=4095)] | None = None
+    following_error_time: Positive | None = None
+
+    def joint(self, number: int) -> JointLimits:
+        """Limits of joint `number` (from 1); all None where none are set."""
+        return self.joints[number - 1] if number <= len(self.joints) else JointLimits()

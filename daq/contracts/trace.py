@@ -1,0 +1,128 @@
+"""A recorded experiment in memory: what was asked, what was measured, when, and under which circumstances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from daq.contracts.errors import TraceError
+from daq.contracts.experiment import ExperimentSpec, Gain
+from daq.contracts.machine import Machine
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+TRACE_FORMAT = 1
+"""Version of the trace's metadata; a reader refuses newer ones."""
+
+Outcome = Literal["complete", "stopped", "fault", "interrupted"]
+EventKind = Literal[
+    "start", "ramp_start", "ramp_end", "reversal", "gains", "limit", "pause", "resume", "retry", "missing",
+    "missed_set_point", "restart", "link_lost", "stop", "fault", "note", "end",
+]  # fmt: skip
+
+
+class TraceEvent(BaseModel):
+    """Something that happened during the record. `time` is in s from the record's start."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    time: float
+    kind: EventKind
+    message: str
+    tick: int | None = None
+    joint: int | None = None
+
+
+class TraceRecord(BaseModel):
+    """What a trace says about itself: the metadata record at the start of the file, and at its end the outcome."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    format: Annotated[int, Field(le=TRACE_FORMAT)] = TRACE_FORMAT
+    trace_id: str
+    created: datetime
+    software: str
+    source: Literal["mock", "real", "imported"]
+    robot: str = "ma2000"
+    operator: str | None = None
+    machine: Machine | None = None
+    memory_map: dict[str, object] | None = None
+    spec: ExperimentSpec | None = None
+    gains: dict[int, Gain] | None = None
+    period: float | None = None
+    """Control period (s); None where the record was not made tick by tick."""
+    drive_unit: Literal["V", "N·m", "N"] | None = None
+    clock: dict[str, float] = {}
+    """Offsets between the board's ticks, the host's monotonic clock and UTC, in s."""
+    notes: str = ""
+    outcome: Outcome | None = None
+    counters: dict[str, float] = {}
+    """The link's counters at the end of the record."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Signals of n samples on the joints `joints` (numbers from 1), one column each, in that order.
+
+    time:      (n,)   s from the start of the record, strictly increasing
+    position:  (n, j) rad (m on a prismatic joint)
+    set_point: (n, j) rad, as the controller took it in that period; None where the record has none
+    error:     (n, j) rad, set point − position as the controller formed it
+    drive:     (n, j) motor volts after the amplifier, or N·m / N where `record.drive_unit` says so
+    velocity:  (n, j) rad/s
+    power_raw: (n, j) the controller's output before the amplifier, DAC counts
+    tick:      (n,)   number of the control period; a gap is a sample that is missing
+
+    Raises TraceError when shapes disagree, time does not increase, or a value is not finite.
+    """
+
+    record: TraceRecord
+    joints: tuple[int, ...]
+    time: Floats
+    position: Floats
+    set_point: Floats | None = None
+    error: Floats | None = None
+    drive: Floats | None = None
+    velocity: Floats | None = None
+    power_raw: Integers | None = None
+    tick: Integers | None = None
+    events: tuple[TraceEvent, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        count = len(self.time)
+        if not self.joints or len(set(self.joints)) != len(self.joints):
+            raise TraceError(f"trace {self.record.trace_id}: joints {self.joints} are not one or more different joints")
+        for name in ("position", "set_point", "error", "drive", "velocity", "power_raw"):
+            signal = getattr(self, name)
+            if signal is not None and signal.shape != (count, len(self.joints)):
+                wanted = (count, len(self.joints))
+                raise TraceError(f"trace {self.record.trace_id}: {name} has shape {signal.shape}, expected {wanted}")
+            if signal is not None and not np.isfinite(signal).all():
+                row = int(np.argwhere(~np.isfinite(signal))[0][0])
+                raise TraceError(f"trace {self.record.trace_id}: {name} is not finite at sample {row}")
+        if not np.isfinite(self.time).all() or (count > 1 and not (np.diff(self.time) > 0).all()):
+            raise TraceError(f"trace {self.record.trace_id}: time must be finite and strictly increasing")
+        if self.tick is not None and self.tick.shape != (count,):
+            raise TraceError(f"trace {self.record.trace_id}: tick has shape {self.tick.shape}, expected {(count,)}")
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def missing(self) -> int:
+        """Control periods between the first and the last sample that have none."""
+        if self.tick is None or len(self) == 0:
+            return 0
+        return int(self.tick[-1] - self.tick[0]) + 1 - len(self)
+
+    def column(self, joint: int) -> int:
+        """Column of joint `joint` (from 1). Raises TraceError when the trace has none."""
+        if joint not in self.joints:
+            raise TraceError(f"trace {self.record.trace_id}: joint {joint} is not in it; it has {self.joints}")
+        return self.joints.index(joint)
