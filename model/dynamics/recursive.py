@@ -1,0 +1,306 @@
+"""Newton-Euler and Walker-Orin recursions for any chain, compiled, in real or dual numbers.
+
+The Newton-Euler recursion follows appendix B of the thesis (link quantities in link axes, inertia about a
+point of the link instead of its centre of mass), with two differences: the reference point is the origin of
+the link's own frame, because for a prismatic joint the origin before it is not fixed to the link; and the
+prismatic terms are added. Gravity enters as an acceleration of the base, −g. Rotors add n²J q̈ at their own
+joint; the gyroscopic torque of their spin is neglected, as in (8.3).
+
+Every array of a call has one dtype: float64, or complex128 for exact sensitivities (see `model.dynamics.dual`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.dynamics.compilation import compiled, inlined
+from model.dynamics.dual import sin_cos
+from model.dynamics.linear_solve import solve_symmetric
+from model.kinematics.chain import ChainArrays
+
+Array = NDArray[Any]
+
+# Columns of the table that a recursion keeps per link: sine and cosine of θ and α, then the origin of the
+# frame from the one before it, in own axes (p), then force and moment about the frame's origin.
+_ST, _CT, _SA, _CA, _P, _F, _N = 0, 1, 2, 3, 4, 7, 10
+_COLUMNS = 13
+
+
+@inlined
+def _cross(ax: complex, ay: complex, az: complex, bx: complex, by: complex, bz: complex) -> Any:
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@inlined
+def _to_link(row: Array, x: complex, y: complex, z: complex) -> Any:
+    """Components of a vector in link axes, from those in the axes of the frame before (transpose of 3.8)."""
+    turned_x = row[_CT] * x + row[_ST] * y
+    turned_y = row[_CT] * y - row[_ST] * x
+    return turned_x, row[_CA] * turned_y + row[_SA] * z, row[_CA] * z - row[_SA] * turned_y
+
+
+@inlined
+def _to_previous(row: Array, x: complex, y: complex, z: complex) -> Any:
+    """Components in the axes of the frame before, from those in link axes (3.8)."""
+    tilted_y = row[_CA] * y - row[_SA] * z
+    tilted_z = row[_SA] * y + row[_CA] * z
+    return row[_CT] * x - row[_ST] * tilted_y, row[_ST] * x + row[_CT] * tilted_y, tilted_z
+
+
+@inlined
+def _tensor_times(inertia: Array, x: complex, y: complex, z: complex) -> Any:
+    """Product of a tensor stored as xx xy xz yy yz zz with a vector."""
+    return (
+        inertia[0] * x + inertia[1] * y + inertia[2] * z,
+        inertia[1] * x + inertia[3] * y + inertia[4] * z,
+        inertia[2] * x + inertia[4] * y + inertia[5] * z,
+    )
+
+
+@compiled
+def _link_table(chain: ChainArrays, q: Array) -> Array:
+    """(n, 13) table with the geometry columns filled for the posture `q`."""
+    n = q.shape[0]
+    table = np.empty((n, _COLUMNS), dtype=q.dtype)
+    for i in range(n):
+        theta, d = chain.geometry[i, 0], chain.geometry[i, 1]
+        if chain.prismatic[i]:
+            d += q[i]
+        else:
+            theta += q[i]
+        table[i, _ST], table[i, _CT] = sin_cos(theta)
+        table[i, _SA], table[i, _CA] = sin_cos(chain.geometry[i, 3])
+        table[i, _P] = chain.geometry[i, 2]
+        table[i, _P + 1] = d * table[i, _SA]
+        table[i, _P + 2] = d * table[i, _CA]
+    return table
+
+
+@compiled
+def newton_euler(chain: ChainArrays, q: Array, velocity: Array, acceleration: Array, gravity: Array) -> Array:
+    """Joint torques or forces for a given motion (appendix B; 3.30 to 3.39).
+
+    Args:
+        chain: packed chain.
+        q: (n,) joint variables, rad or m.
+        velocity: (n,) their rates.
+        acceleration: (n,) their second derivatives.
+        gravity: (3,) in the base frame, m/s²: `chain.gravity`, or zeros to leave gravity out.
+
+    Returns:
+        (n,) torques, N·m, or forces, N, reflected rotor inertia included.
+    """
+    table = _link_table(chain, q)
+    _forward(chain, table, velocity, acceleration, gravity)
+    return _backward(chain, table, acceleration)
+
+
+@compiled
+def _forward(chain: ChainArrays, table: Array, velocity: Array, acceleration: Array, gravity: Array) -> None:
+    """Velocities and accelerations from the base outwards; leaves each link's own force and moment."""
+    zero = 0.0 * gravity[0]
+    wx, wy, wz = zero, zero, zero
+    ux, uy, uz = zero, zero, zero  # angular acceleration
+    vx, vy, vz = -gravity[0], -gravity[1], -gravity[2]  # linear acceleration of the frame's origin
+    for i in range(velocity.shape[0]):
+        row = table[i]
+        rate, change = velocity[i], acceleration[i]
+        vx, vy, vz = _to_link(row, vx, vy, vz)
+        if chain.prismatic[i]:
+            wx, wy, wz = _to_link(row, wx, wy, wz)
+            ux, uy, uz = _to_link(row, ux, uy, uz)
+            kx, ky, kz = _cross(wx, wy, wz, zero, row[_SA] * rate, row[_CA] * rate)
+            vx += 2.0 * kx
+            vy += 2.0 * ky + row[_SA] * change
+            vz += 2.0 * kz + row[_CA] * change
+        else:
+            ux, uy, uz = _to_link(row, ux + wy * rate, uy - wx * rate, uz + change)
+            wx, wy, wz = _to_link(row, wx, wy, wz + rate)
+        px, py, pz = row[_P], row[_P + 1], row[_P + 2]
+        ax, ay, az = _turning_acceleration(wx, wy, wz, ux, uy, uz, px, py, pz)
+        vx, vy, vz = vx + ax, vy + ay, vz + az
+
+        body = chain.inertial[i]
+        mass, sx, sy, sz = body[0], body[1], body[2], body[3]
+        ax, ay, az = _turning_acceleration(wx, wy, wz, ux, uy, uz, sx, sy, sz)
+        row[_F], row[_F + 1], row[_F + 2] = mass * vx + ax, mass * vy + ay, mass * vz + az
+        ex, ey, ez = _tensor_times(body[4:], ux, uy, uz)
+        hx, hy, hz = _tensor_times(body[4:], wx, wy, wz)
+        gx, gy, gz = _cross(wx, wy, wz, hx, hy, hz)
+        nx, ny, nz = _cross(sx, sy, sz, vx, vy, vz)
+        row[_N], row[_N + 1], row[_N + 2] = ex + gx + nx, ey + gy + ny, ez + gz + nz
+
+
+@inlined
+def _turning_acceleration(
+    wx: complex,
+    wy: complex,
+    wz: complex,
+    ux: complex,
+    uy: complex,
+    uz: complex,
+    x: complex,
+    y: complex,
+    z: complex,
+) -> Any:
+    """ω̇ × r + ω × (ω × r)."""
+    ax, ay, az = _cross(ux, uy, uz, x, y, z)
+    bx, by, bz = _cross(wx, wy, wz, x, y, z)
+    cx, cy, cz = _cross(wx, wy, wz, bx, by, bz)
+    return ax + cx, ay + cy, az + cz
+
+
+@compiled
+def _backward(chain: ChainArrays, table: Array, acceleration: Array) -> Array:
+    """Sum forces and moments from the end inwards and project them on the joint axes (3.37 to 3.39)."""
+    n = acceleration.shape[0]
+    torque = np.empty_like(acceleration)
+    zero = 0.0 * acceleration[0]
+    fx, fy, fz = zero, zero, zero
+    nx, ny, nz = zero, zero, zero
+    for i in range(n - 1, -1, -1):
+        row = table[i]
+        fx, fy, fz = fx + row[_F], fy + row[_F + 1], fz + row[_F + 2]
+        mx, my, mz = _cross(row[_P], row[_P + 1], row[_P + 2], fx, fy, fz)
+        nx, ny, nz = nx + row[_N] + mx, ny + row[_N + 1] + my, nz + row[_N + 2] + mz
+        fx, fy, fz = _to_previous(row, fx, fy, fz)
+        nx, ny, nz = _to_previous(row, nx, ny, nz)
+        torque[i] = (fz if chain.prismatic[i] else nz) + chain.rotor_inertia[i] * acceleration[i]
+    return torque
+
+
+@inlined
+def _composite_to_previous(row: Array, body: Array, out: Array) -> None:
+    """Add a rigid body given about its frame's origin to one given about the origin before, in its axes."""
+    mass = body[0]
+    px, py, pz = row[_P], row[_P + 1], row[_P + 2]
+    sx, sy, sz = body[1], body[2], body[3]
+    tx, ty, tz = sx + mass * px, sy + mass * py, sz + mass * pz
+    xx = body[4] + py * (sy + ty) + pz * (sz + tz)
+    yy = body[7] + px * (sx + tx) + pz * (sz + tz)
+    zz = body[9] + px * (sx + tx) + py * (sy + ty)
+    xy = body[5] - px * sy - tx * py
+    xz = body[6] - px * sz - tx * pz
+    yz = body[8] - py * sz - ty * pz
+    # turn by α about x
+    ca, sa = row[_CA], row[_SA]
+    xy, xz = ca * xy - sa * xz, sa * xy + ca * xz
+    mixed = 2.0 * ca * sa * yz
+    yy_turned = ca * ca * yy - mixed + sa * sa * zz
+    yz = ca * sa * (yy - zz) + (ca * ca - sa * sa) * yz
+    zz = sa * sa * yy + mixed + ca * ca * zz
+    yy = yy_turned
+    # turn by θ about z
+    ct, st = row[_CT], row[_ST]
+    xz, yz = ct * xz - st * yz, st * xz + ct * yz
+    mixed = 2.0 * ct * st * xy
+    xx_turned = ct * ct * xx - mixed + st * st * yy
+    xy = ct * st * (xx - yy) + (ct * ct - st * st) * xy
+    yy = st * st * xx + mixed + ct * ct * yy
+    tx, ty, tz = _to_previous(row, tx, ty, tz)
+    out[0] += mass
+    out[1] += tx
+    out[2] += ty
+    out[3] += tz
+    out[4] += xx_turned
+    out[5] += xy
+    out[6] += xz
+    out[7] += yy
+    out[8] += yz
+    out[9] += zz
+
+
+@compiled
+def _composites(chain: ChainArrays, table: Array) -> Array:
+    """(n + 1, 10) all bodies from link i outwards as one, row i − 1 in frame i − 1's axes; row n is empty.
+
+    Row i is about the origin of frame i and holds link i and everything beyond it, row 0 the whole arm.
+    """
+    n = table.shape[0]
+    bodies = np.zeros((n + 1, 10), dtype=table.dtype)
+    for i in range(n):
+        bodies[i + 1] = chain.inertial[i]
+    for i in range(n - 1, -1, -1):
+        _composite_to_previous(table[i], bodies[i + 1], bodies[i])
+    return bodies
+
+
+@compiled
+def mass_matrix(chain: ChainArrays, q: Array) -> Array:
+    """D(q) by composite bodies (Walker and Orin 1982), (n, n), reflected rotor inertia on the diagonal."""
+    n = q.shape[0]
+    table = _link_table(chain, q)
+    bodies = _composites(chain, table)
+    result = np.empty((n, n), dtype=q.dtype)
+    for j in range(n):
+        row, body = table[j], bodies[j + 1]
+        px, py, pz = row[_P], row[_P + 1], row[_P + 2]
+        mass, sx, sy, sz = body[0], body[1], body[2], body[3]
+        zy, zz = row[_SA], row[_CA]  # the joint's axis in link axes; its x component is zero
+        zx = 0.0 * zy
+        if chain.prismatic[j]:
+            fx, fy, fz = mass * zx, mass * zy, mass * zz
+            nx, ny, nz = _cross(sx, sy, sz, zx, zy, zz)
+        else:
+            vx, vy, vz = _cross(zx, zy, zz, px, py, pz)
+            ax, ay, az = _cross(zx, zy, zz, sx, sy, sz)
+            fx, fy, fz = mass * vx + ax, mass * vy + ay, mass * vz + az
+            mx, my, mz = _cross(sx, sy, sz, vx, vy, vz)
+            nx, ny, nz = _tensor_times(body[4:], zx, zy, zz)
+            nx, ny, nz = nx + mx, ny + my, nz + mz
+        for i in range(j, -1, -1):
+            row = table[i]
+            mx, my, mz = _cross(row[_P], row[_P + 1], row[_P + 2], fx, fy, fz)
+            fx, fy, fz = _to_previous(row, fx, fy, fz)
+            nx, ny, nz = _to_previous(row, nx + mx, ny + my, nz + mz)
+            result[i, j] = fz if chain.prismatic[i] else nz
+            result[j, i] = result[i, j]
+        result[j, j] += chain.rotor_inertia[j]
+    return result
+
+
+@compiled
+def gravity_torques(chain: ChainArrays, q: Array) -> Array:
+    """G(q): rates and accelerations zero, (n,)."""
+    rest = np.zeros_like(q)
+    return newton_euler(chain, q, rest, rest, chain.gravity)
+
+
+@compiled
+def velocity_torques(chain: ChainArrays, q: Array, velocity: Array) -> Array:
+    """H(q, q̇), Coriolis and centrifugal: accelerations and gravity zero, (n,)."""
+    return newton_euler(chain, q, velocity, np.zeros_like(q), np.zeros_like(chain.gravity))
+
+
+@compiled
+def inverse_dynamics(chain: ChainArrays, q: Array, velocity: Array, acceleration: Array) -> Array:
+    """τ = D(q) q̈ + H(q, q̇) + G(q) (3.40), (n,)."""
+    return newton_euler(chain, q, velocity, acceleration, chain.gravity)
+
+
+@compiled
+def forward_dynamics(chain: ChainArrays, q: Array, velocity: Array, torque: Array) -> Array:
+    """q̈ for given joint torques or forces, (n,); inf or nan where D(q) is singular."""
+    remaining = torque - newton_euler(chain, q, velocity, np.zeros_like(q), chain.gravity)
+    return solve_symmetric(mass_matrix(chain, q), remaining)
+
+
+@compiled
+def kinetic_energy(chain: ChainArrays, q: Array, velocity: Array) -> Any:
+    """½ q̇ᵀ D(q) q̇, rotors included, J."""
+    matrix = mass_matrix(chain, q)
+    total = 0.0 * velocity[0]
+    for i in range(q.shape[0]):
+        for j in range(q.shape[0]):
+            total += velocity[i] * matrix[i, j] * velocity[j]
+    return 0.5 * total
+
+
+@compiled
+def potential_energy(chain: ChainArrays, q: Array) -> Any:
+    """Energy in the field of gravity, zero for mass at the base's origin, J."""
+    whole = _composites(chain, _link_table(chain, q))[0]
+    return -(chain.gravity[0] * whole[1] + chain.gravity[1] * whole[2] + chain.gravity[2] * whole[3])
