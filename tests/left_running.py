@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 MARK = "MA2000_DAQ_TESTS"
-"""Environment variable that the tests' processes inherit, so that they are known again even when their parent has gone."""
+"""Environment variable that the tests' processes inherit: it tells them even when their parent has gone."""
 
 GRACE_S = 2.0
 """How long what is about to end may still take."""
