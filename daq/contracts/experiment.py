@@ -156,7 +156,8 @@ class ExperimentSpec(_Part):
     """One experiment. The same model serves the command line, the service and the trace's metadata.
 
     `start` gives angles (rad) of joints to be brought to before the record; joints not named go to the machine's rest
-    posture. `settle` s are held before the motion and `hold` s after it, both recorded.
+    posture. `settle` s are held before the motion and `hold` s after it, both recorded. `record` names the joints to
+    record; None means every joint that the line has room for.
     """
 
     trajectory: Trajectory = Ramp()
@@ -166,6 +167,7 @@ class ExperimentSpec(_Part):
     settle: Hold = 0.5
     hold: Hold = 2.0
     repeats: Annotated[int, Field(ge=1, le=1000)] = 1
+    record: Annotated[tuple[JointNumber, ...], Field(min_length=1, max_length=JOINTS)] | None = None
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")] | None = None
     operator: Annotated[str, Field(max_length=100)] | None = None
     notes: Annotated[str, Field(max_length=10000)] = ""
@@ -174,6 +176,8 @@ class ExperimentSpec(_Part):
     def _joints_agree(self) -> Self:
         if list(self.joints) != sorted(set(self.joints)):
             raise ValueError(f"joints {list(self.joints)}: must be different and ascending")
+        if self.record is not None and not set(self.joints) <= set(self.record):
+            raise ValueError(f"record {list(self.record)} leaves out joints that move: {list(self.joints)}")
         moves: list[tuple[object, tuple[int, ...]]] = [(self.trajectory, self.joints)]
         if isinstance(self.trajectory, Sequence):
             moves = [(segment.move, segment.joints or self.joints) for segment in self.trajectory.segments]
