@@ -1,0 +1,52 @@
+"""Coulomb friction: how large it may be (7.32)–(7.34), and how it builds up when a joint starts to move.
+
+Its sign is not a function of speed here. Each joint has a bristle deflected by the motion, as in Dahl's model,
+    dζ/dq = (1 − ζ sign(dq)) / δ,   friction = level · ζ,   −1 ≤ ζ ≤ 1,
+with δ the presliding displacement. A joint at rest holds a load up to the level without creeping, and nothing
+becomes stiff near zero speed. For a displacement Δq the equation has the exact solution used in `deflect`.
+"""
+
+from __future__ import annotations
+
+from math import cos, exp, hypot, sin
+
+from mock_controller.plant.parameters import PlantParameters
+
+
+class CoulombLevel:
+    """Largest Coulomb torque (N·m) of each joint at a posture.
+
+    The weights of link 2 and of link 3 with its load, projected as in (7.32)–(7.34), are normal forces; μ̃ is an
+    arm in metres. The source prints no sign: the magnitude of each joint's sum is taken.
+    """
+
+    def __init__(self, parameters: PlantParameters) -> None:
+        body = parameters.rigid_body
+        g = hypot(*body.gravity)
+        arm = parameters.friction.effective_arm
+        self._link2 = arm * body.m2 * g
+        self._link3 = arm * (body.m3 + body.m_load) * g
+        constant = [joint.constant_friction for joint in parameters.joints]
+        self._c1, self._c2, self._c3 = constant[:3]
+        self._wrist = constant[3:]
+
+    def at(self, q: list[float]) -> list[float]:
+        """Levels (N·m, ≥ 0) of the six joints at angles `q` (rad)."""
+        s2 = sin(q[1])
+        s23 = sin(q[1] + q[2])
+        link2, link3 = self._link2, self._link3
+        return [
+            self._c1 + abs(link2 * s2 * cos(q[1]) + link3 * s23 * cos(q[1] + q[2])),
+            self._c2 + abs(link2 * s2 + link3 * s23 * cos(q[2])),
+            self._c3 + abs(link3 * s23),
+            *self._wrist,
+        ]
+
+
+def deflect(bristle: float, displacement: float, presliding: float) -> float:
+    """The bristle's deflection ζ after the joint has moved by `displacement` (rad)."""
+    if displacement > 0.0:
+        return 1.0 + (bristle - 1.0) * exp(-displacement / presliding)
+    if displacement < 0.0:
+        return -1.0 + (bristle + 1.0) * exp(displacement / presliding)
+    return bristle

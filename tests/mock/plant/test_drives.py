@@ -1,0 +1,234 @@
+"""Motors, gears, friction and amplifier against closed forms."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mock_controller.plant import Plant, PlantError, PlantParameters, default_plant
+from mock_controller.plant.friction import CoulombLevel, deflect
+
+UP = (0.0, math.pi / 2, 0.0, 0.0, 0.0, 0.0)
+
+
+def frictionless(gravity: float = 0.0, **joint_changes: float) -> PlantParameters:
+    parameters = default_plant()
+    return replace(
+        parameters,
+        rigid_body=replace(parameters.rigid_body, gravity=(0.0, 0.0, -gravity)),
+        friction=replace(parameters.friction, effective_arm=0.0),
+        joints=tuple(replace(joint, constant_friction=0.0, **joint_changes) for joint in parameters.joints),
+    )
+
+
+def waist_inertia(parameters: PlantParameters) -> float:
+    body = parameters.rigid_body
+    return 0.5 * body.m1 * body.r1**2 + parameters.joints[0].reflected_inertia
+
+
+def test_free_motor_settles_where_back_emf_and_viscous_drag_balance_the_volts() -> None:
+    parameters = frictionless()
+    plant = Plant(parameters, angles=UP)
+    joint = parameters.joints[0]
+    plant.advance([0.25, 0, 0, 0, 0, 0], 400_000)
+    volts = 0.25 * parameters.amplifier.gain
+    k = joint.torque_constant / joint.resistance
+    expected = volts * k / (k * joint.back_emf_constant + joint.viscous_friction) / joint.gear_ratio
+    assert plant.joint_rates[0] == pytest.approx(expected, rel=1e-6)
+
+
+def test_waist_follows_the_first_order_lag_of_its_motor() -> None:
+    """Arm straight up: a constant inertia, so the angle is that of a motor with one time constant."""
+    parameters = frictionless()
+    plant = Plant(parameters, angles=UP)
+    joint = parameters.joints[0]
+    n, k = joint.gear_ratio, joint.torque_constant / joint.resistance
+    # With the arm up the three thin bodies add only the wrist's own inertia about the waist.
+    inertia = waist_inertia(parameters) + 3 * parameters.rigid_body.wrist_inertia
+    damping = n**2 * (k * joint.back_emf_constant + joint.viscous_friction)
+    settled = n * k * 0.25 * parameters.amplifier.gain / damping
+    for elapsed in range(20_000, 200_001, 20_000):
+        plant.advance([0.25, 0, 0, 0, 0, 0], 20_000)
+        t, tau = elapsed * 1e-6, inertia / damping
+        assert plant.joint_angles[0] == pytest.approx(settled * (t - tau * (1 - math.exp(-t / tau))), abs=2e-5)
+
+
+@pytest.mark.parametrize("inductance", [0.0, 0.82e-3, 20e-3])
+def test_holding_a_jammed_motor_draws_the_current_of_its_resistance(inductance: float) -> None:
+    plant = Plant(frictionless(inductance=inductance), angles=UP)
+    plant.stall(1)
+    plant.advance([0.3, 0, 0, 0, 0, 0], 200_000)
+    assert plant.joint_angles[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_inductance_of_the_data_sheet_hardly_delays_the_arm_and_a_large_one_does() -> None:
+    def angle_after_20_ms(inductance: float) -> float:
+        plant = Plant(frictionless(inductance=inductance), angles=UP)
+        plant.advance([0.5, 0, 0, 0, 0, 0], 20_000)
+        return plant.joint_angles[0]
+
+    without, small, large = (angle_after_20_ms(value) for value in (0.0, 0.82e-3, 0.1))
+    assert 0.97 * without < small < without
+    assert large < 0.6 * without
+
+
+@pytest.mark.parametrize("inductance", [0.82e-3, 0.05])
+def test_current_with_inductance_converges_with_the_step(inductance: float) -> None:
+    def angle(step_us: int) -> float:
+        plant = Plant(frictionless(inductance=inductance), angles=UP, step_us=step_us)
+        plant.advance([0.5, 0, 0, 0, 0, 0], 60_000)
+        return plant.joint_angles[0]
+
+    assert angle(1000) == pytest.approx(angle(100), abs=2e-4)
+
+
+def test_amplifier_saturates_at_the_supply() -> None:
+    plant = Plant(default_plant(), angles=UP)
+    plant.advance([5.0, -5.0, 0.5, 0, 0, 0], 1000)
+    assert plant.motor_volts[:3] == (36.0, -36.0, 14.0)
+
+
+def test_motor_balances_gravity_at_the_computed_voltage() -> None:
+    parameters = frictionless(gravity=9.81)
+    body, joint = parameters.rigid_body, parameters.joints[2]
+    gravity = 9.81 * (body.m3 / 2 + body.m_load) * body.a3
+    volts = gravity * joint.resistance / (joint.gear_ratio * joint.torque_constant)
+    plant = Plant(parameters, angles=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    plant.stall(2)
+    plant.advance([0, 0, volts / parameters.amplifier.gain, 0, 0, 0], 400_000)
+    assert plant.joint_angles[2] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_coulomb_friction_holds_what_lies_below_its_level_without_creeping() -> None:
+    parameters = default_plant()
+    plant = Plant(parameters, angles=(0.0, 0.8, 0.0, 0.0, 0.0, 0.0))
+    joint = parameters.joints[2]
+    q = plant.joint_angles
+    level = CoulombLevel(parameters).at(q)[2]
+    body = parameters.rigid_body
+    gravity = 9.81 * (body.m3 / 2 + body.m_load) * body.a3 * math.cos(0.8)
+    # The motor carries gravity and half of the friction's level more.
+    volts = (gravity + 0.5 * level) * joint.resistance / (joint.gear_ratio * joint.torque_constant)
+    plant.stall(2)
+    plant.advance([0, 0, volts / 28, 0, 0, 0], 300_000)
+    after_settling = plant.joint_angles[2]
+    plant.advance([0, 0, volts / 28, 0, 0, 0], 2_000_000)
+    assert abs(after_settling) < parameters.friction.presliding
+    assert plant.joint_angles[2] == pytest.approx(after_settling, abs=1e-6)
+
+
+def test_moving_joint_is_slowed_by_exactly_its_coulomb_level() -> None:
+    """Wrist roll: constant friction, no gravity; steady speed loses level / damping."""
+    parameters = default_plant()
+    joint = parameters.joints[5]
+    n, k = joint.gear_ratio, joint.torque_constant / joint.resistance
+    damping = n**2 * (k * joint.back_emf_constant + joint.viscous_friction)
+    plant = Plant(parameters, angles=UP)
+    plant.advance([0, 0, 0, 0, 0, 0.4], 500_000)
+    expected = (n * k * 0.4 * 28 - joint.constant_friction) / damping
+    assert plant.joint_rates[5] == pytest.approx(expected, rel=1e-6)
+
+
+def test_friction_levels_follow_the_published_projections() -> None:
+    parameters = default_plant()
+    level = CoulombLevel(parameters)
+    body, mu = parameters.rigid_body, parameters.friction.effective_arm
+    weight = 9.81 * (body.m3 + body.m_load)
+    upright = level.at(list(UP))
+    assert upright[1] == pytest.approx(mu * (9.81 * body.m2 + weight))
+    assert upright[2] == pytest.approx(mu * weight)
+    assert upright[0] == pytest.approx(0.0, abs=1e-9)
+    assert level.at([0.0] * 6)[:3] == pytest.approx([0, 0, 0])
+
+
+@given(st.floats(-1, 1), st.lists(st.floats(-0.01, 0.01), max_size=20))
+def test_bristle_never_exceeds_its_level_and_ignores_how_motion_is_cut_in_steps(z: float, path: list[float]) -> None:
+    for displacement in path:
+        halves = deflect(deflect(z, displacement / 2, 5e-4), displacement / 2, 5e-4)
+        z = deflect(z, displacement, 5e-4)
+        assert -1 <= z <= 1
+        assert halves == pytest.approx(z, abs=1e-9)
+
+
+def test_end_stops_hold_against_full_drive() -> None:
+    plant = Plant(default_plant(), angles=UP)
+    plant.advance([1.0, 0, 1.0, 0.5, 0.5, 0.5], 6_000_000)
+    overshoot = [a - j.upper_stop for a, j in zip(plant.joint_angles, plant.parameters.joints, strict=True)]
+    assert max(overshoot) < math.radians(3)
+    assert overshoot[0] > -math.radians(1)
+
+
+def test_stalled_joint_stays_and_moves_again_when_released() -> None:
+    plant = Plant(default_plant(), angles=UP)
+    plant.advance([0.5, 0, 0, 0, 0, 0], 100_000)
+    plant.stall(1)
+    jammed_at = plant.joint_angles[0]
+    plant.advance([1.0, 0, 0, 0, 0, 0], 500_000)
+    assert plant.joint_angles[0] == pytest.approx(jammed_at, abs=1e-6)
+    plant.release(1)
+    plant.advance([1.0, 0, 0, 0, 0, 0], 100_000)
+    assert plant.joint_angles[0] > jammed_at + 0.05
+
+
+def test_held_wrist_does_not_move_while_the_arm_does() -> None:
+    plant = Plant(default_plant(), angles=(0.0, 0.8, 0.3, 0.0, 0.0, 0.0))
+    plant.advance([0.8, 0.9, 0.6, 0, 0, 0], 500_000)
+    assert max(map(abs, plant.joint_angles[3:])) < 1e-4
+
+
+def test_default_step_is_converged_far_below_an_adc_count() -> None:
+    def path(step_us: int) -> list[list[float]]:
+        plant = Plant(default_plant(), angles=(0.0, 0.5, 0.3, 0.0, 0.0, 0.0), step_us=step_us)
+        angles = []
+        for period in range(25):
+            sign = 1 if period < 15 else -0.5
+            plant.advance([0.7 * sign, 0.9 * sign, 0.5 * sign, 0.3 * sign, 0.2, 0.1], 20_000)
+            angles.append(plant.joint_angles)
+        return angles
+
+    def largest_difference(a: list[list[float]], b: list[list[float]]) -> float:
+        return max(abs(x - y) for left, right in zip(a, b, strict=True) for x, y in zip(left, right, strict=True))
+
+    fine = path(250)
+    coarse_error, default_error = (largest_difference(path(step), fine) for step in (2000, 1000))
+    assert default_error < 1.15e-3 / 100
+    assert default_error < 0.4 * coarse_error  # second order: a half step brings a quarter of the error
+
+
+def test_two_plants_alike_agree_to_the_bit() -> None:
+    def run() -> list[float]:
+        plant = Plant(default_plant(), angles=UP)
+        for k in range(20):
+            plant.advance([0.03 * k, -0.02 * k, 0.05, 0, 0, 0.1], 20_000)
+        return plant.joint_angles
+
+    assert run() == run()
+
+
+def test_reset_forgets_everything() -> None:
+    plant = Plant(default_plant(), angles=UP)
+    plant.advance([0.5] * 6, 200_000)
+    first = plant.joint_angles
+    plant.stall(3)
+    plant.reset(UP)
+    assert plant.joint_angles == pytest.approx(list(UP), abs=0)
+    plant.advance([0.5] * 6, 200_000)
+    assert plant.joint_angles == first
+
+
+@pytest.mark.parametrize(
+    ("volts", "duration", "says"),
+    [([0.0] * 5, 1000, "6 finite"), ([math.nan] * 6, 1000, "6 finite"), ([0.0] * 6, 1500, "whole number")],
+)
+def test_impossible_requests_are_refused_in_one_line(volts: list[float], duration: int, says: str) -> None:
+    with pytest.raises(PlantError, match=says):
+        Plant(default_plant()).advance(volts, duration)
+
+
+def test_start_outside_the_end_stops_is_refused() -> None:
+    with pytest.raises(PlantError, match="joint 2"):
+        Plant(default_plant(), angles=(0, 7.0, 0, 0, 0, 0))
