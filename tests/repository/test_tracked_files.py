@@ -11,7 +11,7 @@ LARGEST_BYTES = 1024 * 1024
 
 REGISTRY = re.compile(
     r"""(?x)
-    (registry\ =\ "|"resolved":\ "|index-url[ =]|find-links[ =])\s*["']?(https?|file):  # lock files, options of pip and uv
+    (registry\ =\ "|"resolved":\ "|index-url[ =]|find-links[ =])\s*["']?(https?|file):  # lock files, options
     | ^\s*(--index-url|--extra-index-url|--find-links|-i|-f)[ =]\S  # lines of a requirements file
     | https?://([a-z0-9-]+\.)*(pythonhosted\.org|pypi\.org/simple|npmjs\.(org|com)|registry\.[a-z0-9.-]+)
     """,
