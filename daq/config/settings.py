@@ -1,0 +1,144 @@
+"""Strict TOML configuration. A key nobody knows is an error, and every error names key, value and what is allowed."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import platformdirs
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
+
+from daq.contracts.errors import SpecError
+from daq.contracts.limits import Limits
+from daq.contracts.machine import Machine, load_machine
+
+APP = "ma2000-daq"
+LOCAL_FILE = "daq.toml"
+MOCK_URL = "mock://"
+
+
+class RobotSettings(BaseModel):
+    """The arm: its name in files and addresses, its machine file, its port."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")] = "ma2000"
+    machine: str = "ma2000"
+    port: str | None = None
+    memory_map: Path | None = None
+    limits: Limits | None = None
+    """Replaces the machine file's limits as a whole; None keeps them."""
+
+
+class TraceSettings(BaseModel):
+    """Where traces are kept."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    folder: Path = Path("traces")
+
+    @field_validator("folder")
+    @classmethod
+    def _expanded(cls, folder: Path) -> Path:
+        return folder.expanduser()
+
+
+class Settings(BaseSettings):
+    """Everything that can be configured. Environment variables (`DAQ_ROBOT__PORT=…`) go before the file."""
+
+    model_config = SettingsConfigDict(
+        env_prefix="DAQ_",
+        env_nested_delimiter="__",
+        extra="forbid",
+        frozen=True,
+        nested_model_default_partial_update=True,
+    )
+
+    robot: RobotSettings = RobotSettings()
+    traces: TraceSettings = TraceSettings()
+    operator: Annotated[str, Field(max_length=100)] | None = None
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """The environment, then the file's values (given to the constructor)."""
+        del settings_cls, dotenv_settings, file_secret_settings
+        return env_settings, init_settings
+
+    @property
+    def port(self) -> str:
+        """The configured port, or the mock when none is configured."""
+        return self.robot.port or MOCK_URL
+
+    def machine(self) -> Machine:
+        """The machine file, with this configuration's limits in it. Raises SpecError."""
+        machine = load_machine(self.robot.machine)
+        if self.robot.limits is None:
+            return machine
+        if len(self.robot.limits.joints) not in (0, len(machine.joints)):
+            given = len(self.robot.limits.joints)
+            raise SpecError(f"robot.limits.joints has {given} entries; {machine.name} has {len(machine.joints)} joints")
+        return machine.model_copy(update={"limits": self.robot.limits})
+
+
+def config_files(explicit: Path | None = None) -> list[Path]:
+    """Where a configuration is looked for, first found wins: the one asked for, ./daq.toml, the user's."""
+    if explicit is not None:
+        return [explicit]
+    if "DAQ_CONFIG" in os.environ:
+        return [Path(os.environ["DAQ_CONFIG"])]
+    return [Path(LOCAL_FILE), Path(platformdirs.user_config_dir(APP)) / "config.toml"]
+
+
+def load_settings(explicit: Path | None = None) -> tuple[Settings, Path | None]:
+    """The settings, and the file they came from (None: nothing is configured).
+
+    Raises SpecError with one line: the file, the key, its value, what is allowed.
+    """
+    asked_for = explicit is not None or "DAQ_CONFIG" in os.environ
+    for path in config_files(explicit):
+        if path.is_file():
+            return _parse(path), path
+        if asked_for:
+            raise SpecError(f"configuration {path}: no such file")
+    return _validated({}, "environment"), None
+
+
+def _parse(path: Path) -> Settings:
+    try:
+        data = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SpecError(f"configuration {path}: cannot be read: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SpecError(f"configuration {path}: not TOML: {error}") from error
+    return _validated(data, str(path))
+
+
+def _validated(data: dict[str, Any], origin: str) -> Settings:
+    try:
+        return Settings(**data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        message = first["msg"].removeprefix("Value error, ")
+        if first["type"] == "extra_forbidden":
+            message = f"no such key; allowed here: {', '.join(_keys_at(first['loc'][:-1]))}"
+        raise SpecError(f"configuration {origin}: {key} = {first['input']!r}: {message}") from error
+
+
+def _keys_at(where: tuple[int | str, ...]) -> list[str]:
+    model: type[BaseModel] = Settings
+    for part in where:
+        annotation = model.model_fields[str(part)].annotation if str(part) in model.model_fields else None
+        candidates = [annotation, *getattr(annotation, "__args__", ())]
+        model = next((c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)), model)
+    return sorted(model.model_fields)
