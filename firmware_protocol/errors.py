@@ -5,6 +5,14 @@ class ProtocolError(ValueError):
     """Something on the wire, or meant for it, breaks the protocol."""
 
 
+class UnknownOpcodeError(ProtocolError):
+    """A frame whose opcode stands for no message of its direction."""
+
+
+class PayloadLengthError(ProtocolError):
+    """A payload that is shorter or longer than its message."""
+
+
 class UnitsError(ProtocolError):
     """A value that its register, or the joint's range, cannot hold."""
 

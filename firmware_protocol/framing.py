@@ -49,7 +49,9 @@ def crc16(data: bytes) -> int:
 
 
 def stuff(body: bytes) -> bytes:
-    """COBS: `body` (at most 253 bytes) without zeros, one byte longer."""
+    """COBS: `body` (at most MAX_BODY bytes) without zeros, one byte longer. Raises ProtocolError when it is longer."""
+    if len(body) > MAX_BODY:
+        raise ProtocolError(f"body of {len(body)} bytes: at most {MAX_BODY}")
     encoded = bytearray()
     for block in body.split(b"\0"):
         encoded.append(len(block) + 1)
@@ -58,13 +60,20 @@ def stuff(body: bytes) -> bytes:
 
 
 def unstuff(encoded: bytes) -> bytes:
-    """The bytes that `stuff` was given. Raises ProtocolError when a code byte points past the end."""
+    """The bytes that `stuff` was given.
+
+    Raises ProtocolError when `encoded` is empty, too long or holds a zero, or a code byte points past the end:
+    whatever is accepted is exactly what `stuff` would make of the result.
+    """
+    if not 0 < len(encoded) <= MAX_ENCODED:
+        raise ProtocolError(f"{len(encoded)} bytes between delimiters: allowed are 1 to {MAX_ENCODED}")
+    if 0 in encoded:
+        raise ProtocolError("a zero between delimiters")
     body = bytearray()
     position = 0
     while position < len(encoded):
-        code = encoded[position]
-        end = position + code
-        if code == 0 or end > len(encoded):
+        end = position + encoded[position]
+        if end > len(encoded):
             raise ProtocolError(f"byte stuffing broken at byte {position}")
         body += encoded[position + 1 : end]
         if end < len(encoded):
@@ -108,26 +117,32 @@ class FrameDecoder:
     def feed(self, data: bytes) -> list[Frame]:
         """The frames that `data` completes, in order. Damage is counted, never raised."""
         frames: list[Frame] = []
-        pieces = data.split(b"\0")
-        for piece in pieces[:-1]:
-            self._take(piece)
+        start = 0
+        while (end := data.find(DELIMITER, start)) >= 0:
+            self._take(data, start, end)
             frame = self._finish()
             if frame is not None:
                 frames.append(frame)
-        self._take(pieces[-1])
+            start = end + 1
+        self._take(data, start, len(data))
         return frames
+
+    @property
+    def held(self) -> int:
+        """Bytes of an unfinished frame that wait for their rest: never more than MAX_ENCODED."""
+        return len(self._partial)
 
     def reset(self) -> None:
         """Forgets an unfinished frame (after a reconnection); counters stay."""
         self._partial.clear()
         self._overrun = False
 
-    def _take(self, piece: bytes) -> None:
-        if self._overrun or len(self._partial) + len(piece) > MAX_ENCODED:
+    def _take(self, data: bytes, start: int, end: int) -> None:
+        if self._overrun or len(self._partial) + end - start > MAX_ENCODED:
             self._overrun = True
             self._partial.clear()
         else:
-            self._partial += piece
+            self._partial += data[start:end]
 
     def _finish(self) -> Frame | None:
         encoded = bytes(self._partial)

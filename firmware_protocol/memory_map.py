@@ -5,7 +5,8 @@ from __future__ import annotations
 import tomllib
 from functools import cache
 from importlib import resources
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -15,10 +16,36 @@ JOINTS = 6
 """Joints that the controller serves (section 6.2)."""
 
 Provenance = Literal["documented", "assumed"]
+Unit = Literal["posture_unit", "adc_count", "dac_count", "gain", "bit_field", "on_off"]
 Address = Annotated[int, Field(ge=0, le=0xFFFF)]
+Addresses = Annotated[tuple[Address, ...], Field(strict=False)]
+"""TOML has arrays where Python has tuples; the elements stay strict."""
 
 PER_JOINT_REGISTERS = ("set_point", "position", "error", "power", "gain_p", "gain_i", "gain_d")
 SINGLE_REGISTERS = ("process_inputs", "process_outputs", "gripper")
+
+
+class Kind(NamedTuple):
+    """What driver and controller take a register for. A map may move it and not change this."""
+
+    unit: Unit
+    signed: bool
+    least_bits: int
+    most_bits: int
+
+
+KINDS = {
+    "set_point": Kind("posture_unit", False, 10, 16),
+    "position": Kind("adc_count", False, 12, 12),
+    "error": Kind("adc_count", True, 8, 16),
+    "power": Kind("dac_count", True, 8, 8),
+    "gain_p": Kind("gain", False, 5, 8),
+    "gain_i": Kind("gain", False, 5, 8),
+    "gain_d": Kind("gain", False, 5, 8),
+    "process_inputs": Kind("bit_field", False, 1, 8),
+    "process_outputs": Kind("bit_field", False, 1, 8),
+    "gripper": Kind("on_off", False, 1, 1),
+}
 
 
 class Register(BaseModel):
@@ -27,15 +54,15 @@ class Register(BaseModel):
     Element i of `low`, `high` and `provenance` belongs to joint i+1. A value of up to 8 bits has no `high`.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
-    unit: Literal["posture_unit", "adc_count", "dac_count", "gain", "bit_field", "on_off"]
+    unit: Unit
     bits: Annotated[int, Field(ge=1, le=16)]
     signed: bool
     access: Literal["read", "read_write"]
-    low: tuple[Address, ...]
-    high: tuple[Address, ...] | None = None
-    provenance: tuple[Provenance, ...]
+    low: Addresses
+    high: Addresses | None = None
+    provenance: Annotated[tuple[Provenance, ...], Field(strict=False)]
     note: str = ""
 
     @model_validator(mode="after")
@@ -53,7 +80,7 @@ class Register(BaseModel):
         return self.low + (self.high or ())
 
     def decode(self, low: int, high: int = 0) -> int:
-        """Integer value of the register's bytes; bits above `bits` are ignored unless they carry the sign."""
+        """Integer value of the register's bytes; bits above `bits` are ignored."""
         value = (low | high << 8) & ((1 << self.bits) - 1)
         if self.signed and value >> (self.bits - 1):
             value -= 1 << self.bits
@@ -72,7 +99,7 @@ class Register(BaseModel):
 class MemoryMap(BaseModel):
     """All registers of a controller. `base` and `size` bound the memory that may be read or written."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     version: Literal[1]
     name: str
@@ -82,26 +109,46 @@ class MemoryMap(BaseModel):
 
     @model_validator(mode="after")
     def _consistent(self) -> MemoryMap:
-        for names, count in ((PER_JOINT_REGISTERS, JOINTS), (SINGLE_REGISTERS, 1)):
-            for name in names:
-                if name not in self.registers:
-                    raise ValueError(f"register {name} is missing")
-                if len(self.registers[name].low) != count:
-                    found = len(self.registers[name].low)
-                    raise ValueError(f"register {name} has {found} addresses, needs {count}")
-        unknown = self.registers.keys() - set(PER_JOINT_REGISTERS) - set(SINGLE_REGISTERS)
-        if unknown:
-            raise ValueError(f"register {min(unknown)} is not one that the protocol knows")
-        owner: dict[int, str] = {}
-        for name, register in self.registers.items():
-            for address in register.addresses:
-                if not self.base <= address < self.base + self.size:
-                    last = self.base + self.size - 1
-                    raise ValueError(f"{name} at {address:04X} lies outside {self.base:04X}–{last:04X}")
-                if address in owner:
-                    raise ValueError(f"{name} and {owner[address]} overlap at {address:04X}")
-                owner[address] = name
+        if self.base + self.size > 0x10000:
+            raise ValueError(f"{self.size} bytes from {self.base:04X}: the address space ends at FFFF")
+        self._check_names()
+        self._check_kinds()
+        self._check_addresses()
         return self
+
+    def _check_names(self) -> None:
+        for name in (*PER_JOINT_REGISTERS, *SINGLE_REGISTERS):
+            if name not in self.registers:
+                raise ValueError(f"register {name} is missing")
+        unknown = self.registers.keys() - KINDS.keys()
+        if unknown:
+            raise ValueError(f"register {min(unknown)} is not one that the protocol knows: {', '.join(KINDS)}")
+
+    def _check_kinds(self) -> None:
+        for name, register in self.registers.items():
+            kind = KINDS[name]
+            count = JOINTS if name in PER_JOINT_REGISTERS else 1
+            if len(register.low) != count:
+                raise ValueError(f"register {name} has {len(register.low)} addresses, needs {count}")
+            if register.unit != kind.unit:
+                raise ValueError(f"register {name} in {register.unit}: allowed is {kind.unit}")
+            if register.signed != kind.signed:
+                raise ValueError(f"register {name} must be {'signed' if kind.signed else 'unsigned'}")
+            if not kind.least_bits <= register.bits <= kind.most_bits:
+                allowed = f"{kind.least_bits} to {kind.most_bits}"
+                raise ValueError(f"register {name} has {register.bits} bits: allowed are {allowed}")
+
+    def _check_addresses(self) -> None:
+        owner: dict[int, str] = {}
+        last = self.base + self.size - 1
+        for name, register in self.registers.items():
+            for i, address in enumerate(register.addresses):
+                byte = f"{name} {i % JOINTS + 1}" if name in PER_JOINT_REGISTERS else name
+                if not self.base <= address <= last:
+                    raise ValueError(f"{byte} at {address:04X} lies outside {self.base:04X}–{last:04X}")
+                if address in owner:
+                    raise ValueError(f"{byte} and {owner[address]} overlap at {address:04X}")
+                owner[address] = byte
 
     def __getitem__(self, name: str) -> Register:
         return self.registers[name]
@@ -129,7 +176,23 @@ def parse_memory_map(text: str, origin: str = "memory map") -> MemoryMap:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "registers"
-        raise MemoryMapError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}") from error
+        found = first["input"]
+        value = f" (found {found!r})" if isinstance(found, bool | int | float | str) else ""
+        raise MemoryMapError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}{value}") from error
+
+
+def load_memory_map(path: Path) -> MemoryMap:
+    """A laboratory's own map from its file.
+
+    Raises MemoryMapError when the file cannot be read, is not UTF-8, or is no memory map.
+    """
+    try:
+        text = path.read_text("utf-8")
+    except OSError as error:
+        raise MemoryMapError(f"{path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise MemoryMapError(f"{path}: not UTF-8 text at byte {error.start}") from error
+    return parse_memory_map(text, str(path))
 
 
 @cache

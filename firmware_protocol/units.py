@@ -115,6 +115,11 @@ class DriveScale:
     full_scale_v: float
     amplifier_gain: float
 
+    def __post_init__(self) -> None:
+        for name, value in (("full scale", self.full_scale_v), ("amplifier gain", self.amplifier_gain)):
+            if not (math.isfinite(value) and value > 0):
+                raise UnitsError(f"{name} of {value}: must be finite and above 0")
+
     def counts_to_volts(self, counts: float) -> float:
         """Volts at the motor for DAC counts, before any supply limit."""
         return counts * self.full_scale_v * self.amplifier_gain / DAC_MAX

@@ -1,0 +1,93 @@
+"""Joints in messages: masks, the order of values, and what the board holds of one joint."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import ClassVar
+
+from firmware_protocol.errors import PayloadLengthError, ProtocolError
+from firmware_protocol.memory_map import JOINTS
+from firmware_protocol.message import check_range, unpack
+from firmware_protocol.units import ADC_COUNTS
+
+ALL_JOINTS = (1 << JOINTS) - 1
+"""Mask of joints 1 to 6."""
+SET_POINT_REGISTER_MAX = 1023
+"""Largest value of the ten bits of a set point. The controller takes 0–999; memory may hold anything."""
+
+
+def joints_of(mask: int) -> tuple[int, ...]:
+    """Joint numbers (from 1) in a mask, ascending."""
+    return tuple(joint for joint in range(1, JOINTS + 1) if mask >> (joint - 1) & 1)
+
+
+def mask_of(joints: Iterable[int]) -> int:
+    """Mask of joint numbers (from 1), in any order. Raises ProtocolError for a joint that does not exist."""
+    mask = 0
+    for joint in joints:
+        if not 1 <= joint <= JOINTS:
+            raise ProtocolError(f"joint {joint}: allowed are 1 to {JOINTS}")
+        mask |= 1 << (joint - 1)
+    return mask
+
+
+def check_mask(what: str, mask: int) -> None:
+    """Raises ProtocolError unless the mask names at least one joint and none that does not exist."""
+    if not 0 < mask <= ALL_JOINTS:
+        raise ProtocolError(f"{what}: joint mask {mask:#04x}: allowed are 0x01 to {ALL_JOINTS:#04x}")
+
+
+def check_ascending(what: str, joints: tuple[int, ...]) -> None:
+    """Raises ProtocolError unless joints exist, ascend and are at least one: a mask keeps no other order."""
+    if not joints:
+        raise ProtocolError(f"{what}: no joints: at least one")
+    if any(later <= earlier for earlier, later in pairwise(joints)):
+        raise ProtocolError(f"{what}: joints {', '.join(map(str, joints))}: each once, in ascending order")
+    mask_of(joints)
+
+
+def split_mask(what: str, payload: bytes) -> tuple[tuple[int, ...], bytes]:
+    """Joints of the mask that a payload begins with, and the rest. Raises ProtocolError for an impossible mask."""
+    if not payload:
+        raise PayloadLengthError(f"{what}: empty payload, expected a joint mask first")
+    check_mask(what, payload[0])
+    return joints_of(payload[0]), payload[1:]
+
+
+@dataclass(frozen=True)
+class JointReading:
+    """What the board holds of one joint. Set point in posture units, position and error in ADC counts, power in
+    DAC counts (the PID output before the amplifier; section 6.3)."""
+
+    LAYOUT: ClassVar[str] = "HHhb"
+    set_point: int
+    position: int
+    error: int
+    power: int
+
+    def __post_init__(self) -> None:
+        check_range("set point", self.set_point, 0, SET_POINT_REGISTER_MAX)
+        check_range("position", self.position, 0, ADC_COUNTS - 1)
+        check_range("error", self.error, -0x8000, 0x7FFF)
+        check_range("power", self.power, -0x80, 0x7F)
+
+
+JointReadings = tuple[tuple[int, JointReading], ...]
+"""(joint, reading), joints ascending."""
+
+
+def pack_readings(readings: JointReadings) -> bytes:
+    """Mask, then seven bytes a joint."""
+    return bytes((mask_of(joint for joint, _ in readings),)) + b"".join(
+        struct.pack("<" + JointReading.LAYOUT, r.set_point, r.position, r.error, r.power) for _, r in readings
+    )
+
+
+def parse_readings(what: str, payload: bytes) -> JointReadings:
+    """Readings from mask and values. Raises ProtocolError for a wrong mask, length or value."""
+    joints, rest = split_mask(what, payload)
+    values = unpack("<" + JointReading.LAYOUT * len(joints), rest, what)
+    return tuple((joint, JointReading(*values[4 * i : 4 * i + 4])) for i, joint in enumerate(joints))

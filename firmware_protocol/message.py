@@ -1,0 +1,73 @@
+"""What every request and reply has in common: an opcode, and a payload that packs and parses.
+
+A message that could be constructed can be sent: values are checked when it is made, by hand or from a payload.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, fields
+from typing import ClassVar, Self
+
+from firmware_protocol.errors import PayloadLengthError, ProtocolError
+
+_RANGES = {
+    "B": (0, 0xFF),
+    "b": (-0x80, 0x7F),
+    "H": (0, 0xFFFF),
+    "h": (-0x8000, 0x7FFF),
+    "I": (0, 0xFFFFFFFF),
+    "Q": (0, 0xFFFFFFFFFFFFFFFF),
+}
+"""Values that each letter of a `struct` layout holds."""
+
+
+def check_range(what: str, value: int, lowest: int, highest: int) -> None:
+    """Raises ProtocolError unless lowest <= value <= highest."""
+    if not lowest <= value <= highest:
+        raise ProtocolError(f"{what} of {value}: allowed are {lowest} to {highest}")
+
+
+def unpack(layout: str, payload: bytes, what: str) -> tuple[int, ...]:
+    """The integers of a payload. Raises PayloadLengthError unless the payload is exactly as long as the layout."""
+    try:
+        return struct.unpack(layout, payload)
+    except struct.error:
+        wanted = struct.calcsize(layout)
+        raise PayloadLengthError(f"{what}: payload of {len(payload)} bytes, expected {wanted}") from None
+
+
+@dataclass(frozen=True)
+class Message:
+    """Base of every request and reply.
+
+    A subclass with plain integer fields names their `LAYOUT` (a `struct` format, one letter a field); a subclass
+    with anything else has its own `pack` and `parse`. Construction raises ProtocolError when a value does not fit.
+    """
+
+    OPCODE: ClassVar[int]
+    LAYOUT: ClassVar[str] = "<"
+
+    def __post_init__(self) -> None:
+        for letter, field in zip(self.LAYOUT[1:], fields(self), strict=True):
+            check_range(f"{type(self).__name__}: {field.name}", getattr(self, field.name), *_RANGES[letter])
+
+    def pack(self) -> bytes:
+        """Payload bytes."""
+        return struct.pack(self.LAYOUT, *(getattr(self, field.name) for field in fields(self)))
+
+    @classmethod
+    def parse(cls, payload: bytes) -> Self:
+        """The message of a payload. Raises ProtocolError for any payload that `pack` cannot have made."""
+        return cls(*unpack(cls.LAYOUT, payload, cls.__name__))
+
+
+class Request(Message):
+    """Host to controller."""
+
+    CHANGES_STATE: ClassVar[bool] = False
+    """Refused as STALE when its sequence number is behind that of a later state-changing request."""
+
+
+class Reply(Message):
+    """Controller to host."""

@@ -1,0 +1,240 @@
+"""Requests: what the host asks of the controller.
+
+Every one but `Advance` may be repeated without harm: reads change nothing, writes name absolute values.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import Self
+
+from firmware_protocol.errors import PayloadLengthError, ProtocolError
+from firmware_protocol.framing import MAX_PAYLOAD
+from firmware_protocol.joints import check_ascending, check_mask, mask_of, split_mask
+from firmware_protocol.memory_map import JOINTS
+from firmware_protocol.message import Request, check_range, unpack
+from firmware_protocol.units import GAIN_MAX, POSTURE_UNITS
+
+AFTER_NEWEST = 0xFFFFFFFF
+"""SAMPLE(after=AFTER_NEWEST) waits for the next snapshot to be made, whatever has been seen."""
+MAX_READ = MAX_PAYLOAD
+"""Most bytes that one `ReadBlock` asks for."""
+MAX_WRITE = MAX_PAYLOAD - 2
+"""Most bytes that one `WriteBlock` carries."""
+
+
+def _check_block(what: str, address: int, count: int, most: int) -> None:
+    check_range(f"{what}: address", address, 0, 0xFFFF)
+    check_range(f"{what}: number of bytes", count, 1, most)
+    if address + count > 0x10000:
+        raise ProtocolError(f"{what}: {count} bytes from {address:04X}: the address space ends at FFFF")
+
+
+@dataclass(frozen=True)
+class Hello(Request):
+    """Who is there? Clears the RESTARTED flag and forgets the sequence numbers seen so far."""
+
+    OPCODE = 0x01
+
+
+@dataclass(frozen=True)
+class ReadBlock(Request):
+    """Peek: `count` (1–48) bytes of shared memory from `address`, one after the other."""
+
+    OPCODE = 0x02
+    LAYOUT = "<HB"
+    address: int
+    count: int
+
+    def __post_init__(self) -> None:
+        _check_block("ReadBlock", self.address, self.count, MAX_READ)
+
+
+@dataclass(frozen=True)
+class WriteBlock(Request):
+    """Poke: `data` (1–46 bytes) to shared memory from `address` on, in one access."""
+
+    OPCODE = 0x03
+    CHANGES_STATE = True
+    address: int
+    data: bytes
+
+    def __post_init__(self) -> None:
+        _check_block("WriteBlock", self.address, len(self.data), MAX_WRITE)
+
+    def pack(self) -> bytes:
+        """Address, then the bytes."""
+        return struct.pack("<H", self.address) + self.data
+
+    @classmethod
+    def parse(cls, payload: bytes) -> Self:
+        """Address, then at least one byte."""
+        if len(payload) < 3:
+            raise PayloadLengthError(f"WriteBlock: payload of {len(payload)} bytes, expected at least 3")
+        return cls(int.from_bytes(payload[:2], "little"), payload[2:])
+
+
+@dataclass(frozen=True)
+class WriteSetPoints(Request):
+    """Set points of some joints (posture units), taken together (DRIVESA, SAMOVE, CONTPATH; section 6.4)."""
+
+    OPCODE = 0x04
+    CHANGES_STATE = True
+    postures: tuple[tuple[int, int], ...]
+    """(joint, posture units 0–999), joints ascending."""
+
+    def __post_init__(self) -> None:
+        check_ascending("WriteSetPoints", tuple(joint for joint, _ in self.postures))
+        for joint, posture in self.postures:
+            if not 0 <= posture < POSTURE_UNITS:
+                limit = POSTURE_UNITS - 1
+                raise ProtocolError(f"joint {joint}: set point of {posture} posture units: allowed are 0 to {limit}")
+
+    def pack(self) -> bytes:
+        """Mask, then one 16-bit value a joint."""
+        mask = mask_of(joint for joint, _ in self.postures)
+        return struct.pack(f"<B{len(self.postures)}H", mask, *(posture for _, posture in self.postures))
+
+    @classmethod
+    def parse(cls, payload: bytes) -> Self:
+        """Raises ProtocolError for a set point outside 0–999 too."""
+        joints, rest = split_mask(cls.__name__, payload)
+        postures = unpack(f"<{len(joints)}H", rest, cls.__name__)
+        return cls(tuple(zip(joints, postures, strict=True)))
+
+
+@dataclass(frozen=True)
+class ReportGains(Request):
+    """PID gains of all joints (REPORTG)."""
+
+    OPCODE = 0x06
+
+
+@dataclass(frozen=True)
+class SetGains(Request):
+    """PID gains of one joint, each 0–20 (SETG)."""
+
+    OPCODE = 0x07
+    LAYOUT = "<BBBB"
+    CHANGES_STATE = True
+    joint: int
+    p: int
+    i: int
+    d: int
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.joint <= JOINTS:
+            raise ProtocolError(f"joint {self.joint}: allowed are 1 to {JOINTS}")
+        for name, value in (("P", self.p), ("I", self.i), ("D", self.d)):
+            check_range(f"joint {self.joint}: gain {name}", value, 0, GAIN_MAX)
+
+
+@dataclass(frozen=True)
+class ReportErrorsPositionsPowers(Request):
+    """Errors, positions and powers of the masked joints as the memory holds them now (REPORTEPP).
+
+    Read byte by byte: a value may be torn. `Sample` is the consistent form.
+    """
+
+    OPCODE = 0x08
+    LAYOUT = "<B"
+    mask: int
+
+    def __post_init__(self) -> None:
+        check_mask("ReportErrorsPositionsPowers", self.mask)
+
+
+@dataclass(frozen=True)
+class Sample(Request):
+    """The oldest snapshot newer than tick `after`; waits for one when there is none.
+
+    A lost reply costs nothing: the same question gets the same answer again.
+    """
+
+    OPCODE = 0x10
+    LAYOUT = "<IB"
+    after: int
+    mask: int
+
+    def __post_init__(self) -> None:
+        check_range("Sample: after", self.after, 0, AFTER_NEWEST)
+        check_mask("Sample", self.mask)
+
+
+@dataclass(frozen=True)
+class Stop(Request):
+    """Set points := measured posture, at once, and held until `Release`. Obeyed at any moment, in any state."""
+
+    OPCODE = 0x20
+    CHANGES_STATE = True
+
+
+@dataclass(frozen=True)
+class Release(Request):
+    """Ends the freeze of `Stop`. Set points stay where the stop put them."""
+
+    OPCODE = 0x21
+    CHANGES_STATE = True
+
+
+@dataclass(frozen=True)
+class ReadProcess(Request):
+    """Process inputs, outputs and gripper."""
+
+    OPCODE = 0x30
+
+
+@dataclass(frozen=True)
+class WriteOutputs(Request):
+    """Process outputs in `mask` take the bits of `values`; the others stay."""
+
+    OPCODE = 0x31
+    LAYOUT = "<BB"
+    CHANGES_STATE = True
+    mask: int
+    values: int
+
+
+@dataclass(frozen=True)
+class SetGripper(Request):
+    """Pneumatic gripper: 1 closes, 0 opens."""
+
+    OPCODE = 0x32
+    LAYOUT = "<B"
+    CHANGES_STATE = True
+    closed: int
+
+    def __post_init__(self) -> None:
+        if self.closed not in (0, 1):
+            raise ProtocolError(f"gripper {self.closed}: allowed are 0 (open) and 1 (closed)")
+
+
+@dataclass(frozen=True)
+class ReadStatus(Request):
+    """Tick, flags and counters of the board."""
+
+    OPCODE = 0x33
+
+
+@dataclass(frozen=True)
+class Advance(Request):
+    """Lock-step only: let `microseconds` of the board's time pass.
+
+    Relative, so a repeat under the same sequence number is answered again and not carried out again.
+    """
+
+    OPCODE = 0x40
+    LAYOUT = "<I"
+    CHANGES_STATE = True
+    microseconds: int
+
+
+REQUESTS: dict[int, type[Request]] = {
+    kind.OPCODE: kind
+    for kind in (
+        Hello, ReadBlock, WriteBlock, WriteSetPoints, ReportGains, SetGains, ReportErrorsPositionsPowers, Sample,
+        Stop, Release, ReadProcess, WriteOutputs, SetGripper, ReadStatus, Advance,
+    )
+}  # fmt: skip
+"""Every request by its opcode."""
