@@ -63,12 +63,12 @@ $(FOR_DEVELOPMENT): requirements-dev.txt $(FOR_USE)
 	@$(PIP) install --require-hashes --requirement requirements-dev.txt
 	@touch $@
 
-# ensurepip writes pip last, so that a .venv whose making was interrupted is made again.
+# ensurepip writes pip last: a .venv whose making was interrupted, or that uv made, has none and is made again.
 $(BIN)/pip:
 	@command -v $(PYTHON) >/dev/null || { echo "No $(PYTHON) found: install Python 3.11 or newer, or name one: make PYTHON=python3.12"; exit 1; }
 	@$(PYTHON) -c 'import sys; v = sys.version_info; v >= (3, 11) or sys.exit("Python 3.11 or newer is needed and $(PYTHON) is %d.%d: name a newer one: make PYTHON=python3.12" % v[:2])'
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "$(PYTHON) cannot make virtual environments: install its venv package (Debian, Ubuntu: apt install python3-venv)"; exit 1; }
-	@$(PYTHON) -m venv .venv
+	@$(PYTHON) -m venv --clear .venv
 
 # ---- the pinned requirements: with hashes, for every platform, and without the address of any package index
 
