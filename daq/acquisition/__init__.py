@@ -1,0 +1,1 @@
+"""The acquisition process: owner of the port, writer of the trace, listener for stop."""

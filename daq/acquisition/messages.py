@@ -1,0 +1,87 @@
+"""What the acquisition process is told, and what it tells: one JSON object a line, on its standard input and output."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.limits import Limits
+from daq.contracts.machine import Machine
+from daq.contracts.trace import Outcome, TraceEvent
+
+
+class _Message(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Job(_Message):
+    """One experiment to run: the first line that the process reads.
+
+    `moves_real_arm` is the operator's consent: without it a controller that is not simulated is refused.
+    """
+
+    url: str
+    machine: Machine
+    limits: Limits
+    spec: ExperimentSpec
+    folder: Path
+    robot: str = "ma2000"
+    memory_map: str | None = None
+    """Text of a memory map file; None for the one that ships."""
+    moves_real_arm: bool = False
+    report_samples: bool = False
+
+
+class Progress(_Message):
+    """How far the run is."""
+
+    kind: Literal["progress"] = "progress"
+    fraction: float
+    text: str
+
+
+class EventHappened(_Message):
+    """Something that is in the trace too."""
+
+    kind: Literal["event"] = "event"
+    event: TraceEvent
+
+
+class Sampled(_Message):
+    """One sample, for a live view; columns in the order of `joints`."""
+
+    kind: Literal["sample"] = "sample"
+    tick: int
+    time: float
+    joints: tuple[int, ...]
+    set_point: tuple[float, ...]
+    position: tuple[float, ...]
+    drive: tuple[float, ...]
+    status: int
+
+
+class Finished(_Message):
+    """The run is over and its trace is closed."""
+
+    kind: Literal["finished"] = "finished"
+    outcome: Outcome
+    trace: Path
+    samples: int
+    missing: int
+    counters: dict[str, float]
+    reason: str = ""
+
+
+class Failed(_Message):
+    """Nothing was recorded: why, in one line, and the exit code that goes with it."""
+
+    kind: Literal["failed"] = "failed"
+    message: str
+    exit_code: int
+
+
+Report = Annotated[Progress | EventHappened | Sampled | Finished | Failed, Field(discriminator="kind")]
+REPORT: TypeAdapter[Progress | EventHappened | Sampled | Finished | Failed] = TypeAdapter(Report)

@@ -1,0 +1,72 @@
+"""What every subcommand needs: the settings, the port, the consent to move a real arm, and how results are printed."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from daq.config import Settings
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")]
+YesOption = Annotated[bool, typer.Option("--yes", help="Consent to moving a real arm without being asked.")]
+
+
+@cache
+def console() -> Console:
+    """For people: progress, questions, remarks, on standard error. Results go to standard output."""
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False)
+
+
+@dataclass
+class Invocation:
+    """One call of `daq`: what was said before the subcommand. Settings are read when they are first needed."""
+
+    config_file: Path | None = None
+    port_option: str | None = None
+    told: bool = field(default=False, repr=False)
+
+    @cached_property
+    def settings(self) -> Settings:
+        """The settings. Raises SpecError."""
+        from daq.config import load_settings
+
+        return load_settings(self.config_file)[0]
+
+    @property
+    def port(self) -> str:
+        """The port of the command line, of the configuration, or the mock: said aloud when it is the mock by default."""
+        if self.port_option is not None:
+            return self.port_option
+        if self.settings.robot.port is None and not self.told:
+            self.told = True
+            console().print("No robot is configured: using the mock controller (no arm moves). See `daq config show`.")
+        return self.settings.port
+
+    @property
+    def trace_folder(self) -> Path:
+        """Where traces are kept."""
+        return self.settings.traces.folder
+
+
+def invocation(context: typer.Context) -> Invocation:
+    """The invocation that the callback made."""
+    found = context.find_object(Invocation)
+    assert found is not None
+    return found
+
+
+def print_json(data: Any) -> None:
+    """Data on standard output, as one JSON document."""
+    json.dump(data, sys.stdout, indent=2, ensure_ascii=False, default=str)
+    sys.stdout.write("\n")

@@ -1,0 +1,49 @@
+"""Subcommands that are imported when they are used, so that `daq --help` starts fast."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+import typer.core
+import typer.main
+
+SUBCOMMANDS: dict[str, tuple[str, str]] = {
+    "run": ("daq.cli.run", "Run an experiment and record its trace."),
+    "stop": ("daq.cli.stop", "Stop every moving robot, at once."),
+    "reset": ("daq.cli.reset", "End the freeze of a stop; nothing moves."),
+    "status": ("daq.cli.status", "What the robot and its link say now."),
+    "ports": ("daq.cli.ports", "Serial ports that could be a robot."),
+    "gains": ("daq.cli.gains", "Show or set the controller's PID gains."),
+    "io": ("daq.cli.process_io", "Process inputs and outputs, and the gripper."),
+    "teach": ("daq.cli.teach", "Jog, lead by the nose, steps, and playing back."),
+    "calibrate": ("daq.cli.calibrate", "Find what the machine really does."),
+    "traces": ("daq.cli.traces", "List, show, plot, convert and verify traces."),
+    "config": ("daq.cli.config", "Show and check the configuration."),
+    "mock": ("daq.cli.mock", "Start a mock controller that others can connect to."),
+    "residual": ("daq.cli.residual", "Simulate a trace and show where it disagrees."),
+    "demo": ("daq.cli.demo", "The ramp step on the mock, from command to plot."),
+}
+
+
+class LazyGroup(typer.core.TyperGroup):
+    """Lists subcommands by name and one line; imports the one that is called."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        for name, (_, line) in SUBCOMMANDS.items():
+            self.add_command(typer.core.TyperCommand(name, help=line))
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """In the order of the table, which is the order of use."""
+        del ctx
+        return list(SUBCOMMANDS)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that `args` names, imported now."""
+        if args and args[0] in SUBCOMMANDS:
+            module = import_module(SUBCOMMANDS[args[0]][0])
+            command = typer.main.get_command(module.app)
+            command.name = args[0]
+            self.add_command(command, args[0])
+        return super().resolve_command(ctx, args)
