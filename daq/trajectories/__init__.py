@@ -1,0 +1,10 @@
+"""From a specified motion to the set points of every control period. Pure: nothing here moves anything."""
+
+from daq.trajectories.move import MOVE_SPEED, plan_move
+from daq.trajectories.planner import plan, start_angles
+from daq.trajectories.set_points import Mark, Plan, PlanPreview, control_period, make_plan, snapped
+
+__all__ = [
+    "MOVE_SPEED", "Mark", "Plan", "PlanPreview", "control_period", "make_plan", "plan", "plan_move", "snapped",
+    "start_angles",
+]  # fmt: skip

@@ -1,0 +1,26 @@
+"""Cubic in time, at rest at both ends (section 3.7 of the source)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from daq.contracts.experiment import Cubic
+from daq.contracts.trace import Floats
+from daq.trajectories.piece import Piece, sample_times, smooth_piece
+from daq.trajectories.set_points import Mark
+
+PEAK_SPEED = 1.5
+"""Highest speed of a cubic that starts and ends at rest, in units of its mean speed."""
+
+
+def cubic(move: Cubic, amplitudes: Floats, period: float) -> Piece:
+    """Through amplitudes (k,) rad in `duration`, all joints together."""
+    fraction = rest_to_rest(sample_times(move.duration, period) / move.duration)
+    marks = (Mark(0, "ramp_start", "cubic starts"), Mark(len(fraction), "ramp_end", "cubic ends"))
+    return smooth_piece(fraction[:, None] * amplitudes, marks)
+
+
+def rest_to_rest(fraction: Floats) -> Floats:
+    """Part of the way done after `fraction` of the time: 3s² − 2s³, the cubic whose rates are zero at both ends."""
+    s = np.clip(fraction, 0.0, 1.0)
+    return s * s * (3.0 - 2.0 * s)

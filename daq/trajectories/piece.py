@@ -1,0 +1,49 @@
+"""A piece of motion: what every kind of trajectory comes down to before it is put on an arm."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from daq.contracts.errors import SpecError
+from daq.contracts.trace import Floats
+from daq.trajectories.set_points import Booleans, Mark
+
+TIME_TOLERANCE = 1e-9
+"""Periods by which a duration may miss a whole number of them and still count as whole."""
+LONGEST = 4 * 3600.0
+"""Longest plan in s; more is taken for a slip of the pen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Motion of k joints from where they stand, without the point where they stand.
+
+    offsets: (m, k) rad from the start of the piece, at 1, 2, … m control periods after it
+    jumps:   (m,) True where a set point jumps on purpose
+    marks:   their `index` counts from the start of the piece: 0 is the last set point before it
+    """
+
+    offsets: Floats
+    jumps: Booleans
+    marks: tuple[Mark, ...] = ()
+
+
+def smooth_piece(offsets: Floats, marks: tuple[Mark, ...] = ()) -> Piece:
+    """A piece without jumps."""
+    return Piece(offsets, np.zeros(len(offsets), dtype=np.bool_), marks)
+
+
+def periods_in(duration: float, period: float) -> int:
+    """Control periods until `duration` (s) is over, at least one. Raises SpecError when it is longer than LONGEST."""
+    if duration > LONGEST:
+        hours = duration / 3600
+        raise SpecError(f"experiment: it would take {hours:.1f} h, at most {LONGEST / 3600:.0f} h are allowed")
+    return max(1, math.ceil(duration / period - TIME_TOLERANCE))
+
+
+def sample_times(duration: float, period: float) -> Floats:
+    """(m,) s: the ends of the control periods of a motion, the last one at or after its end."""
+    return np.arange(1, periods_in(duration, period) + 1, dtype=np.float64) * period

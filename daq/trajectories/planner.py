@@ -1,0 +1,134 @@
+"""From an experiment's specification to its set points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Several
+
+import numpy as np
+
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import (
+    Cubic,
+    ExperimentSpec,
+    Multisine,
+    Path,
+    Pause,
+    Ramp,
+    Sequence,
+    Sine,
+    SlowRamp,
+    Staircase,
+    Step,
+    Trajectory,
+)
+from daq.contracts.machine import Machine
+from daq.contracts.trace import Floats
+from daq.trajectories.cubic import cubic
+from daq.trajectories.move import move_piece
+from daq.trajectories.multisine import multisine
+from daq.trajectories.path import path
+from daq.trajectories.pause import pause
+from daq.trajectories.piece import Piece, periods_in, smooth_piece
+from daq.trajectories.ramp import ramp
+from daq.trajectories.sequence import joined, spread
+from daq.trajectories.set_points import Mark, Plan, control_period, make_plan, snapped
+from daq.trajectories.sine import sine
+from daq.trajectories.slow_ramp import slow_ramp
+from daq.trajectories.staircase import staircase
+from daq.trajectories.step import step
+
+
+def start_angles(spec: ExperimentSpec, machine: Machine) -> tuple[float, ...]:
+    """Where the arm has to be before the record (rad, all joints): `spec.start`, else the first point of a path, else
+    the machine's rest posture. Raises SpecError when a joint has none of these, or does not exist."""
+    _require_joints(spec, machine)
+    start = dict(spec.start)
+    if isinstance(spec.trajectory, Path):
+        first = dict(zip(spec.joints, spec.trajectory.positions[0], strict=True))
+        start = first | start
+    missing = [joint for joint in range(1, len(machine.joints) + 1) if joint not in start]
+    if missing and machine.rest_posture is None:
+        raise SpecError(f"start: joints {missing} have none, and machine {machine.name} has no rest_posture")
+    rest = machine.rest_posture or ()
+    return tuple(start[joint] if joint in start else rest[joint - 1] for joint in range(1, len(machine.joints) + 1))
+
+
+def plan(spec: ExperimentSpec, machine: Machine, start: Several[float]) -> Plan:
+    """Set points of the whole experiment from `start` (rad, all joints of the machine): settle, motion, hold, and with
+    repeats a slow way back between them.
+
+    Joints that the experiment does not move keep their posture. Nothing is checked here but that it can be written
+    down; `daq.safety.check_plan` says whether it may be carried out. Raises SpecError.
+    """
+    _require_joints(spec, machine)
+    period = control_period(machine)
+    begin = snapped(machine, start)
+    columns = [joint - 1 for joint in spec.joints]
+    unit = np.array([abs(machine.calibration(joint).rad_per_posture_unit) for joint in spec.joints])
+    motion = _piece(spec.trajectory, spec.joints, begin[columns], unit, period)
+    whole = _with_repeats(spec, motion, period)
+    whole = spread(whole, columns, len(begin))
+    angles = np.concatenate([begin[None, :], begin + whole.offsets])
+    jumps = np.concatenate([[False], whole.jumps])
+    ends = Mark(0, "start", "first set point"), Mark(len(whole.offsets), "end", "last set point")
+    return make_plan(machine, spec.joints, angles, jumps, (ends[0], *whole.marks, ends[1]))
+
+
+def _with_repeats(spec: ExperimentSpec, motion: Piece, period: float) -> Piece:
+    count = len(spec.joints)
+    settle, hold = pause(spec.settle, count, period), pause(spec.hold, count, period)
+    end = motion.offsets[-1] if len(motion.offsets) else np.zeros(count)
+    back = move_piece(-end, period)
+    once = len(settle.offsets) + len(motion.offsets) + len(hold.offsets) + len(back.offsets)
+    periods_in(once * spec.repeats * period, period)  # too long is refused before it is built
+    pieces: list[Piece] = []
+    for repeat in range(1, spec.repeats + 1):
+        if repeat > 1:
+            pieces.append(back)
+        if spec.repeats > 1:
+            pieces.append(smooth_piece(np.zeros((0, count)), (Mark(0, "note", f"repeat {repeat} of {spec.repeats}"),)))
+        pieces += [settle, motion, hold]
+    return joined(pieces, count)
+
+
+def _piece(move: Trajectory, joints: tuple[int, ...], start: Floats, within: Floats, period: float) -> Piece:
+    if isinstance(move, Path):
+        return path(move, joints, start, within, period)
+    if isinstance(move, Sequence):
+        pieces = []
+        for segment in move.segments:
+            own = segment.joints or joints
+            columns = [joints.index(joint) for joint in own]
+            pieces.append(spread(_simple_piece(segment.move, own, period), columns, len(joints)))
+        return joined(pieces, len(joints))
+    return _simple_piece(move, joints, period)
+
+
+def _simple_piece(
+    move: Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Pause, joints: tuple[int, ...], period: float
+) -> Piece:
+    if isinstance(move, Pause):
+        return pause(move.duration, len(joints), period)
+    given = move.amplitude
+    amplitudes = np.array([given[joint] if isinstance(given, dict) else given for joint in joints])
+    match move:
+        case Ramp():
+            piece = ramp(move, amplitudes, period)
+        case Step():
+            piece = step(amplitudes)
+        case Staircase():
+            piece = staircase(move, amplitudes, period)
+        case SlowRamp():
+            piece = slow_ramp(move, amplitudes, period)
+        case Sine():
+            piece = sine(move, amplitudes, period)
+        case Multisine():
+            piece = multisine(move, joints, amplitudes, period)
+        case Cubic():
+            piece = cubic(move, amplitudes, period)
+    return piece
+
+
+def _require_joints(spec: ExperimentSpec, machine: Machine) -> None:
+    for joint in (*spec.joints, *spec.start):
+        machine.joint(joint)
