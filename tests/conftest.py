@@ -73,8 +73,9 @@ def _check_nothing_left_running() -> Iterator[None]:
     yield
     left = Running.now() - before
     if left and (left := left.wait()):
+        message = f"left running: {left}"  # named before they are ended
         left.kill_processes()
-        pytest.fail(f"left running: {left}")
+        pytest.fail(message)
 
 
 @pytest.fixture(scope="session", autouse=True)
