@@ -34,7 +34,7 @@ class RigidBodyParameters:
 
 @dataclass(frozen=True)
 class JointParameters:
-    """Motor, gear, friction and end stops of one joint.
+    """Motor, gear, friction, end stops and start angle (rad) of one joint.
 
     `gear_ratio` is motor turns per joint turn; `viscous_friction` acts on the motor's speed (7.30);
     `constant_friction` (N·m, at the joint) comes on top of the load-dependent Coulomb friction.
@@ -50,6 +50,7 @@ class JointParameters:
     constant_friction: float
     lower_stop: float
     upper_stop: float
+    start: float
 
     @property
     def reflected_inertia(self) -> float:
@@ -82,6 +83,11 @@ class PlantParameters:
     friction: FrictionParameters
     joints: tuple[JointParameters, ...]
 
+    @property
+    def start(self) -> tuple[float, ...]:
+        """Angles (rad) at which the arm stands when it is switched on."""
+        return tuple(joint.start for joint in self.joints)
+
 
 def _joint(reader: QuantityReader, number: int) -> JointParameters:
     table = f"joint_{number}"
@@ -100,6 +106,7 @@ def _joint(reader: QuantityReader, number: int) -> JointParameters:
         constant_friction=reader.take(table, "constant_friction", "N*m", 0, 100),
         lower_stop=math.radians(lower),
         upper_stop=math.radians(upper),
+        start=math.radians(reader.take(table, "start", "deg", lower, upper)),
     )
 
 

@@ -43,7 +43,7 @@ class PlantError(ValueError):
 
 
 class Plant:
-    """Six joints from a set of parameters and modifications, at rest at `angles` (rad).
+    """Six joints from a set of parameters and modifications, at rest at `angles` (rad; by default the file's start).
 
     Raises PlantError for a modification that the step length cannot follow.
     """
@@ -52,7 +52,7 @@ class Plant:
         self,
         parameters: PlantParameters,
         modifications: Iterable[Modification] = (),
-        angles: Sequence[float] = (0.0, math.pi / 2, 0.0, 0.0, 0.0, 0.0),
+        angles: Sequence[float] | None = None,
         step_us: int = STEP_US,
     ) -> None:
         self._modifications = tuple(modifications)
@@ -80,7 +80,7 @@ class Plant:
         )
         self._model.dof_damping[:] = self._half_damping
         self._stalled: set[int] = set()
-        self.reset(angles)
+        self.reset(parameters.start if angles is None else angles)
         self._check_stiffness()
 
     def reset(self, angles: Sequence[float]) -> None:

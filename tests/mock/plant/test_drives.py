@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mock_controller.plant import Plant, PlantError, PlantParameters, default_plant
 from mock_controller.plant.friction import CoulombLevel, deflect
 
-UP = (0.0, math.pi / 2, 0.0, 0.0, 0.0, 0.0)
+UP = (math.pi, math.pi / 2, 0.0, 0.0, 0.0, 0.0)
 
 
 def frictionless(gravity: float = 0.0, **joint_changes: float) -> PlantParameters:
@@ -54,7 +54,9 @@ def test_waist_follows_the_first_order_lag_of_its_motor() -> None:
     for elapsed in range(20_000, 200_001, 20_000):
         plant.advance([0.25, 0, 0, 0, 0, 0], 20_000)
         t, tau = elapsed * 1e-6, inertia / damping
-        assert plant.joint_angles[0] == pytest.approx(settled * (t - tau * (1 - math.exp(-t / tau))), abs=2e-5)
+        assert plant.joint_angles[0] - math.pi == pytest.approx(
+            settled * (t - tau * (1 - math.exp(-t / tau))), abs=2e-5
+        )
 
 
 @pytest.mark.parametrize("inductance", [0.0, 0.82e-3, 20e-3])
@@ -62,14 +64,14 @@ def test_holding_a_jammed_motor_draws_the_current_of_its_resistance(inductance: 
     plant = Plant(frictionless(inductance=inductance), angles=UP)
     plant.stall(1)
     plant.advance([0.3, 0, 0, 0, 0, 0], 200_000)
-    assert plant.joint_angles[0] == pytest.approx(0.0, abs=1e-9)
+    assert plant.joint_angles[0] == pytest.approx(math.pi, abs=1e-9)
 
 
 def test_inductance_of_the_data_sheet_hardly_delays_the_arm_and_a_large_one_does() -> None:
     def angle_after_20_ms(inductance: float) -> float:
         plant = Plant(frictionless(inductance=inductance), angles=UP)
         plant.advance([0.5, 0, 0, 0, 0, 0], 20_000)
-        return plant.joint_angles[0]
+        return plant.joint_angles[0] - math.pi
 
     without, small, large = (angle_after_20_ms(value) for value in (0.0, 0.82e-3, 0.1))
     assert 0.97 * without < small < without
@@ -81,7 +83,7 @@ def test_current_with_inductance_converges_with_the_step(inductance: float) -> N
     def angle(step_us: int) -> float:
         plant = Plant(frictionless(inductance=inductance), angles=UP, step_us=step_us)
         plant.advance([0.5, 0, 0, 0, 0, 0], 60_000)
-        return plant.joint_angles[0]
+        return plant.joint_angles[0] - math.pi
 
     assert angle(1000) == pytest.approx(angle(100), abs=2e-4)
 
@@ -97,7 +99,7 @@ def test_motor_balances_gravity_at_the_computed_voltage() -> None:
     body, joint = parameters.rigid_body, parameters.joints[2]
     gravity = 9.81 * (body.m3 / 2 + body.m_load) * body.a3
     volts = gravity * joint.resistance / (joint.gear_ratio * joint.torque_constant)
-    plant = Plant(parameters, angles=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    plant = Plant(parameters, angles=(math.pi, 0.0, 0.0, 0.0, 0.0, 0.0))
     plant.stall(2)
     plant.advance([0, 0, volts / parameters.amplifier.gain, 0, 0, 0], 400_000)
     assert plant.joint_angles[2] == pytest.approx(0.0, abs=1e-4)
@@ -105,7 +107,7 @@ def test_motor_balances_gravity_at_the_computed_voltage() -> None:
 
 def test_coulomb_friction_holds_what_lies_below_its_level_without_creeping() -> None:
     parameters = default_plant()
-    plant = Plant(parameters, angles=(0.0, 0.8, 0.0, 0.0, 0.0, 0.0))
+    plant = Plant(parameters, angles=(math.pi, 0.8, 0.0, 0.0, 0.0, 0.0))
     joint = parameters.joints[2]
     q = plant.joint_angles
     level = CoulombLevel(parameters).at(q)[2]
@@ -175,14 +177,14 @@ def test_stalled_joint_stays_and_moves_again_when_released() -> None:
 
 
 def test_held_wrist_does_not_move_while_the_arm_does() -> None:
-    plant = Plant(default_plant(), angles=(0.0, 0.8, 0.3, 0.0, 0.0, 0.0))
+    plant = Plant(default_plant(), angles=(math.pi, 0.8, 0.3, 0.0, 0.0, 0.0))
     plant.advance([0.8, 0.9, 0.6, 0, 0, 0], 500_000)
     assert max(map(abs, plant.joint_angles[3:])) < 1e-4
 
 
 def test_default_step_is_converged_far_below_an_adc_count() -> None:
     def path(step_us: int) -> list[list[float]]:
-        plant = Plant(default_plant(), angles=(0.0, 0.5, 0.3, 0.0, 0.0, 0.0), step_us=step_us)
+        plant = Plant(default_plant(), angles=(math.pi, 0.5, 0.3, 0.0, 0.0, 0.0), step_us=step_us)
         angles = []
         for period in range(25):
             sign = 1 if period < 15 else -0.5
@@ -231,4 +233,4 @@ def test_impossible_requests_are_refused_in_one_line(volts: list[float], duratio
 
 def test_start_outside_the_end_stops_is_refused() -> None:
     with pytest.raises(PlantError, match="joint 2"):
-        Plant(default_plant(), angles=(0, 7.0, 0, 0, 0, 0))
+        Plant(default_plant(), angles=(math.pi, 7.0, 0, 0, 0, 0))

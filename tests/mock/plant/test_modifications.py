@@ -12,7 +12,7 @@ from mock_controller.modifications import ModificationError, build_modifications
 from mock_controller.modifications.interface import Modification
 from mock_controller.plant import Plant, PlantError, default_plant
 
-LOW = (0.0, 0.3, 0.2, 0.0, 0.0, 0.0)
+LOW = (math.pi, 0.3, 0.2, 0.0, 0.0, 0.0)
 
 
 def moved(modifications: Sequence[Modification] = (), volts: Sequence[float] = (0.5, 0.6, 0.4, 0, 0, 0)) -> list[float]:
@@ -101,9 +101,9 @@ class Dry:
 
 
 def test_torque_from_outside_moves_the_joint_it_acts_on() -> None:
-    pushed = Plant(default_plant(), [Push(20.0)], angles=(0, math.pi / 2, 0, 0, 0, 0))
+    pushed = Plant(default_plant(), [Push(20.0)], angles=(math.pi, math.pi / 2, 0, 0, 0, 0))
     pushed.advance([0.0] * 6, 100_000)
-    assert pushed.joint_angles[0] > 0.01
+    assert pushed.joint_angles[0] > math.pi + 0.01
 
 
 def test_effects_with_no_strength_reproduce_the_plain_plant() -> None:

@@ -10,7 +10,7 @@ from mock_controller.quantities import DataFileError
 
 def test_every_number_says_whether_it_is_documented_or_assumed() -> None:
     _, provenance = parse_plant(default_plant_text())
-    assert len(provenance) == 13 + 2 + 2 + 60
+    assert len(provenance) == 13 + 2 + 2 + 66
     by_name = {entry.name: entry for entry in provenance}
     assert by_name["rigid_body.m2"].kind == "documented"
     assert by_name["joint_4.gear_ratio"].kind == "assumed"
@@ -25,7 +25,7 @@ def test_every_number_says_whether_it_is_documented_or_assumed() -> None:
         ("value = 28.0", "value = nan", "amplifier.gain: value is nan"),
         ("[amplifier]", "[amplifire]", "amplifier.gain: must be"),
         ("[amplifier]", "[amplifier]\ncolour = 3", "amplifier.colour: not a quantity"),
-        ("value = -135", "value = 140", "lower_stop 140.0 deg must be below"),
+        ('value = 45, unit = "deg"', 'value = 340, unit = "deg"', "lower_stop 340.0 deg must be below"),
         ("[amplifier]", "[amplifier", "not TOML"),
     ],
 )

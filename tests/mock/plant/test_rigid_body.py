@@ -110,7 +110,7 @@ def test_free_arm_without_gravity_keeps_its_kinetic_energy() -> None:
     model = build_model(parameters, 1e-4)
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     data = mujoco.MjData(model)
-    data.qpos[:] = [0, 1.0, 0.3, 0, 0, 0]
+    data.qpos[:] = [3, 1.0, 0.3, 0, 0, 0]
     data.qvel[:] = [0.8, -0.5, 1.0, 0.3, 0.2, 0.4]
     mujoco.mj_forward(model, data)
     start = data.energy[1]

@@ -1,0 +1,338 @@
+"""The motor controller: a 6502 with a control period, a memory shared with the host, and an arm on its amplifiers.
+
+Time is the board's own, in whole µs, and moves only by `run_until` and by the accesses of the host, which take time.
+A period is three events:
+    start     positions are sampled; set points and gains are fetched, unless the host holds the memory at this very
+              moment: the controller does not wait (section 6.3), goes on with those it had, and counts it
+    output    a computing delay later the drive changes and the results are stored, byte by byte
+    complete  the last byte is stored and the period's snapshot joins the ring
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from firmware_protocol.memory_map import JOINTS, MemoryMap
+from firmware_protocol.units import DAC_MAX, GAIN_MAX, POSTURE_UNITS, counts_to_posture, posture_to_counts
+from mock_controller.board.memory import SharedMemory, encoded
+from mock_controller.board.parameters import BoardParameters
+from mock_controller.board.pid import IntegerPid
+from mock_controller.board.sensor import PositionSensors
+from mock_controller.board.snapshot import PeriodSnapshot, SnapshotRing
+from mock_controller.modifications.interface import ChangesBoard, ChangesSetPoint, Modification, of_kind
+from mock_controller.plant import Plant
+
+
+class BoardError(ValueError):
+    """Something the board cannot be asked to do."""
+
+
+@dataclass
+class BoardCounters:
+    """What happened since the mock was started; a brown-out does not clear it."""
+
+    boots: int = 0
+    periods: int = 0
+    set_points_missed: int = 0
+    """Periods in which the host held the memory when the controller wanted it."""
+    set_points_invalid: int = 0
+    """Set points above 999 that the controller found in the memory and did not take."""
+    gains_invalid: int = 0
+    """Gains above 20 that the controller found in the memory and did not take."""
+    writes_while_frozen: int = 0
+    """Bytes meant for set points that the freeze kept out."""
+
+
+class Board:
+    """Controller and arm, switched on at time 0 with the arm where `plant` has it.
+
+    Raises BoardError when the plant's step does not divide the period and the computing delay.
+    """
+
+    def __init__(
+        self,
+        parameters: BoardParameters,
+        memory_map: MemoryMap,
+        plant: Plant,
+        seed: int,
+        modifications: Iterable[Modification] = (),
+    ) -> None:
+        modifications = tuple(modifications)
+        for change in of_kind(modifications, ChangesBoard):
+            parameters = change.change_board(parameters)
+        self.parameters = parameters
+        self.plant = plant
+        self.memory = SharedMemory(memory_map)
+        self.sensors = PositionSensors(parameters, seed, modifications)
+        self.snapshots = SnapshotRing()
+        self.counters = BoardCounters()
+        self._timing = parameters.timing
+        for name, value in (("period", self._timing.period), ("computing_delay", self._timing.computing_delay)):
+            if value % plant.step_us:
+                raise BoardError(f"{name} of {value} µs: must be a multiple of the plant's step, {plant.step_us} µs")
+        self._set_point_effects: list[ChangesSetPoint] = of_kind(modifications, ChangesSetPoint)
+        self._pids = [IntegerPid(parameters.integral_shift) for _ in range(JOINTS)]
+        self._volts_per_count = [
+            calibration.direction * parameters.dac_full_scale / DAC_MAX for calibration in parameters.calibrations
+        ]
+        self._set_point_addresses = frozenset(memory_map["set_point"].addresses)
+        self._time_us = 0
+        self._frozen = False
+        self._process_inputs = 0
+        self._host_until_us = 0
+        self._published: list[tuple[int, int]] = []
+        self._power_up()
+
+    # --- time
+
+    @property
+    def time_us(self) -> int:
+        """The board's time (µs) since it was first switched on."""
+        return self._time_us
+
+    @property
+    def next_event_us(self) -> int:
+        """When the controller next does something by itself."""
+        return self._next_us
+
+    def run_until(self, time_us: int) -> None:
+        """Lets time pass up to `time_us`, events at that very time included. A time already past changes nothing."""
+        while self._next_us <= time_us:
+            self._time_us = self._next_us
+            self._next_action()
+        self._time_us = max(self._time_us, time_us)
+
+    # --- the host's side of the memory
+
+    def read(self, address: int, count: int) -> bytes:
+        """`count` bytes from `address`, one after the other; takes time. Raises MemoryAddressError."""
+        self.memory.check(address, count)
+        self._take_memory(count)
+        end_us = self._host_until_us
+        data = bytearray()
+        for left in range(count - 1, -1, -1):
+            self.run_until(end_us - left * self._timing.host_byte)
+            self._store_published()
+            data.append(self.memory.get(address + len(data)))
+        return bytes(data)
+
+    def write(self, address: int, data: bytes) -> None:
+        """Bytes from `address` on, in one access; takes time. Raises MemoryAddressError."""
+        self.memory.check(address, len(data))
+        self._write_pairs([(address + offset, value) for offset, value in enumerate(data)])
+
+    def write_set_points(self, postures: Mapping[int, int]) -> None:
+        """Set points (posture units 0–999) of joints (from 1) in one access; takes time. Ignored while frozen."""
+        for joint, posture in postures.items():
+            if not (1 <= joint <= JOINTS and 0 <= posture < POSTURE_UNITS):
+                limit = POSTURE_UNITS - 1
+                raise BoardError(f"joint {joint}: set point of {posture}: joints 1 to {JOINTS}, values 0 to {limit}")
+        by_index = [(joint - 1, posture) for joint, posture in postures.items()]
+        self._write_pairs(encoded(self.memory.map["set_point"], by_index))
+
+    def hold_memory(self, duration_us: int) -> None:
+        """The host's side keeps the memory busy for `duration_us` from now: every fetch in that time is missed."""
+        self._host_until_us = max(self._host_until_us, self._time_us + duration_us)
+
+    # --- stop
+
+    @property
+    def frozen(self) -> bool:
+        """Whether set points are held since a `freeze`."""
+        return self._frozen
+
+    def freeze(self) -> tuple[int, ...]:
+        """Set points := measured posture, now, and no others until `release`; the six postures (posture units).
+
+        A second freeze changes nothing. The latch outlives a brown-out.
+        """
+        if self._frozen and self._powered:
+            return tuple(self.memory.values("set_point"))
+        self._frozen = True
+        postures = tuple(counts_to_posture(counts) for counts in self._measured)
+        self._write_pairs(encoded(self.memory.map["set_point"], enumerate(postures)), by_freeze=True)
+        return postures
+
+    def release(self) -> None:
+        """Ends the freeze; set points stay as they are until new ones are written."""
+        self._frozen = False
+
+    # --- the rest of the panel
+
+    @property
+    def tick(self) -> int:
+        """Periods begun since power-up; the first is 1."""
+        return self._tick
+
+    @property
+    def powered(self) -> bool:
+        """False during a brown-out."""
+        return self._powered
+
+    @property
+    def process_outputs(self) -> int:
+        """Bits at the output ports."""
+        return self._process_outputs
+
+    @property
+    def gripper_closed(self) -> bool:
+        """Whether the gripper's valve is on."""
+        return self._gripper_closed
+
+    def set_process_inputs(self, bits: int) -> None:
+        """Puts bits (0–255) on the input ports; the memory shows them from the next period on."""
+        if not 0 <= bits <= 0xFF:
+            raise BoardError(f"process inputs {bits}: allowed are 0 to 255")
+        self._process_inputs = bits
+
+    def brown_out(self) -> None:
+        """The supply sags now: drive off, memory lost; after the reset time the controller powers up again.
+
+        Until then the memory reads as zero. Ticks start again at 1.
+        """
+        step = self.plant.step_us
+        off_us = -(-self._time_us // step) * step
+        self._advance_plant(off_us)
+        self._volts = [0.0] * JOINTS
+        self._powered = False
+        self._published = []
+        self._stored = 0
+        self.memory.clear()
+        self._schedule(off_us + self._timing.reset, self._power_up)
+
+    # --- the controller's program
+
+    def _schedule(self, time_us: int, action: Callable[[], None]) -> None:
+        self._next_us = time_us
+        self._next_action = action
+
+    def _power_up(self) -> None:
+        """Set points become the measured posture, so that nothing jumps; gains come from EPROM."""
+        self._advance_plant(self._time_us)
+        self.counters.boots += 1
+        self.memory.clear()
+        self.snapshots.clear()
+        self._powered = True
+        self._tick = 0
+        self._volts = [0.0] * JOINTS
+        self._period_start_us = self._time_us - self._timing.period
+        self._published = []
+        self._stored = 0
+        self._process_outputs = 0
+        self._gripper_closed = False
+        for pid in self._pids:
+            pid.reset()
+        self._gains = list(self.parameters.default_gains)
+        self._measured = self.sensors.read(self.plant.joint_angles)
+        self._postures = [counts_to_posture(counts) for counts in self._measured]
+        self.memory.store("set_point", self._postures)
+        self.memory.store("position", self._measured)
+        for column, name in enumerate(("gain_p", "gain_i", "gain_d")):
+            self.memory.store(name, [gains[column] for gains in self._gains])
+        self._schedule(self._time_us, self._start_period)
+
+    def _start_period(self) -> None:
+        now = self._time_us
+        self._advance_plant(now)
+        self._tick += 1
+        self._period_start_us = now
+        self.counters.periods += 1
+        self._measured = self.sensors.read(self.plant.joint_angles)
+        missed = now < self._host_until_us
+        if missed:
+            self.counters.set_points_missed += 1
+        else:
+            self._fetch()
+        results = self._control(missed)
+        self._schedule(now + self._timing.computing_delay, partial(self._change_output, results))
+
+    def _fetch(self) -> None:
+        """Takes set points, gains and outputs from the memory; what is out of range is left where it is."""
+        for index, posture in enumerate(self.memory.values("set_point")):
+            if posture < POSTURE_UNITS:
+                self._postures[index] = posture
+            else:
+                self.counters.set_points_invalid += 1
+        columns = (self.memory.values(name) for name in ("gain_p", "gain_i", "gain_d"))
+        for index, gains in enumerate(zip(*columns, strict=True)):
+            if max(gains) <= GAIN_MAX:
+                self._gains[index] = gains
+            else:
+                self.counters.gains_invalid += 1
+        self.memory.store("process_inputs", [self._process_inputs])
+        self._process_outputs = self.memory.values("process_outputs")[0]
+        self._gripper_closed = bool(self.memory.values("gripper")[0])
+
+    def _control(self, missed: bool) -> PeriodSnapshot:
+        targets = [posture_to_counts(posture) for posture in self._postures]
+        for effect in self._set_point_effects:
+            index = effect.joint - 1
+            targets[index] = effect.set_point(targets[index], self._tick)
+        errors = [target - position for target, position in zip(targets, self._measured, strict=True)]
+        powers = [pid.update(e, gains) for pid, e, gains in zip(self._pids, errors, self._gains, strict=True)]
+        return PeriodSnapshot(
+            tick=self._tick,
+            time_us=self._time_us,
+            set_points=tuple(self._postures),
+            positions=self._measured,
+            errors=tuple(errors),
+            powers=tuple(powers),
+            set_point_missed=missed,
+            frozen=self._frozen,
+        )
+
+    def _change_output(self, results: PeriodSnapshot) -> None:
+        """The computing delay is over: new drive, and the results begin to appear in the memory."""
+        now = self._time_us
+        self._advance_plant(now)
+        self._volts = [scale * power for scale, power in zip(self._volts_per_count, results.powers, strict=True)]
+        registers = self.memory.map
+        self._published = [
+            *encoded(registers["position"], enumerate(results.positions)),
+            *encoded(registers["error"], enumerate(results.errors)),
+            *encoded(registers["power"], enumerate(results.powers)),
+        ]
+        self._stored = 0
+        self._publishing_since_us = now
+        end_us = now + len(self._published) * self._timing.publish_byte
+        self._schedule(end_us, partial(self._complete_period, results))
+
+    def _complete_period(self, results: PeriodSnapshot) -> None:
+        self._store_published()
+        self.snapshots.append(results)
+        self._schedule(self._period_start_us + self._timing.period, self._start_period)
+
+    def _store_published(self) -> None:
+        """Brings the memory up to the present: byte k of the results is there k+1 byte times after their start."""
+        total = len(self._published)
+        if self._stored == total:
+            return
+        due = min((self._time_us - self._publishing_since_us) // self._timing.publish_byte, total)
+        for address, value in self._published[self._stored : due]:
+            self.memory.put(address, value)
+        self._stored = due
+
+    def _advance_plant(self, time_us: int) -> None:
+        behind = time_us - self.plant.time_us
+        if behind > 0:
+            self.plant.advance(self._volts, behind)
+
+    # --- contention
+
+    def _take_memory(self, count: int) -> None:
+        """Begins an access of `count` bytes; in the controller's fetch window the host has to wait for its end."""
+        self.run_until(self._period_start_us + self._timing.fetch_window)
+        self._host_until_us = self._time_us + count * self._timing.host_byte
+
+    def _write_pairs(self, pairs: Sequence[tuple[int, int]], by_freeze: bool = False) -> None:
+        self._take_memory(len(pairs))
+        end_us = self._host_until_us
+        for left, (address, value) in zip(range(len(pairs) - 1, -1, -1), pairs, strict=True):
+            self.run_until(end_us - left * self._timing.host_byte)
+            self._store_published()
+            if self._frozen and not by_freeze and address in self._set_point_addresses:
+                self.counters.writes_while_frozen += 1
+            elif self._powered:
+                self.memory.put(address, value)

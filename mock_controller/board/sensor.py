@@ -1,0 +1,89 @@
+"""Potentiometers and the 12-bit converter: joint angles in, ADC counts out.
+
+Each potentiometer bends by its own smooth curve, drawn from the seed, within the documented linearity. The
+converter adds noise and rounds half up. A potentiometer may also fail: stick, or crackle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from random import Random
+
+from firmware_protocol.memory_map import JOINTS
+from firmware_protocol.units import ADC_COUNTS, JointCalibration
+from mock_controller.board.parameters import BoardParameters
+from mock_controller.modifications.interface import ChangesSensor, Modification, of_kind
+
+_CELLS = 256
+"""Cells of a linearity curve's table, interpolated linearly: good to a hundredth of a count."""
+
+
+class LinearityCurve:
+    """Error of one potentiometer (counts) over its range: three harmonics of random size and phase.
+
+    The largest error is 40 % to 100 % of `limit` (counts).
+    """
+
+    def __init__(self, random: Random, limit: float) -> None:
+        waves = [(k, random.uniform(0.3, 1.0) / k, random.uniform(0.0, math.tau)) for k in (1, 2, 3)]
+        raw = [
+            sum(size * math.sin(math.tau * k * cell / _CELLS + phase) for k, size, phase in waves)
+            for cell in range(_CELLS + 1)
+        ]
+        scale = limit * random.uniform(0.4, 1.0) / max(map(abs, raw))
+        self._table = [scale * value for value in raw] + [scale * raw[-1]]
+
+    def at(self, counts: float) -> float:
+        """Error (counts) where a perfect potentiometer would show `counts`."""
+        place = min(max(counts, 0.0), float(ADC_COUNTS)) * (_CELLS / ADC_COUNTS)
+        cell = int(place)
+        left = self._table[cell]
+        return left + (place - cell) * (self._table[cell + 1] - left)
+
+
+class PositionSensors:
+    """The six potentiometers and their converter; every draw comes from `seed`, joint by joint."""
+
+    def __init__(self, parameters: BoardParameters, seed: int, modifications: Iterable[Modification] = ()) -> None:
+        limit = parameters.linearity * ADC_COUNTS
+        self._calibrations: tuple[JointCalibration, ...] = parameters.calibrations
+        self._curves = [LinearityCurve(Random(f"linearity {seed} {j}"), limit) for j in range(1, JOINTS + 1)]
+        self._noise_source = [Random(f"noise {seed} {j}") for j in range(1, JOINTS + 1)]
+        self._noise = [parameters.noise] * JOINTS
+        self._usual_noise = parameters.noise
+        self._stuck: dict[int, int] = {}
+        self._last = [0] * JOINTS
+        self._effects: list[ChangesSensor] = of_kind(modifications, ChangesSensor)
+
+    def read(self, angles: Sequence[float]) -> tuple[int, ...]:
+        """ADC counts (0–4095) of six joint angles (rad)."""
+        if self._effects:
+            angles = list(angles)
+            for effect in self._effects:
+                angles[effect.joint - 1] = effect.sensed_angle(angles[effect.joint - 1])
+        self._last = [self._convert(index, angle) for index, angle in enumerate(angles)]
+        return tuple(self._last)
+
+    def stick(self, joint: int) -> None:
+        """The wiper of `joint` (from 1) stays where it is: the reading no longer follows the arm."""
+        self._stuck[joint - 1] = self._last[joint - 1]
+
+    def crackle(self, joint: int, noise: float) -> None:
+        """The reading of `joint` (from 1) gets noise of `noise` counts rms."""
+        self._noise[joint - 1] = noise
+
+    def repair(self, joint: int) -> None:
+        """`joint` (from 1) neither sticks nor crackles any more."""
+        self._stuck.pop(joint - 1, None)
+        self._noise[joint - 1] = self._usual_noise
+
+    def _convert(self, index: int, angle: float) -> int:
+        # The noise is drawn whatever happens, so that a fault of one moment leaves later noise as it was.
+        noise = self._noise[index] * self._noise_source[index].gauss(0.0, 1.0)
+        stuck = self._stuck.get(index)
+        if stuck is not None:
+            return stuck
+        ideal = self._calibrations[index].rad_to_counts(angle)
+        counts = math.floor(ideal + self._curves[index].at(ideal) + noise + 0.5)
+        return min(max(counts, 0), ADC_COUNTS - 1)
