@@ -47,6 +47,7 @@ class TraceRecord(BaseModel):
     format: Annotated[int, Field(le=TRACE_FORMAT)] = TRACE_FORMAT
     trace_id: str
     created: datetime
+    """UTC of the record's start, `time` = 0."""
     software: str
     source: Literal["mock", "real", "imported"]
     robot: str = "ma2000"
@@ -78,6 +79,8 @@ class Trace:
     velocity:  (n, j) rad/s
     power_raw: (n, j) the controller's output before the amplifier, DAC counts
     tick:      (n,)   number of the control period; a gap is a sample that is missing
+    host_time: (n,)   s, the host's monotonic clock when the sample arrived
+    status:    (n,)   the board's flags (`firmware_protocol.commands.StatusFlag`)
 
     Raises TraceError when shapes disagree, time does not increase, or a value is not finite.
     """
@@ -92,6 +95,8 @@ class Trace:
     velocity: Floats | None = None
     power_raw: Integers | None = None
     tick: Integers | None = None
+    host_time: Floats | None = None
+    status: Integers | None = None
     events: tuple[TraceEvent, ...] = field(default=())
 
     def __post_init__(self) -> None:
@@ -108,8 +113,10 @@ class Trace:
                 raise TraceError(f"trace {self.record.trace_id}: {name} is not finite at sample {row}")
         if not np.isfinite(self.time).all() or (count > 1 and not (np.diff(self.time) > 0).all()):
             raise TraceError(f"trace {self.record.trace_id}: time must be finite and strictly increasing")
-        if self.tick is not None and self.tick.shape != (count,):
-            raise TraceError(f"trace {self.record.trace_id}: tick has shape {self.tick.shape}, expected {(count,)}")
+        for name in ("tick", "host_time", "status"):
+            signal = getattr(self, name)
+            if signal is not None and signal.shape != (count,):
+                raise TraceError(f"trace {self.record.trace_id}: {name} has shape {signal.shape}, expected {(count,)}")
 
     def __len__(self) -> int:
         return len(self.time)

@@ -1,0 +1,80 @@
+"""What the operating system is asked for so that a trace survives: locks, syncs, renames that are all or nothing."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from pathlib import Path
+from typing import IO
+
+from daq.contracts.errors import TraceError
+
+
+def create_locked(path: Path) -> IO[bytes]:
+    """A new file, locked for this process until it is closed or the process ends.
+
+    Raises TraceError when the file exists, or another process took it in the moment of its making; OSError otherwise.
+    """
+    try:
+        stream = path.open("xb")
+    except FileExistsError:
+        raise TraceError(f"{path}: exists already; a trace is never written over") from None
+    fcntl.flock(stream, fcntl.LOCK_EX)
+    if not is_still_at(stream, path):
+        stream.close()
+        raise TraceError(f"{path}: was taken away by another process while it was being made")
+    return stream
+
+
+def try_lock(stream: IO[bytes]) -> bool:
+    """Take the lock of an open file; False when a living process has it."""
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def is_being_written(path: Path) -> bool:
+    """Whether a living process is writing this file. Raises OSError when it cannot be opened."""
+    with path.open("rb") as stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
+
+
+def is_still_at(stream: IO[bytes], path: Path) -> bool:
+    """Whether `path` still names the open file."""
+    try:
+        named = path.stat()
+    except FileNotFoundError:
+        return False
+    return os.path.samestat(os.fstat(stream.fileno()), named)
+
+
+def sync(stream: IO[bytes]) -> None:
+    """Bring everything written so far to the disk."""
+    stream.flush()
+    os.fsync(stream.fileno())
+
+
+def sync_folder(folder: Path) -> None:
+    """Bring the names in a folder to the disk."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def rename(old: Path, new: Path) -> None:
+    """Give a file its final name, and bring the name to the disk."""
+    old.replace(new)
+    sync_folder(new.parent)
+
+
+def reason(error: OSError) -> str:
+    """The operating system's words for what went wrong."""
+    return error.strerror or str(error)

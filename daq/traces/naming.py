@@ -1,0 +1,40 @@
+"""Names of trace files: the moment, the kind of experiment, the first digits of the trace's number."""
+
+from __future__ import annotations
+
+import re
+import secrets
+from datetime import UTC
+from pathlib import Path
+
+from daq.contracts.trace import TraceRecord
+from daq.traces.layout import PART_SUFFIX, SUFFIX
+
+ID_DIGITS = 12
+DIGITS_IN_NAME = 6
+KIND_LENGTH = 40
+
+
+def new_trace_id() -> str:
+    """Twelve random hexadecimal digits."""
+    return secrets.token_hex(ID_DIGITS // 2)
+
+
+def trace_path(folder: Path, record: TraceRecord) -> Path:
+    """Where a trace belongs, as `2026-11-21T05-14-42Z_ramp_ab12cd.mcap`: sorted by name is sorted by time."""
+    moment = record.created.astimezone(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
+    kind: str = record.source
+    if record.spec is not None:
+        kind = record.spec.name or record.spec.trajectory.kind
+    kind = re.sub(r"[^A-Za-z0-9.-]+", "-", kind)[:KIND_LENGTH]
+    return folder / f"{moment}_{kind}_{record.trace_id[:DIGITS_IN_NAME]}{SUFFIX}"
+
+
+def part_path(path: Path) -> Path:
+    """The name of a trace while it is recorded."""
+    return path.with_name(path.name + PART_SUFFIX.removeprefix(SUFFIX))
+
+
+def finished_path(part: Path) -> Path:
+    """The name a part file gets when it is finished."""
+    return part.with_name(part.name.removesuffix(PART_SUFFIX) + SUFFIX)

@@ -1,0 +1,123 @@
+"""The MCAP side of writing: rows, events and metadata into a stream. Knows nothing of files, threads or disks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import IO
+
+from mcap.writer import CompressionType, Writer
+
+from daq.contracts.errors import TraceError
+from daq.contracts.sample import SampleRow
+from daq.contracts.trace import Outcome, TraceEvent, TraceRecord
+from daq.traces import layout
+
+ONE_CHUNK_A_FLUSH = 1 << 40
+"""Size (bytes) that no chunk reaches: chunks end where `flush` says, never inside a row."""
+
+
+def open_mcap(stream: IO[bytes]) -> Writer:
+    """An MCAP writer as all traces are written: zstd, one chunk a flush, checksums over chunks and the data section."""
+    writer = Writer(stream, chunk_size=ONE_CHUNK_A_FLUSH, compression=CompressionType.ZSTD, enable_data_crcs=True)
+    writer.start(library=f"ma2000-daq/{version('ma2000-daq')}")
+    return writer
+
+
+def outcome_metadata(
+    outcome: Outcome, counters: Mapping[str, float], samples: int, duration: float, remark: str = ""
+) -> dict[str, str]:
+    """The metadata record at the end of a trace."""
+    return {
+        "outcome": outcome,
+        "counters": layout.compact(dict(counters)).decode(),
+        "samples": str(samples),
+        "duration": repr(duration),
+        "remark": remark,
+    }
+
+
+class Recording:
+    """One trace on its way into `stream`: the start metadata at once, then rows and events, then `finish`.
+
+    Raises TraceError when `record` has no time zone, and OSError whenever the stream does.
+    """
+
+    def __init__(
+        self,
+        stream: IO[bytes],
+        record: TraceRecord,
+        joints: tuple[int, ...],
+        signals: tuple[str, ...],
+        attachments: Mapping[str, bytes],
+    ) -> None:
+        if record.created.tzinfo is None:
+            raise TraceError(f"trace {record.trace_id}: created has no time zone, UTC is expected")
+        self.samples = 0
+        self.last_time = 0.0
+        self._first: SampleRow | None = None
+        self._events = 0
+        self._start_ns = layout.nanoseconds(record.created.astimezone(UTC))
+        self._names = layout.joint_names(record, joints)
+        self._effort = record.drive_unit in ("N·m", "N") and "drive" in signals
+        self._mcap = open_mcap(stream)
+        start = record.model_copy(update={"outcome": None, "counters": {}})
+        self._mcap.add_metadata(
+            layout.START_METADATA,
+            {
+                "record": start.model_dump_json(),
+                "joints": " ".join(str(joint) for joint in joints),
+                "signals": " ".join(signals),
+            },
+        )
+        for name, data in attachments.items():
+            media_type = "application/toml" if name.endswith(".toml") else "application/octet-stream"
+            self._mcap.add_attachment(self._start_ns, self._start_ns, name, media_type, data)
+        states = self._mcap.register_schema(layout.JOINT_STATES_SCHEMA, "jsonschema", layout.schema("JointStates.json"))
+        sample = self._mcap.register_schema(layout.JOINT_SCHEMA, "ros2msg", layout.schema("JointSample.msg"))
+        log = self._mcap.register_schema(layout.EVENT_SCHEMA, "jsonschema", layout.schema("Log.json"))
+        self._states = self._mcap.register_channel(layout.JOINT_STATES_TOPIC, "json", states)
+        self._joints = [
+            self._mcap.register_channel(f"{layout.JOINT_TOPIC}{joint}", "cdr", sample, {"name": name})
+            for joint, name in zip(joints, self._names, strict=True)
+        ]
+        self._log = self._mcap.register_channel(layout.EVENTS_TOPIC, "json", log)
+
+    def row(self, row: SampleRow) -> None:
+        """Add one control period.
+
+        Messages are published at the board's time and logged at the host's monotonic one, both counted from the
+        record's start: a UTC clock that is set back meanwhile moves nothing.
+        """
+        first = self._first = self._first or row
+        published = self._start_ns + round(row.time * 1e9)
+        logged = self._start_ns + round((first.time + row.host_time - first.host_time) * 1e9)
+        states = layout.joint_states(row, published, self._names, self._effort)
+        self._mcap.add_message(self._states, logged, states, published, self.samples)
+        for column, channel in enumerate(self._joints):
+            self._mcap.add_message(channel, logged, layout.joint_sample(row, column), published, self.samples)
+        self.samples += 1
+        self.last_time = row.time
+
+    def event(self, event: TraceEvent) -> None:
+        """Add an event."""
+        moment = self._start_ns + round(event.time * 1e9)
+        self._mcap.add_message(self._log, moment, layout.event_message(event, moment), moment, self._events)
+        self._events += 1
+
+    def flush(self) -> None:
+        """End the chunk: what was added so far can be read back once the stream's bytes are."""
+        self._mcap.flush()  # type: ignore[no-untyped-call]
+
+    def finish(self, outcome: Outcome, counters: Mapping[str, float]) -> None:
+        """Write the outcome, the index and the end of the file."""
+        self._mcap.flush()  # type: ignore[no-untyped-call]
+        duration = self.last_time - (self._first.time if self._first else 0.0)
+        self._mcap.add_metadata(layout.END_METADATA, outcome_metadata(outcome, counters, self.samples, duration))
+        self._mcap.finish()  # type: ignore[no-untyped-call]
+
+
+def utc_now() -> datetime:
+    """UTC, for `TraceRecord.created`."""
+    return datetime.now(UTC)

@@ -1,0 +1,219 @@
+"""Recording a trace off the acquisition loop: a bounded queue to one thread that writes and syncs."""
+
+from __future__ import annotations
+
+import math
+import queue
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from daq.contracts.errors import TraceError
+from daq.contracts.sample import SampleRow
+from daq.contracts.trace import Outcome, TraceEvent, TraceRecord
+from daq.traces import disk
+from daq.traces.layout import RECORDED_SIGNALS
+from daq.traces.naming import part_path
+from daq.traces.recording import Recording
+
+SYNC_INTERVAL = 0.8
+"""s between syncs. At most 1.2 s of a record may be lost, which leaves a slow disk 0.4 s for one sync."""
+QUEUE_LENGTH = 16384
+"""Samples and events that may wait for the disk: five minutes at 50 Hz."""
+ROWS_A_CHUNK = 2000
+"""Rows after which a chunk ends even before the next sync (faster than real time many rows come between two)."""
+
+
+@dataclass(frozen=True)
+class _Close:
+    outcome: Outcome
+    counters: Mapping[str, float]
+
+
+class TraceWriter:
+    """Writes a trace to `path`; until it is closed the file is called `path` + `.part`.
+
+    `sample` and `event` only put into a queue. When the disk is full, fails, or falls behind by a whole queue, the
+    next call raises TraceError, `failure` holds it, and what was synced before stays in the part file, from where it
+    is salvaged. `patience` is how long (s) a call may wait for room in the queue: 0 for acquisition in real time.
+
+    Raises TraceError when the file cannot be made or exists already. A `with` block that ends without `close` closes
+    the trace as interrupted.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        record: TraceRecord,
+        joints: tuple[int, ...],
+        *,
+        attachments: Mapping[str, bytes] | None = None,
+        sync_interval: float = SYNC_INTERVAL,
+        queue_length: int = QUEUE_LENGTH,
+        patience: float = 0.0,
+    ) -> None:
+        self.path = path
+        self.part = part_path(path)
+        self.synced_samples = 0
+        self._joints = joints
+        self._patience = patience
+        self._sync_interval = sync_interval
+        self._last: SampleRow | None = None
+        self._failure: TraceError | None = None
+        self._closed = False
+        self._queue: queue.Queue[SampleRow | TraceEvent | _Close] = queue.Queue(queue_length)
+        if path.exists():
+            raise TraceError(f"{path}: exists already; a trace is never written over")
+        try:
+            self._stream = disk.create_locked(self.part)
+        except OSError as error:
+            raise TraceError(f"{path}: cannot be made: {disk.reason(error)}") from error
+        try:
+            self._recording = Recording(self._stream, record, joints, RECORDED_SIGNALS, attachments or {})
+            disk.sync(self._stream)
+            disk.sync_folder(path.parent)
+        except BaseException as error:
+            self._release()
+            self.part.unlink()
+            if isinstance(error, OSError):
+                raise TraceError(f"{path}: cannot be written: {disk.reason(error)}") from error
+            raise
+        self._thread = threading.Thread(target=self._run, name=f"writer of {path.name}", daemon=True)
+        self._thread.start()
+
+    @property
+    def failure(self) -> TraceError | None:
+        """What went wrong, once something has."""
+        return self._failure
+
+    def sample(self, row: SampleRow) -> None:
+        """Record one control period. Raises TraceError when writing has failed or the row cannot follow the last."""
+        self._check(row)
+        self._last = row
+        self._put(row)
+
+    def event(self, event: TraceEvent) -> None:
+        """Record an event. Raises TraceError when writing has failed or the event's time is not finite."""
+        if not math.isfinite(event.time):
+            raise TraceError(f"{self.path}: event {event.kind!r} has time {event.time}, which is not finite")
+        self._put(event)
+
+    def close(self, outcome: Outcome, counters: Mapping[str, float] | None = None) -> Path:
+        """Write everything that waits, finish the file and give it its name. Returns `path`.
+
+        Raises TraceError when that failed; the part file then stays for `salvage`.
+        """
+        if self._closed:
+            raise TraceError(f"{self.path}: is closed already")
+        self._closed = True
+        while self._thread.is_alive():
+            try:
+                self._queue.put(_Close(outcome, counters or {}), timeout=self._sync_interval)
+            except queue.Full:
+                continue
+            self._thread.join()
+        self._release()
+        if self._failure is not None:
+            raise self._failure
+        return self.path
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._closed:
+            return
+        try:
+            self.close("interrupted")
+        except TraceError:
+            if error is None:
+                raise
+
+    def _check(self, row: SampleRow) -> None:
+        count = len(self._joints)
+        floats = (row.set_point, row.position, row.error, row.drive)
+        if any(len(signal) != count for signal in (*floats, row.power_raw)) or len(row.velocity) not in (0, count):
+            raise TraceError(f"{self.path}: tick {row.tick} does not have {count} values of each signal")
+        if not math.isfinite(row.time + row.host_time + sum(map(sum, floats)) + sum(row.velocity)):
+            raise TraceError(f"{self.path}: tick {row.tick} has a value that is not finite")
+        if self._last is not None and (row.tick <= self._last.tick or row.time <= self._last.time):
+            raise TraceError(f"{self.path}: tick {row.tick} came after tick {self._last.tick}")
+
+    def _put(self, item: SampleRow | TraceEvent) -> None:
+        if self._failure is not None:
+            raise self._failure
+        if self._closed:
+            raise TraceError(f"{self.path}: is closed already")
+        try:
+            self._queue.put(item, block=self._patience > 0, timeout=self._patience)
+        except queue.Full:
+            raise self._fail(f"the disk is {self._queue.maxsize} samples and events behind") from None
+
+    def _fail(self, what: str) -> TraceError:
+        """Remember the first failure; the calls that come raise it."""
+        if self._failure is None:
+            self._failure = TraceError(f"{self.path}: cannot be written: {what}; what came before is in {self.part}")
+        return self._failure
+
+    def _run(self) -> None:
+        try:
+            self._write_until_closed()
+        except OSError as error:
+            self._fail(disk.reason(error))
+        except BaseException as error:
+            self._fail(f"{type(error).__name__}: {error}")
+            raise
+
+    def _write_until_closed(self) -> None:
+        next_sync = time.monotonic() + self._sync_interval
+        unsynced = rows = 0
+        while True:
+            try:
+                item = self._queue.get(timeout=max(0.0, next_sync - time.monotonic()))
+            except queue.Empty:
+                item = None
+            match item:
+                case SampleRow():
+                    self._recording.row(item)
+                    unsynced, rows = unsynced + 1, rows + 1
+                case TraceEvent():
+                    self._recording.event(item)
+                    unsynced += 1
+                case _Close():
+                    return self._finish(item)
+            if time.monotonic() >= next_sync:
+                next_sync = time.monotonic() + self._sync_interval
+                if unsynced:
+                    self._sync()
+                unsynced = rows = 0
+            elif rows >= ROWS_A_CHUNK:
+                self._recording.flush()
+                rows = 0
+
+    def _sync(self) -> None:
+        self._recording.flush()
+        disk.sync(self._stream)
+        self.synced_samples = self._recording.samples
+
+    def _finish(self, close: _Close) -> None:
+        if self._failure is not None:
+            # Samples were refused: what was taken is kept, but nobody shall call it finished.
+            return self._sync()
+        self._recording.finish(close.outcome, close.counters)
+        disk.sync(self._stream)
+        disk.rename(self.part, self.path)
+        self.synced_samples = self._recording.samples
+        return None
+
+    def _release(self) -> None:
+        try:
+            self._stream.close()
+        except OSError:
+            # What could not be written has been reported; closing only tries the same bytes again.
+            return
