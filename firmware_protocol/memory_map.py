@@ -5,7 +5,6 @@ from __future__ import annotations
 import tomllib
 from functools import cache
 from importlib import resources
-from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -179,20 +178,6 @@ def parse_memory_map(text: str, origin: str = "memory map") -> MemoryMap:
         found = first["input"]
         value = f" (found {found!r})" if isinstance(found, bool | int | float | str) else ""
         raise MemoryMapError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}{value}") from error
-
-
-def load_memory_map(path: Path) -> MemoryMap:
-    """A laboratory's own map from its file.
-
-    Raises MemoryMapError when the file cannot be read, is not UTF-8, or is no memory map.
-    """
-    try:
-        text = path.read_text("utf-8")
-    except OSError as error:
-        raise MemoryMapError(f"{path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise MemoryMapError(f"{path}: not UTF-8 text at byte {error.start}") from error
-    return parse_memory_map(text, str(path))
 
 
 @cache

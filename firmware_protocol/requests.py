@@ -226,7 +226,6 @@ class Advance(Request):
 
     OPCODE = 0x40
     LAYOUT = "<I"
-    CHANGES_STATE = True
     microseconds: int
 
 
