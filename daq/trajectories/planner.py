@@ -14,6 +14,7 @@ from daq.contracts.experiment import (
     Path,
     Pause,
     Ramp,
+    Segment,
     Sequence,
     Sine,
     SlowRamp,
@@ -28,7 +29,7 @@ from daq.trajectories.move import move_piece
 from daq.trajectories.multisine import multisine
 from daq.trajectories.path import path
 from daq.trajectories.pause import pause
-from daq.trajectories.piece import Piece, periods_in, smooth_piece
+from daq.trajectories.piece import Piece, smooth_piece
 from daq.trajectories.ramp import ramp
 from daq.trajectories.sequence import joined, spread
 from daq.trajectories.set_points import Mark, Plan, control_period, make_plan, snapped
@@ -79,8 +80,6 @@ def _with_repeats(spec: ExperimentSpec, motion: Piece, period: float) -> Piece:
     settle, hold = pause(spec.settle, count, period), pause(spec.hold, count, period)
     end = motion.offsets[-1] if len(motion.offsets) else np.zeros(count)
     back = move_piece(-end, period)
-    once = len(settle.offsets) + len(motion.offsets) + len(hold.offsets) + len(back.offsets)
-    periods_in(once * spec.repeats * period, period)  # too long is refused before it is built
     pieces: list[Piece] = []
     for repeat in range(1, spec.repeats + 1):
         if repeat > 1:
@@ -88,20 +87,21 @@ def _with_repeats(spec: ExperimentSpec, motion: Piece, period: float) -> Piece:
         if spec.repeats > 1:
             pieces.append(smooth_piece(np.zeros((0, count)), (Mark(0, "note", f"repeat {repeat} of {spec.repeats}"),)))
         pieces += [settle, motion, hold]
-    return joined(pieces, count)
+    return joined(pieces, count, period)
 
 
 def _piece(move: Trajectory, joints: tuple[int, ...], start: Floats, within: Floats, period: float) -> Piece:
     if isinstance(move, Path):
         return path(move, joints, start, within, period)
     if isinstance(move, Sequence):
-        pieces = []
-        for segment in move.segments:
-            own = segment.joints or joints
-            columns = [joints.index(joint) for joint in own]
-            pieces.append(spread(_simple_piece(segment.move, own, period), columns, len(joints)))
-        return joined(pieces, len(joints))
+        return joined((_segment_piece(segment, joints, period) for segment in move.segments), len(joints), period)
     return _simple_piece(move, joints, period)
+
+
+def _segment_piece(segment: Segment, joints: tuple[int, ...], period: float) -> Piece:
+    own = segment.joints or joints
+    columns = [joints.index(joint) for joint in own]
+    return spread(_simple_piece(segment.move, own, period), columns, len(joints))
 
 
 def _simple_piece(

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from daq.trajectories.piece import Piece
+from daq.trajectories.piece import Piece, periods_in
 from daq.trajectories.set_points import Mark
 
 
-def joined(pieces: Iterable[Piece], joints: int) -> Piece:
-    """One piece from several on the same `joints` joints."""
+def joined(pieces: Iterable[Piece], joints: int, period: float) -> Piece:
+    """One piece from several on the same `joints` joints. Raises SpecError when it grows longer than LONGEST."""
     offsets = [np.zeros((0, joints))]
     jumps = [np.zeros(0, dtype=np.bool_)]
     marks: list[Mark] = []
@@ -23,6 +23,7 @@ def joined(pieces: Iterable[Piece], joints: int) -> Piece:
         jumps.append(piece.jumps)
         marks.extend(replace(mark, index=mark.index + length) for mark in piece.marks)
         length += len(piece.offsets)
+        periods_in(length * period, period)  # too long is refused before it fills the memory
         if len(piece.offsets):
             reached = offsets[-1][-1]
     return Piece(np.concatenate(offsets), np.concatenate(jumps), tuple(marks))

@@ -1,0 +1,14 @@
+"""What keeps a real arm from harm on the host's side. Pure: it judges, the caller acts. It never replaces the
+hardware's own emergency stop."""
+
+from daq.safety.check_plan import check_move_to_start, check_plan, unchecked
+from daq.safety.findings import Finding, Verdict
+from daq.safety.guards import RestGuards, RunningGuards
+from daq.safety.joint_limits import largest_step
+from daq.safety.states import Action, Arm, Event, IllegalEventError, State, advance
+from daq.safety.violation import Violation
+
+__all__ = [
+    "Action", "Arm", "Event", "Finding", "IllegalEventError", "RestGuards", "RunningGuards", "State", "Verdict",
+    "Violation", "advance", "check_move_to_start", "check_plan", "largest_step", "unchecked",
+]  # fmt: skip

@@ -1,0 +1,97 @@
+"""Range, speed and size of steps of each joint over a whole plan."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from daq.contracts.limits import Limits
+from daq.contracts.machine import Machine
+from daq.safety.violation import TOLERANCE, Violation
+from daq.trajectories import Plan
+from firmware_protocol.units import ADC_COUNTS, POSTURE_UNITS
+
+STATIC_ERROR_MARGIN = 12
+"""ADC counts kept free between a step and the following-error limit for the arm's static error: an assumption. At the
+default gain gravity costs joint 2 about 3 counts; a step without this margin might never be let through."""
+
+
+def joint_violations(plan: Plan, machine: Machine, limits: Limits) -> list[Violation]:
+    """What speaks against the plan joint by joint."""
+    found: list[Violation] = []
+    for joint in range(1, plan.angles.shape[1] + 1):
+        found += _posture_violations(plan, joint)
+        found += _range_violations(plan, machine, limits, joint)
+        found += _speed_violations(plan, limits, joint)
+        found += _step_violations(plan, machine, limits, joint)
+    return found
+
+
+def largest_step(machine: Machine, limits: Limits, joint: int) -> float | None:
+    """Largest step (rad) that set points of `joint` may make; None when no following-error limit is set."""
+    if limits.following_error_counts is None:
+        return None
+    counts = max(limits.following_error_counts - STATIC_ERROR_MARGIN, 1)
+    return counts * machine.calibration(joint).range_rad / ADC_COUNTS
+
+
+def _posture_violations(plan: Plan, joint: int) -> list[Violation]:
+    postures = plan.postures[:, joint - 1]
+    found = []
+    for limit, sign, worst in ((0, -1, int(postures.argmin())), (POSTURE_UNITS - 1, 1, int(postures.argmax()))):
+        value, time = int(postures[worst]), worst * plan.period
+        if sign * (value - limit) > 0:
+            line = f"joint {joint}: posture {value} at {time:.2f} s: allowed are 0 to {POSTURE_UNITS - 1}"
+            found.append(Violation("posture", joint, time, value, limit, line))
+    return found
+
+
+def _range_violations(plan: Plan, machine: Machine, limits: Limits, joint: int) -> list[Violation]:
+    own = limits.joint(joint)
+    angles = plan.angles[:, joint - 1]
+    # A limit may lie inside a posture unit: the posture nearest to an allowed angle is allowed.
+    slack = abs(machine.calibration(joint).rad_per_posture_unit) / 2 + TOLERANCE
+    allowed = f"{_degrees(own.low)} to {_degrees(own.high)}"
+    found = []
+    for limit, sign, worst in ((own.low, -1, int(angles.argmin())), (own.high, 1, int(angles.argmax()))):
+        value, time = float(angles[worst]), worst * plan.period
+        if limit is not None and sign * (value - limit) > slack:
+            line = f"joint {joint}: {_degrees(value)} at {time:.2f} s: allowed are {allowed}"
+            found.append(Violation("range", joint, time, value, limit, line))
+    return found
+
+
+def _degrees(angle: float | None) -> str:
+    return "any" if angle is None else f"{math.degrees(angle):.2f}°"
+
+
+def _speed_violations(plan: Plan, limits: Limits, joint: int) -> list[Violation]:
+    speed = limits.joint(joint).speed
+    if speed is None or len(plan) < 2:
+        return []
+    change = np.where(plan.jumps[1:], 0.0, np.abs(np.diff(plan.angles[:, joint - 1])))
+    worst = int(change.argmax())
+    if change[worst] <= speed * plan.period + TOLERANCE:
+        return []
+    value, time = float(change[worst]) / plan.period, worst * plan.period
+    line = (
+        f"joint {joint}: {math.degrees(value):.1f} °/s at {time:.2f} s: allowed are up to {math.degrees(speed):.1f} °/s"
+    )
+    return [Violation("speed", joint, time, value, speed, line)]
+
+
+def _step_violations(plan: Plan, machine: Machine, limits: Limits, joint: int) -> list[Violation]:
+    largest = largest_step(machine, limits, joint)
+    if largest is None or len(plan) < 2:
+        return []
+    change = np.where(plan.jumps[1:], np.abs(np.diff(plan.angles[:, joint - 1])), 0.0)
+    worst = int(change.argmax())
+    value, time = float(change[worst]), (worst + 1) * plan.period
+    if value <= largest + TOLERANCE:
+        return []
+    line = (
+        f"joint {joint}: step of {_degrees(value)} at {time:.2f} s: allowed are up to {_degrees(largest)} "
+        f"(following-error limit less {STATIC_ERROR_MARGIN} counts)"
+    )
+    return [Violation("step", joint, time, value, largest, line)]

@@ -1,0 +1,44 @@
+"""Where the ends of the links are: forward kinematics of the Denavit–Hartenberg chain (section 3.2 of the source)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from daq.contracts.machine import Joint, Machine
+from daq.contracts.trace import Floats
+
+
+def link_ends(machine: Machine, angles: Floats) -> Floats:
+    """Origins of the links' frames, (n, joints, 3) in m in the base frame, for angles (n, joints) in rad (m on a
+    prismatic joint). The product of the transformations (3.7), carried as a rotation and an origin."""
+    count = len(angles)
+    rotation = np.broadcast_to(np.eye(3), (count, 3, 3))
+    origin = np.zeros((count, 3))
+    ends = np.empty((count, len(machine.joints), 3))
+    for column, joint in enumerate(machine.joints):
+        own_rotation, own_origin = _transformation(joint, angles[:, column])
+        origin = origin + np.einsum("nij,nj->ni", rotation, own_origin)
+        rotation = rotation @ own_rotation
+        ends[:, column] = origin
+    return ends
+
+
+def _transformation(joint: Joint, value: Floats) -> tuple[Floats, Floats]:
+    """Rotation (n, 3, 3) and origin (n, 3) of a joint's frame in the one before it."""
+    geometry = joint.geometry
+    revolute = joint.kind == "revolute"
+    theta = geometry.theta.value + (value if revolute else np.zeros_like(value))
+    d = geometry.d.value + (np.zeros_like(value) if revolute else value)
+    cos_theta, sin_theta = np.cos(theta), np.sin(theta)
+    cos_alpha, sin_alpha = np.cos(geometry.alpha.value), np.sin(geometry.alpha.value)
+    zero = np.zeros_like(theta)
+    rotation = np.stack(
+        [
+            np.stack([cos_theta, -cos_alpha * sin_theta, sin_alpha * sin_theta], axis=-1),
+            np.stack([sin_theta, cos_alpha * cos_theta, -sin_alpha * cos_theta], axis=-1),
+            np.stack([zero, zero + sin_alpha, zero + cos_alpha], axis=-1),
+        ],
+        axis=-2,
+    )
+    origin = np.stack([geometry.a.value * cos_theta, geometry.a.value * sin_theta, d], axis=-1)
+    return rotation, origin

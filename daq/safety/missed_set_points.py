@@ -1,0 +1,44 @@
+"""Set points that the controller did not take because the host had the memory (section 6.3 of the source)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from daq.contracts.sample import SampleRow
+from daq.safety.findings import Finding, Verdict, Watched
+from firmware_protocol.commands import StatusFlag
+
+LONGEST_RUN = 10
+"""Control periods in a row without a set point taken that are still borne: an assumption, 0.2 s."""
+
+
+@dataclass
+class MissedSetPoints:
+    """Counts them. One is harmless, set points being absolute; a run of them means an arm that is not under control."""
+
+    watched: Watched
+    missed: int = 0
+    run: int = 0
+
+    def check(self, row: SampleRow, expected: Mapping[int, int] | None) -> Verdict:
+        """`expected` are the postures (by joint) that this period should have taken; None when nobody can say."""
+        line = self._difference(row, expected or {})
+        if row.status & StatusFlag.SET_POINT_MISSED:
+            line = line or f"tick {row.tick}: the controller wanted the memory while the host had it"
+        if line is None:
+            self.run = 0
+            return Verdict()
+        self.missed += 1
+        self.run += 1
+        trips = (f"{self.run} set points missed in a row, allowed are {LONGEST_RUN}",) if self.run > LONGEST_RUN else ()
+        return Verdict(trips=trips, findings=(Finding("missed_set_point", line),))
+
+    def _difference(self, row: SampleRow, expected: Mapping[int, int]) -> str | None:
+        for joint, own, taken in zip(self.watched.joints, self.watched.calibrations, row.set_point, strict=True):
+            if joint not in expected:
+                continue
+            posture = round((taken - own.angle_at_zero_rad) / own.rad_per_posture_unit)
+            if posture != expected[joint]:
+                return f"joint {joint}: tick {row.tick} took posture {posture}, sent was {expected[joint]}"
+        return None

@@ -1,0 +1,131 @@
+"""The states of an arm under this host, and what each event does to them. Pure: events in, state and actions out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from daq.contracts.errors import DaqError
+
+
+class State(StrEnum):
+    """Only in RUNNING are set points sent. FAULT is left by an explicit reset alone."""
+
+    DISCONNECTED = "disconnected"
+    IDLE = "idle"
+    ARMED = "armed"
+    RUNNING = "running"
+    STOPPED = "stopped"
+    FAULT = "fault"
+
+
+class Event(StrEnum):
+    """What can happen."""
+
+    CONNECTED = "connected"
+    LINK_LOST = "link lost"
+    ARM = "arm"
+    """Somebody wants to move the arm, and the plan has passed every check."""
+    DISARM = "disarm"
+    START = "start"
+    FINISHED = "finished"
+    STOP = "stop"
+    """From anyone, at any moment."""
+    TRIP = "trip"
+    """A guard has found a reason for a fault."""
+    RESET = "reset"
+
+
+class Action(StrEnum):
+    """What the caller must do, in the order given."""
+
+    CEASE = "cease"
+    """Send no further set point."""
+    FREEZE = "freeze"
+    """Set points := measured position, on the board, ahead of every queue. Sent even when the link is thought dead."""
+    RELEASE = "release"
+    """End the board's freeze; set points stay where it put them."""
+    SEND = "send"
+    """Begin to send set points."""
+
+
+class IllegalEventError(DaqError):
+    """An event that the state does not allow; nothing has changed."""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """The state, whether the link is up, and why the arm was stopped or is at fault."""
+
+    state: State = State.DISCONNECTED
+    connected: bool = False
+    cause: str | None = None
+
+
+Outcome = tuple[Arm, tuple[Action, ...]]
+
+_HALT = (Action.CEASE, Action.FREEZE)
+_ORDERLY: dict[tuple[State, Event], tuple[State, tuple[Action, ...]]] = {
+    (State.IDLE, Event.ARM): (State.ARMED, (Action.RELEASE,)),
+    (State.STOPPED, Event.ARM): (State.ARMED, (Action.RELEASE,)),
+    (State.ARMED, Event.DISARM): (State.IDLE, ()),
+    (State.ARMED, Event.START): (State.RUNNING, (Action.SEND,)),
+    (State.RUNNING, Event.FINISHED): (State.ARMED, (Action.CEASE,)),
+    (State.STOPPED, Event.RESET): (State.IDLE, ()),
+}
+_ADVICE = {
+    Event.CONNECTED: "the link is up already",
+    Event.ARM: "possible when idle or stopped; reset a fault first, connect when disconnected",
+    Event.DISARM: "possible when armed",
+    Event.START: "arm first",
+    Event.FINISHED: "nothing is running",
+    Event.RESET: "possible when stopped or at fault",
+}
+
+
+def advance(arm: Arm, event: Event, cause: str | None = None) -> Outcome:
+    """State and actions after `event`; `cause` says in a few words why, for a stop or a fault.
+
+    STOP, TRIP and LINK_LOST are taken in every state. Raises IllegalEventError for any other event that the state does
+    not allow.
+    """
+    match event:
+        case Event.STOP:
+            return _stop(arm, cause or "stop requested")
+        case Event.TRIP:
+            return replace(arm, state=State.FAULT, cause=_first(arm, cause or "guard tripped")), _HALT
+        case Event.LINK_LOST:
+            return _link_lost(arm, cause or "link lost")
+        case Event.CONNECTED if not arm.connected:
+            return _connected(arm)
+        case Event.RESET if arm.state is State.FAULT:
+            return Arm(State.IDLE if arm.connected else State.DISCONNECTED, arm.connected), ()
+    if (arm.state, event) not in _ORDERLY:
+        raise IllegalEventError(f"cannot {event} while {arm.state}: {_ADVICE[event]}")
+    state, actions = _ORDERLY[arm.state, event]
+    return Arm(state, arm.connected), actions
+
+
+def _stop(arm: Arm, cause: str) -> Outcome:
+    if arm.state in (State.FAULT, State.DISCONNECTED):
+        return arm, _HALT
+    return replace(arm, state=State.STOPPED, cause=_first(arm, cause)), _HALT
+
+
+def _link_lost(arm: Arm, cause: str) -> Outcome:
+    if arm.state in (State.ARMED, State.RUNNING):
+        return Arm(State.FAULT, False, cause), _HALT
+    if arm.state is State.FAULT:
+        return replace(arm, connected=False), ()
+    return Arm(), ()
+
+
+def _connected(arm: Arm) -> Outcome:
+    if arm.state is State.FAULT:
+        return replace(arm, connected=True), (Action.FREEZE,)
+    return Arm(State.IDLE, True), ()
+
+
+def _first(arm: Arm, cause: str) -> str:
+    """The first cause is kept: what follows from it would hide it. A fault replaces a stop's."""
+    return arm.cause if arm.state is State.FAULT and arm.cause else cause
