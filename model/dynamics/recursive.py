@@ -35,28 +35,28 @@ def _cross(ax: complex, ay: complex, az: complex, bx: complex, by: complex, bz: 
 
 
 @inlined
-def _to_link(row: Array, x: complex, y: complex, z: complex) -> Any:
+def _to_link(table: Array, i: int, x: complex, y: complex, z: complex) -> Any:
     """Components of a vector in link axes, from those in the axes of the frame before (transpose of 3.8)."""
-    turned_x = row[_CT] * x + row[_ST] * y
-    turned_y = row[_CT] * y - row[_ST] * x
-    return turned_x, row[_CA] * turned_y + row[_SA] * z, row[_CA] * z - row[_SA] * turned_y
+    turned_x = table[i, _CT] * x + table[i, _ST] * y
+    turned_y = table[i, _CT] * y - table[i, _ST] * x
+    return turned_x, table[i, _CA] * turned_y + table[i, _SA] * z, table[i, _CA] * z - table[i, _SA] * turned_y
 
 
 @inlined
-def _to_previous(row: Array, x: complex, y: complex, z: complex) -> Any:
+def _to_previous(table: Array, i: int, x: complex, y: complex, z: complex) -> Any:
     """Components in the axes of the frame before, from those in link axes (3.8)."""
-    tilted_y = row[_CA] * y - row[_SA] * z
-    tilted_z = row[_SA] * y + row[_CA] * z
-    return row[_CT] * x - row[_ST] * tilted_y, row[_ST] * x + row[_CT] * tilted_y, tilted_z
+    tilted_y = table[i, _CA] * y - table[i, _SA] * z
+    tilted_z = table[i, _SA] * y + table[i, _CA] * z
+    return table[i, _CT] * x - table[i, _ST] * tilted_y, table[i, _ST] * x + table[i, _CT] * tilted_y, tilted_z
 
 
 @inlined
-def _tensor_times(inertia: Array, x: complex, y: complex, z: complex) -> Any:
-    """Product of a tensor stored as xx xy xz yy yz zz with a vector."""
+def _tensor_times(body: Array, i: int, x: complex, y: complex, z: complex) -> Any:
+    """Product of the tensor in columns 4 to 9 (xx xy xz yy yz zz) of row i with a vector."""
     return (
-        inertia[0] * x + inertia[1] * y + inertia[2] * z,
-        inertia[1] * x + inertia[3] * y + inertia[4] * z,
-        inertia[2] * x + inertia[4] * y + inertia[5] * z,
+        body[i, 4] * x + body[i, 5] * y + body[i, 6] * z,
+        body[i, 5] * x + body[i, 7] * y + body[i, 8] * z,
+        body[i, 6] * x + body[i, 8] * y + body[i, 9] * z,
     )
 
 
@@ -106,32 +106,31 @@ def _forward(chain: ChainArrays, table: Array, velocity: Array, acceleration: Ar
     ux, uy, uz = zero, zero, zero  # angular acceleration
     vx, vy, vz = -gravity[0], -gravity[1], -gravity[2]  # linear acceleration of the frame's origin
     for i in range(velocity.shape[0]):
-        row = table[i]
         rate, change = velocity[i], acceleration[i]
-        vx, vy, vz = _to_link(row, vx, vy, vz)
+        vx, vy, vz = _to_link(table, i, vx, vy, vz)
         if chain.prismatic[i]:
-            wx, wy, wz = _to_link(row, wx, wy, wz)
-            ux, uy, uz = _to_link(row, ux, uy, uz)
-            kx, ky, kz = _cross(wx, wy, wz, zero, row[_SA] * rate, row[_CA] * rate)
+            wx, wy, wz = _to_link(table, i, wx, wy, wz)
+            ux, uy, uz = _to_link(table, i, ux, uy, uz)
+            kx, ky, kz = _cross(wx, wy, wz, zero, table[i, _SA] * rate, table[i, _CA] * rate)
             vx += 2.0 * kx
-            vy += 2.0 * ky + row[_SA] * change
-            vz += 2.0 * kz + row[_CA] * change
+            vy += 2.0 * ky + table[i, _SA] * change
+            vz += 2.0 * kz + table[i, _CA] * change
         else:
-            ux, uy, uz = _to_link(row, ux + wy * rate, uy - wx * rate, uz + change)
-            wx, wy, wz = _to_link(row, wx, wy, wz + rate)
-        px, py, pz = row[_P], row[_P + 1], row[_P + 2]
+            ux, uy, uz = _to_link(table, i, ux + wy * rate, uy - wx * rate, uz + change)
+            wx, wy, wz = _to_link(table, i, wx, wy, wz + rate)
+        px, py, pz = table[i, _P], table[i, _P + 1], table[i, _P + 2]
         ax, ay, az = _turning_acceleration(wx, wy, wz, ux, uy, uz, px, py, pz)
         vx, vy, vz = vx + ax, vy + ay, vz + az
 
-        body = chain.inertial[i]
-        mass, sx, sy, sz = body[0], body[1], body[2], body[3]
+        body = chain.inertial
+        mass, sx, sy, sz = body[i, 0], body[i, 1], body[i, 2], body[i, 3]
         ax, ay, az = _turning_acceleration(wx, wy, wz, ux, uy, uz, sx, sy, sz)
-        row[_F], row[_F + 1], row[_F + 2] = mass * vx + ax, mass * vy + ay, mass * vz + az
-        ex, ey, ez = _tensor_times(body[4:], ux, uy, uz)
-        hx, hy, hz = _tensor_times(body[4:], wx, wy, wz)
+        table[i, _F], table[i, _F + 1], table[i, _F + 2] = mass * vx + ax, mass * vy + ay, mass * vz + az
+        ex, ey, ez = _tensor_times(body, i, ux, uy, uz)
+        hx, hy, hz = _tensor_times(body, i, wx, wy, wz)
         gx, gy, gz = _cross(wx, wy, wz, hx, hy, hz)
         nx, ny, nz = _cross(sx, sy, sz, vx, vy, vz)
-        row[_N], row[_N + 1], row[_N + 2] = ex + gx + nx, ey + gy + ny, ez + gz + nz
+        table[i, _N], table[i, _N + 1], table[i, _N + 2] = ex + gx + nx, ey + gy + ny, ez + gz + nz
 
 
 @inlined
@@ -162,31 +161,31 @@ def _backward(chain: ChainArrays, table: Array, acceleration: Array) -> Array:
     fx, fy, fz = zero, zero, zero
     nx, ny, nz = zero, zero, zero
     for i in range(n - 1, -1, -1):
-        row = table[i]
-        fx, fy, fz = fx + row[_F], fy + row[_F + 1], fz + row[_F + 2]
-        mx, my, mz = _cross(row[_P], row[_P + 1], row[_P + 2], fx, fy, fz)
-        nx, ny, nz = nx + row[_N] + mx, ny + row[_N + 1] + my, nz + row[_N + 2] + mz
-        fx, fy, fz = _to_previous(row, fx, fy, fz)
-        nx, ny, nz = _to_previous(row, nx, ny, nz)
+        fx, fy, fz = fx + table[i, _F], fy + table[i, _F + 1], fz + table[i, _F + 2]
+        mx, my, mz = _cross(table[i, _P], table[i, _P + 1], table[i, _P + 2], fx, fy, fz)
+        nx, ny, nz = nx + table[i, _N] + mx, ny + table[i, _N + 1] + my, nz + table[i, _N + 2] + mz
+        fx, fy, fz = _to_previous(table, i, fx, fy, fz)
+        nx, ny, nz = _to_previous(table, i, nx, ny, nz)
         torque[i] = (fz if chain.prismatic[i] else nz) + chain.rotor_inertia[i] * acceleration[i]
     return torque
 
 
 @inlined
-def _composite_to_previous(row: Array, body: Array, out: Array) -> None:
-    """Add a rigid body given about its frame's origin to one given about the origin before, in its axes."""
-    mass = body[0]
-    px, py, pz = row[_P], row[_P + 1], row[_P + 2]
-    sx, sy, sz = body[1], body[2], body[3]
+def _add_to_previous(table: Array, bodies: Array, i: int) -> None:
+    """Add body i + 1, given in frame i + 1 (about its origin), to body i in frame i; the joint between is i."""
+    k = i + 1
+    mass = bodies[k, 0]
+    px, py, pz = table[i, _P], table[i, _P + 1], table[i, _P + 2]
+    sx, sy, sz = bodies[k, 1], bodies[k, 2], bodies[k, 3]
     tx, ty, tz = sx + mass * px, sy + mass * py, sz + mass * pz
-    xx = body[4] + py * (sy + ty) + pz * (sz + tz)
-    yy = body[7] + px * (sx + tx) + pz * (sz + tz)
-    zz = body[9] + px * (sx + tx) + py * (sy + ty)
-    xy = body[5] - px * sy - tx * py
-    xz = body[6] - px * sz - tx * pz
-    yz = body[8] - py * sz - ty * pz
+    xx = bodies[k, 4] + py * (sy + ty) + pz * (sz + tz)
+    yy = bodies[k, 7] + px * (sx + tx) + pz * (sz + tz)
+    zz = bodies[k, 9] + px * (sx + tx) + py * (sy + ty)
+    xy = bodies[k, 5] - px * sy - tx * py
+    xz = bodies[k, 6] - px * sz - tx * pz
+    yz = bodies[k, 8] - py * sz - ty * pz
     # turn by α about x
-    ca, sa = row[_CA], row[_SA]
+    ca, sa = table[i, _CA], table[i, _SA]
     xy, xz = ca * xy - sa * xz, sa * xy + ca * xz
     mixed = 2.0 * ca * sa * yz
     yy_turned = ca * ca * yy - mixed + sa * sa * zz
@@ -194,72 +193,80 @@ def _composite_to_previous(row: Array, body: Array, out: Array) -> None:
     zz = sa * sa * yy + mixed + ca * ca * zz
     yy = yy_turned
     # turn by θ about z
-    ct, st = row[_CT], row[_ST]
+    ct, st = table[i, _CT], table[i, _ST]
     xz, yz = ct * xz - st * yz, st * xz + ct * yz
     mixed = 2.0 * ct * st * xy
     xx_turned = ct * ct * xx - mixed + st * st * yy
     xy = ct * st * (xx - yy) + (ct * ct - st * st) * xy
     yy = st * st * xx + mixed + ct * ct * yy
-    tx, ty, tz = _to_previous(row, tx, ty, tz)
-    out[0] += mass
-    out[1] += tx
-    out[2] += ty
-    out[3] += tz
-    out[4] += xx_turned
-    out[5] += xy
-    out[6] += xz
-    out[7] += yy
-    out[8] += yz
-    out[9] += zz
+    tx, ty, tz = _to_previous(table, i, tx, ty, tz)
+    bodies[i, 0] += mass
+    bodies[i, 1] += tx
+    bodies[i, 2] += ty
+    bodies[i, 3] += tz
+    bodies[i, 4] += xx_turned
+    bodies[i, 5] += xy
+    bodies[i, 6] += xz
+    bodies[i, 7] += yy
+    bodies[i, 8] += yz
+    bodies[i, 9] += zz
 
 
 @compiled
 def _composites(chain: ChainArrays, table: Array) -> Array:
-    """(n + 1, 10) all bodies from link i outwards as one, row i − 1 in frame i − 1's axes; row n is empty.
+    """(n + 1, 10): row i is link i with everything beyond it as one rigid body, in frame i about its origin.
 
-    Row i is about the origin of frame i and holds link i and everything beyond it, row 0 the whole arm.
+    Links are numbered from 1; row 0 is the whole arm in the base frame.
     """
     n = table.shape[0]
     bodies = np.zeros((n + 1, 10), dtype=table.dtype)
-    for i in range(n):
-        bodies[i + 1] = chain.inertial[i]
+    bodies[1:] = chain.inertial
     for i in range(n - 1, -1, -1):
-        _composite_to_previous(table[i], bodies[i + 1], bodies[i])
+        _add_to_previous(table, bodies, i)
     return bodies
+
+
+@inlined
+def _unit_acceleration_wrench(prismatic: bool, table: Array, bodies: Array, j: int) -> Any:
+    """Force and moment, in link axes about its origin, that give joint j of the composite unit acceleration."""
+    k = j + 1
+    mass, sx, sy, sz = bodies[k, 0], bodies[k, 1], bodies[k, 2], bodies[k, 3]
+    zy, zz = table[j, _SA], table[j, _CA]  # the joint's axis in link axes; its x component is zero
+    zx = 0.0 * zy
+    if prismatic:
+        fx, fy, fz = mass * zx, mass * zy, mass * zz
+        nx, ny, nz = _cross(sx, sy, sz, zx, zy, zz)
+    else:
+        vx, vy, vz = _cross(zx, zy, zz, table[j, _P], table[j, _P + 1], table[j, _P + 2])
+        ax, ay, az = _cross(zx, zy, zz, sx, sy, sz)
+        fx, fy, fz = mass * vx + ax, mass * vy + ay, mass * vz + az
+        mx, my, mz = _cross(sx, sy, sz, vx, vy, vz)
+        nx, ny, nz = _tensor_times(bodies, k, zx, zy, zz)
+        nx, ny, nz = nx + mx, ny + my, nz + mz
+    return fx, fy, fz, nx, ny, nz
+
+
+@compiled
+def _mass_matrix(chain: ChainArrays, table: Array) -> Array:
+    n = table.shape[0]
+    bodies = _composites(chain, table)
+    result = np.empty((n, n), dtype=table.dtype)
+    for j in range(n):
+        fx, fy, fz, nx, ny, nz = _unit_acceleration_wrench(chain.prismatic[j], table, bodies, j)
+        for i in range(j, -1, -1):
+            mx, my, mz = _cross(table[i, _P], table[i, _P + 1], table[i, _P + 2], fx, fy, fz)
+            fx, fy, fz = _to_previous(table, i, fx, fy, fz)
+            nx, ny, nz = _to_previous(table, i, nx + mx, ny + my, nz + mz)
+            result[i, j] = fz if chain.prismatic[i] else nz
+            result[j, i] = result[i, j]
+        result[j, j] += chain.rotor_inertia[j]
+    return result
 
 
 @compiled
 def mass_matrix(chain: ChainArrays, q: Array) -> Array:
     """D(q) by composite bodies (Walker and Orin 1982), (n, n), reflected rotor inertia on the diagonal."""
-    n = q.shape[0]
-    table = _link_table(chain, q)
-    bodies = _composites(chain, table)
-    result = np.empty((n, n), dtype=q.dtype)
-    for j in range(n):
-        row, body = table[j], bodies[j + 1]
-        px, py, pz = row[_P], row[_P + 1], row[_P + 2]
-        mass, sx, sy, sz = body[0], body[1], body[2], body[3]
-        zy, zz = row[_SA], row[_CA]  # the joint's axis in link axes; its x component is zero
-        zx = 0.0 * zy
-        if chain.prismatic[j]:
-            fx, fy, fz = mass * zx, mass * zy, mass * zz
-            nx, ny, nz = _cross(sx, sy, sz, zx, zy, zz)
-        else:
-            vx, vy, vz = _cross(zx, zy, zz, px, py, pz)
-            ax, ay, az = _cross(zx, zy, zz, sx, sy, sz)
-            fx, fy, fz = mass * vx + ax, mass * vy + ay, mass * vz + az
-            mx, my, mz = _cross(sx, sy, sz, vx, vy, vz)
-            nx, ny, nz = _tensor_times(body[4:], zx, zy, zz)
-            nx, ny, nz = nx + mx, ny + my, nz + mz
-        for i in range(j, -1, -1):
-            row = table[i]
-            mx, my, mz = _cross(row[_P], row[_P + 1], row[_P + 2], fx, fy, fz)
-            fx, fy, fz = _to_previous(row, fx, fy, fz)
-            nx, ny, nz = _to_previous(row, nx + mx, ny + my, nz + mz)
-            result[i, j] = fz if chain.prismatic[i] else nz
-            result[j, i] = result[i, j]
-        result[j, j] += chain.rotor_inertia[j]
-    return result
+    return _mass_matrix(chain, _link_table(chain, q))
 
 
 @compiled
@@ -284,8 +291,13 @@ def inverse_dynamics(chain: ChainArrays, q: Array, velocity: Array, acceleration
 @compiled
 def forward_dynamics(chain: ChainArrays, q: Array, velocity: Array, torque: Array) -> Array:
     """q̈ for given joint torques or forces, (n,); inf or nan where D(q) is singular."""
-    remaining = torque - newton_euler(chain, q, velocity, np.zeros_like(q), chain.gravity)
-    return solve_symmetric(mass_matrix(chain, q), remaining)
+    table = _link_table(chain, q)
+    rest = np.zeros_like(q)
+    _forward(chain, table, velocity, rest, chain.gravity)
+    remaining = _backward(chain, table, rest)
+    for i in range(q.shape[0]):
+        remaining[i] = torque[i] - remaining[i]
+    return solve_symmetric(_mass_matrix(chain, table), remaining)
 
 
 @compiled
