@@ -160,7 +160,7 @@ def test_end_stops_hold_against_full_drive() -> None:
     plant = Plant(default_plant(), angles=UP)
     plant.advance([1.0, 0, 1.0, 0.5, 0.5, 0.5], 6_000_000)
     overshoot = [a - j.upper_stop for a, j in zip(plant.joint_angles, plant.parameters.joints, strict=True)]
-    assert max(overshoot) < math.radians(3)
+    assert max(overshoot) < math.radians(0.5)
     assert overshoot[0] > -math.radians(1)
 
 
