@@ -1,0 +1,31 @@
+"""`python -m mock_controller`: exit code 0 when interrupted or no longer owned, 2 for wrong options."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from types import FrameType
+
+from mock_controller.options import read_options
+from mock_controller.server import Server
+
+
+def main(arguments: list[str]) -> int:
+    """Runs the mock until it is interrupted; the exit code."""
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        Server(read_options(arguments)).run()
+    except KeyboardInterrupt:
+        return 0
+    except ValueError as error:
+        print(f"mock_controller: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _interrupt(_signal: int, _frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,278 @@
+"""The conversation: which request is carried out, refused, or has to wait.
+
+At most one `Sample` waits at a time (a later one takes its place), and in lock-step one `Advance`; all other requests
+are answered meanwhile, `Stop` at once. Time is the board's: carrying out a request lets it pass.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from firmware_protocol.commands import (
+    PROTOCOL_VERSION,
+    Advance,
+    Advanced,
+    Arrival,
+    ArrivalOrder,
+    Capability,
+    Hello,
+    HelloReply,
+    JointReading,
+    ReadBlock,
+    ReadProcess,
+    ReadStatus,
+    Refusal,
+    Refused,
+    Release,
+    Released,
+    Reply,
+    ReportErrorsPositionsPowers,
+    ReportGains,
+    Request,
+    Sample,
+    SetGains,
+    SetGripper,
+    SetPointsTaken,
+    Snapshot,
+    Status,
+    StatusFlag,
+    Stop,
+    Stopped,
+    WriteBlock,
+    WriteOutputs,
+    WriteSetPoints,
+    joints_of,
+    parse_request,
+    refusal_of,
+    to_frame,
+)
+from firmware_protocol.errors import ProtocolError
+from firmware_protocol.framing import Frame
+from mock_controller.board.memory import MemoryAddressError
+from mock_controller.board.snapshot import RING_DEPTH, PeriodSnapshot
+from mock_controller.bridge.routines import MemoryRoutines
+from mock_controller.bridge.stop_record import StopRecord
+from mock_controller.timeline import Timeline
+
+WAIT_LIMIT_PERIODS = 25
+"""A sample that has waited for so many periods is refused: the controller does not run."""
+
+
+@dataclass
+class _WaitingSample:
+    sequence: int
+    after: int
+    joints: tuple[int, ...]
+    boots: int
+    until_us: int
+
+
+@dataclass
+class _WaitingAdvance:
+    sequence: int
+    until_us: int
+
+
+class Bridge:
+    """Answers requests. `sees_period` offers `Sample`; `lock_step` offers `Advance`."""
+
+    def __init__(self, timeline: Timeline, *, sees_period: bool = True, lock_step: bool = False) -> None:
+        self._timeline = timeline
+        self._board = timeline.board
+        self._routines = MemoryRoutines(timeline, sees_period)
+        self._sees_period = sees_period
+        self._lock_step = lock_step
+        self._order = ArrivalOrder()
+        self._sample: _WaitingSample | None = None
+        self._advance: _WaitingAdvance | None = None
+        self._boots_greeted = 0
+        self.stops = StopRecord()
+        self.answered: Counter[str] = Counter()
+        """Requests that came to be carried out, by name."""
+        self.refused: Counter[str] = Counter()
+        """Refusals by reason."""
+        routines = self._routines
+        self._handlers: dict[type[Request], Callable[[Any], Reply | Refusal]] = {
+            Hello: self._hello,
+            ReadBlock: routines.read_block,
+            WriteBlock: self._write_block,
+            WriteSetPoints: self._write_set_points,
+            ReportGains: lambda _: routines.gains(),
+            SetGains: routines.set_gains,
+            ReportErrorsPositionsPowers: routines.errors_positions_powers,
+            Stop: self._stop,
+            Release: self._release,
+            ReadProcess: lambda _: routines.read_process(),
+            WriteOutputs: routines.write_outputs,
+            SetGripper: routines.set_gripper,
+            ReadStatus: self._read_status,
+        }
+
+    # --- time
+
+    @property
+    def time_us(self) -> int:
+        """Board time."""
+        return self._board.time_us
+
+    def run_until(self, time_us: int) -> None:
+        """Lets board time pass."""
+        self._timeline.run_until(time_us)
+        if self.stops.unused:
+            self.stops.look(self._board.snapshots)
+
+    @property
+    def wake_us(self) -> int | None:
+        """When a waiting request may be answered; None when none waits."""
+        times = []
+        if self._sample is not None:
+            times.append(min(self._board.next_event_us, max(self._sample.until_us, self.time_us)))
+        if self._advance is not None:
+            times.append(max(self._advance.until_us, self.time_us))
+        return min(times, default=None)
+
+    def hang_up(self) -> None:
+        """Nobody waits any more. What the host has said before it went still counts."""
+        self._sample = None
+        self._advance = None
+
+    # --- requests
+
+    def receive(self, frame: Frame) -> list[Frame]:
+        """Carries out one request, or lets it wait; the replies there are now."""
+        try:
+            request = parse_request(frame)
+        except ProtocolError as error:
+            return [self._refuse(frame.sequence, frame.opcode, refusal_of(error))]
+        arrival = self._order.judge(frame.sequence, request)
+        if arrival is Arrival.STALE:
+            return [self._refuse(frame.sequence, frame.opcode, Refusal.STALE)]
+        self.answered[type(request).__name__] += 1
+        if isinstance(request, Sample):
+            return self._begin_sample(frame.sequence, request)
+        if isinstance(request, Advance):
+            return self._begin_advance(frame.sequence, request, again=arrival is Arrival.AGAIN)
+        try:
+            reply = self._handlers[type(request)](request)
+        except MemoryAddressError:
+            reply = Refusal.BAD_ADDRESS
+        if isinstance(reply, Refusal):
+            return [self._refuse(frame.sequence, frame.opcode, reply)]
+        return [to_frame(frame.sequence, reply)]
+
+    def overdue(self) -> list[Frame]:
+        """Replies to what waited, as far as their moment has come."""
+        replies = []
+        if self._sample is not None:
+            replies += self._try_sample(self._sample)
+        if self._advance is not None and self.time_us >= self._advance.until_us:
+            sequence, self._advance = self._advance.sequence, None
+            replies.append(self._advanced(sequence))
+        return replies
+
+    def _refuse(self, sequence: int, opcode: int, reason: Refusal) -> Frame:
+        self.refused[reason.name] += 1
+        return to_frame(sequence, Refused(opcode, reason))
+
+    # --- at once
+
+    def _flags(self, frozen: bool, missed: bool = False) -> int:
+        flags = StatusFlag(0)
+        if frozen:
+            flags |= StatusFlag.FROZEN
+        if self._board.counters.boots != self._boots_greeted:
+            flags |= StatusFlag.RESTARTED
+        if missed:
+            flags |= StatusFlag.SET_POINT_MISSED
+        return flags
+
+    def _hello(self, _: Hello) -> Reply:
+        board = self._board
+        self._boots_greeted = board.counters.boots
+        capabilities = Capability.SIMULATED
+        if self._sees_period:
+            capabilities |= Capability.SAMPLE
+        if self._lock_step:
+            capabilities |= Capability.LOCK_STEP
+        depth = RING_DEPTH if self._sees_period else 0
+        return HelloReply(
+            PROTOCOL_VERSION, capabilities, board.parameters.timing.period, depth, board.counters.boots & 0xFFFF
+        )
+
+    def _write_set_points(self, request: WriteSetPoints) -> Reply | Refusal:
+        if self._board.frozen:
+            return Refusal.FROZEN
+        self._routines.write_set_points(request)
+        return SetPointsTaken(self._board.tick, self._flags(self._board.frozen))
+
+    def _write_block(self, request: WriteBlock) -> Reply | Refusal:
+        if self._board.frozen and self._routines.touches_set_points(request):
+            return Refusal.FROZEN
+        return self._routines.write_block(request)
+
+    def _stop(self, _: Stop) -> Reply:
+        received_us, already = self.time_us, self._board.frozen
+        postures = self._routines.freeze()
+        if not already:
+            self.stops.note(received_us, self.time_us, self._board.tick)
+        return Stopped(self._board.tick, postures)
+
+    def _release(self, _: Release) -> Reply:
+        self._board.release()
+        return Released()
+
+    def _read_status(self, _: ReadStatus) -> Reply:
+        board = self._board
+        return Status(
+            board.tick, self._flags(board.frozen), board.counters.boots & 0xFFFF, board.counters.set_points_missed
+        )
+
+    # --- what waits
+
+    def _begin_sample(self, sequence: int, request: Sample) -> list[Frame]:
+        if not self._sees_period:
+            return [self._refuse(sequence, Sample.OPCODE, Refusal.NOT_CAPABLE)]
+        newest = self._board.snapshots.newest()
+        # A host that asks for more than there is remembers the ticks of an earlier life of the board.
+        after = min(request.after, newest.tick if newest else 0)
+        patience_us = WAIT_LIMIT_PERIODS * self._board.parameters.timing.period
+        self._sample = _WaitingSample(
+            sequence, after, joints_of(request.mask), self._board.counters.boots, self.time_us + patience_us
+        )
+        return self._try_sample(self._sample)
+
+    def _try_sample(self, waiting: _WaitingSample) -> list[Frame]:
+        if waiting.boots != self._board.counters.boots:
+            waiting.boots, waiting.after = self._board.counters.boots, 0
+        found = self._board.snapshots.oldest_after(waiting.after)
+        if found is not None:
+            self._sample = None
+            return [to_frame(waiting.sequence, self._snapshot(found, waiting.joints))]
+        if self.time_us >= waiting.until_us:
+            self._sample = None
+            return [self._refuse(waiting.sequence, Sample.OPCODE, Refusal.NOTHING_NEW)]
+        return []
+
+    def _snapshot(self, found: PeriodSnapshot, joints: tuple[int, ...]) -> Reply:
+        rows = zip(found.set_points, found.positions, found.errors, found.powers, strict=True)
+        readings = [JointReading(*row) for row in rows]
+        return Snapshot(
+            found.tick,
+            self._flags(found.frozen, found.set_point_missed),
+            tuple((joint, readings[joint - 1]) for joint in joints),
+        )
+
+    def _begin_advance(self, sequence: int, request: Advance, *, again: bool) -> list[Frame]:
+        if not self._lock_step:
+            return [self._refuse(sequence, Advance.OPCODE, Refusal.NOT_CAPABLE)]
+        if again and self._advance is None:
+            return [self._advanced(sequence)]
+        if not again:
+            self._advance = _WaitingAdvance(sequence, self.time_us + request.microseconds)
+        return []
+
+    def _advanced(self, sequence: int) -> Frame:
+        return to_frame(sequence, Advanced(self.time_us, self._board.tick))

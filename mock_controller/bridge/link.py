@@ -1,0 +1,199 @@
+"""One connection as seen from the bridge: bytes in, bytes out, each at its moment of board time.
+
+Bytes travel on a line (which may take time), through the faults of the line, to the bridge; replies go the same way
+back. Everything under way has a time; `run_until` lets it happen in order.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from firmware_protocol.framing import Frame, FrameDecoder, encode_frame
+from mock_controller.bridge.line import Line
+from mock_controller.bridge.pieces import PieceSplitter
+
+
+class Responder(Protocol):
+    """What the link needs of a bridge."""
+
+    @property
+    def time_us(self) -> int:
+        """Board time."""
+        ...
+
+    def run_until(self, time_us: int) -> None:
+        """Lets board time pass."""
+        ...
+
+    def receive(self, frame: Frame) -> list[Frame]:
+        """Carries out a request now; the replies that it has at once."""
+        ...
+
+    def overdue(self) -> list[Frame]:
+        """Replies that had to wait for their moment, which has come."""
+        ...
+
+    @property
+    def wake_us(self) -> int | None:
+        """When the next waiting reply may be ready; None when none waits."""
+        ...
+
+    def hang_up(self) -> None:
+        """The host is gone: forgets what waits."""
+        ...
+
+
+class WireChunk(Protocol):
+    """Bytes that come `delay_us` late; later ones wait for them where they hold the line."""
+
+    @property
+    def data(self) -> bytes: ...
+    @property
+    def delay_us(self) -> int: ...
+    @property
+    def holds_line(self) -> bool: ...
+
+
+class Wire(Protocol):
+    """What may happen to a frame on its way."""
+
+    def on_the_wire(self, data: bytes, direction: Literal["to_controller", "to_host"]) -> Iterable[WireChunk]: ...
+
+
+@dataclass
+class LinkCounts:
+    """What the bridge has seen and said, over all connections."""
+
+    frames_received: int = 0
+    damaged: int = 0
+    frames_sent: int = 0
+
+
+_Due = tuple[int, int, bytes]
+"""When (board time, µs), in which order at the same time, and what."""
+
+
+class Link:
+    """Bytes in and out of a bridge. `baud` None: the line takes no time."""
+
+    def __init__(self, bridge: Responder, wire: Wire, baud: int | None = None) -> None:
+        self._bridge = bridge
+        self._wire = wire
+        self._baud = baud
+        self._splitter = PieceSplitter()
+        self._decoder = FrameDecoder()
+        self._order = 0
+        self.counts = LinkCounts()
+        self._start()
+
+    def _start(self) -> None:
+        self._in_line = Line(self._baud)
+        self._out_line = Line(self._baud)
+        self._last_bit_us = 0
+        self._arriving: list[_Due] = []
+        self._leaving: list[_Due] = []
+        self._outbox: deque[_Due] = deque()
+
+    def hang_up(self) -> None:
+        """Forgets everything under way: the host is gone."""
+        self._splitter.reset()
+        self._decoder.reset()
+        self._bridge.hang_up()
+        self._start()
+
+    @property
+    def time_us(self) -> int:
+        """Board time."""
+        return self._bridge.time_us
+
+    # --- what is under way
+
+    @property
+    def owes(self) -> bool:
+        """Whether bytes are on the line, or a request waits for its moment."""
+        on_line = bool(self._arriving) and self._arriving[0][0] <= max(self.time_us, self._last_bit_us)
+        return on_line or bool(self._outbox) or self._bridge.wake_us is not None
+
+    @property
+    def delayed(self) -> bool:
+        """Whether a fault keeps anything back."""
+        return bool(self._arriving or self._leaving)
+
+    def next_event_us(self) -> int | None:
+        """When something happens next; None when nothing will without the host."""
+        times = [queue[0][0] for queue in (self._arriving, self._leaving, self._outbox) if queue]
+        wake = self._bridge.wake_us
+        if wake is not None:
+            times.append(wake)
+        return min(times, default=None)
+
+    # --- bytes
+
+    def receive(self, data: bytes) -> None:
+        """Takes bytes that the host puts on the line now."""
+        for piece in self._splitter.feed(data):
+            self.receive_piece(piece)
+
+    def receive_piece(self, piece: bytes) -> None:
+        """Takes one piece that the host puts on the line now."""
+        arrival = self._in_line.carry(len(piece), self.time_us)
+        self._last_bit_us = arrival
+        for chunk in self._wire.on_the_wire(piece, "to_controller"):
+            at = arrival + chunk.delay_us
+            if chunk.holds_line:
+                self._in_line.reserve(at)
+            heapq.heappush(self._arriving, self._due(at, chunk.data))
+
+    def take_output(self) -> bytes:
+        """Bytes that have reached the host's end of the line by now."""
+        output = bytearray()
+        while self._outbox and self._outbox[0][0] <= self.time_us:
+            output += self._outbox.popleft()[2]
+        return bytes(output)
+
+    def run_until(self, time_us: int) -> None:
+        """Lets everything happen that happens up to a time (µs); the bridge's own work may end a little later."""
+        while True:
+            arriving = self._arriving[0][0] if self._arriving else time_us + 1
+            leaving = self._leaving[0][0] if self._leaving else time_us + 1
+            wake = self._bridge.wake_us
+            event = min(arriving, leaving, time_us + 1 if wake is None else wake)
+            if event > time_us:
+                break
+            self._bridge.run_until(event)
+            if event == leaving:
+                _, _, data = heapq.heappop(self._leaving)
+                self._put_on_line(data, event)
+            elif event == arriving:
+                self._arrive(heapq.heappop(self._arriving)[2])
+            self._send(self._bridge.overdue())
+        self._bridge.run_until(time_us)
+
+    def _arrive(self, data: bytes) -> None:
+        decoder = self._decoder
+        frames = decoder.feed(data)
+        self.counts.damaged = decoder.damaged + decoder.oversized
+        for frame in frames:
+            self.counts.frames_received += 1
+            self._send(self._bridge.receive(frame))
+
+    def _send(self, replies: list[Frame]) -> None:
+        for frame in replies:
+            self.counts.frames_sent += 1
+            now = self.time_us
+            for chunk in self._wire.on_the_wire(encode_frame(frame), "to_host"):
+                if chunk.delay_us and not chunk.holds_line:
+                    heapq.heappush(self._leaving, self._due(now + chunk.delay_us, chunk.data))
+                else:
+                    self._put_on_line(chunk.data, now + chunk.delay_us)
+
+    def _put_on_line(self, data: bytes, at_us: int) -> None:
+        self._outbox.append(self._due(self._out_line.carry(len(data), at_us), data))
+
+    def _due(self, time_us: int, data: bytes) -> _Due:
+        self._order += 1
+        return (time_us, self._order, data)

@@ -1,0 +1,142 @@
+"""What the bridge does with the shared memory for each request: the host routines of the source (section 6.4).
+
+Every access takes board time. A bridge that sees the controller's period keeps its accesses clear of the moment when
+the controller fetches its set points, so that none is missed for its sake; one that does not, collides with it now
+and then, as a host does that knows nothing of the period (section 6.3).
+"""
+
+from __future__ import annotations
+
+from firmware_protocol.commands import (
+    Block,
+    BlockWritten,
+    ErrorsPositionsPowers,
+    Gains,
+    GainsSet,
+    GripperSet,
+    JointReading,
+    OutputsWritten,
+    Process,
+    ReadBlock,
+    Reply,
+    ReportErrorsPositionsPowers,
+    SetGains,
+    SetGripper,
+    WriteBlock,
+    WriteOutputs,
+    WriteSetPoints,
+    joints_of,
+)
+from firmware_protocol.memory_map import JOINTS
+from mock_controller.timeline import Timeline
+
+_GAINS = ("gain_p", "gain_i", "gain_d")
+
+
+class MemoryRoutines:
+    """Accesses to the shared memory of one board."""
+
+    def __init__(self, timeline: Timeline, sees_period: bool) -> None:
+        self._timeline = timeline
+        self._board = timeline.board
+        self._map = timeline.board.memory.map
+        self._byte_us = timeline.board.parameters.timing.host_byte
+        self._sees_period = sees_period
+
+    # --- accesses
+
+    def _keep_clear(self, count: int) -> None:
+        """Waits, where an access of `count` bytes from now on would meet the controller's fetch, until it is over."""
+        if not self._sees_period:
+            return
+        period_us = self._timeline.next_period_us()
+        if self._board.time_us + count * self._byte_us > period_us:
+            self._timeline.run_until(period_us)
+
+    def _read(self, address: int, count: int = 1) -> bytes:
+        self._keep_clear(count)
+        return self._board.read(address, count)
+
+    def _write(self, address: int, data: bytes) -> None:
+        self._keep_clear(len(data))
+        self._board.write(address, data)
+
+    def _value(self, name: str, index: int = 0) -> int:
+        """A register's value, its bytes read one after the other: it may be torn."""
+        register = self._map[name]
+        low = self._read(register.low[index])[0]
+        high = self._read(register.high[index])[0] if register.high else 0
+        return register.decode(low, high)
+
+    # --- routines
+
+    def read_block(self, request: ReadBlock) -> Reply:
+        """Peek."""
+        return Block(self._read(request.address, request.count))
+
+    def write_block(self, request: WriteBlock) -> Reply:
+        """Poke."""
+        self._write(request.address, request.data)
+        return BlockWritten()
+
+    def touches_set_points(self, request: WriteBlock) -> bool:
+        """Whether a poke reaches a set point."""
+        touched = range(request.address, request.address + len(request.data))
+        return any(address in touched for address in self._map["set_point"].addresses)
+
+    def write_set_points(self, request: WriteSetPoints) -> None:
+        """Set points of some joints, in one access."""
+        self._keep_clear(2 * len(request.postures))
+        self._board.write_set_points(dict(request.postures))
+
+    def freeze(self) -> tuple[int, ...]:
+        """Set points := measured posture; the six postures."""
+        self._keep_clear(2 * JOINTS)
+        return self._board.freeze()
+
+    def gains(self) -> Reply:
+        """PID gains of all joints."""
+        return Gains(
+            tuple(
+                (self._value("gain_p", index), self._value("gain_i", index), self._value("gain_d", index))
+                for index in range(JOINTS)
+            )
+        )
+
+    def set_gains(self, request: SetGains) -> Reply:
+        """PID gains of one joint, byte by byte."""
+        for name, value in zip(_GAINS, (request.p, request.i, request.d), strict=True):
+            self._write(self._map[name].low[request.joint - 1], bytes((value,)))
+        return GainsSet()
+
+    def errors_positions_powers(self, request: ReportErrorsPositionsPowers) -> Reply:
+        """What the memory holds of some joints, byte by byte."""
+        return ErrorsPositionsPowers(
+            tuple(
+                (
+                    joint,
+                    JointReading(
+                        self._value("set_point", joint - 1),
+                        self._value("position", joint - 1),
+                        self._value("error", joint - 1),
+                        self._value("power", joint - 1),
+                    ),
+                )
+                for joint in joints_of(request.mask)
+            )
+        )
+
+    def read_process(self) -> Reply:
+        """Process inputs, outputs and gripper."""
+        return Process(self._value("process_inputs"), self._value("process_outputs"), self._value("gripper"))
+
+    def write_outputs(self, request: WriteOutputs) -> Reply:
+        """Outputs in the mask; the others keep what the memory holds."""
+        kept = self._value("process_outputs") & ~request.mask
+        self._write(self._map["process_outputs"].low[0], bytes((kept | request.values & request.mask,)))
+        return OutputsWritten()
+
+    def set_gripper(self, request: SetGripper) -> Reply:
+        """Opens or closes."""
+        self._write(self._map["gripper"].low[0], bytes((request.closed,)))
+        return GripperSet()

@@ -1,0 +1,44 @@
+"""When a stop came, was in the memory, and was used: the figures that stopping is judged by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mock_controller.board.snapshot import SnapshotRing
+
+
+@dataclass
+class StopRecord:
+    """Moments of the latest stop, in board time (µs); None for what has not happened."""
+
+    count: int = 0
+    received_us: int | None = None
+    """The whole request had arrived."""
+    frozen_us: int | None = None
+    """The last byte of the frozen set points was in the memory."""
+    frozen_tick: int | None = None
+    """The last period that had begun then."""
+    first_used_us: int | None = None
+    """The first period began that took the frozen set points."""
+    first_used_tick: int | None = None
+
+    @property
+    def unused(self) -> bool:
+        """Whether a stop waits for a period that takes its set points."""
+        return self.frozen_us is not None and self.first_used_us is None
+
+    def note(self, received_us: int, frozen_us: int, tick: int) -> None:
+        """A stop was carried out."""
+        self.count += 1
+        self.received_us, self.frozen_us, self.frozen_tick = received_us, frozen_us, tick
+        self.first_used_us = self.first_used_tick = None
+
+    def look(self, snapshots: SnapshotRing) -> None:
+        """Looks for the first complete period that took the frozen set points."""
+        if self.frozen_us is None or self.frozen_tick is None or self.first_used_us is not None:
+            return
+        candidate = snapshots.oldest_after(self.frozen_tick)
+        while candidate is not None and (candidate.set_point_missed or candidate.time_us < self.frozen_us):
+            candidate = snapshots.oldest_after(candidate.tick)
+        if candidate is not None:
+            self.first_used_us, self.first_used_tick = candidate.time_us, candidate.tick

@@ -1,0 +1,183 @@
+"""The control port's vocabulary: what a test, a benchmark or a person may ask of the mock behind the host's back.
+
+One JSON object a line in, one a line out: `{"do": "counts"}` → `{"ok": true, …}`; what cannot be done is answered by
+`{"ok": false, "error": "…"}` and changes nothing.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from mock_controller.board.board import BoardError
+from mock_controller.device import Device
+from mock_controller.faults.fault import FaultError
+from mock_controller.faults.registry import describe
+
+Answer = dict[str, Any]
+
+
+class ControlError(ValueError):
+    """A command that cannot be understood."""
+
+
+class Process(Protocol):
+    """What the control port can do to the process and its line."""
+
+    def disconnect(self, seconds: float | None) -> None:
+        """Cuts the line; it comes back after `seconds` of the clock, or not by itself."""
+        ...
+
+    def reconnect(self) -> None:
+        """The line is back now."""
+        ...
+
+    def kill(self) -> None:
+        """The process ends at once, without a word."""
+        ...
+
+    def clock(self) -> Answer:
+        """How board time and the host's clock go together."""
+        ...
+
+    def lost_bytes(self) -> int:
+        """Bytes that the host never read."""
+        ...
+
+
+class Control:
+    """Carries out commands on one device."""
+
+    def __init__(self, device: Device, process: Process) -> None:
+        self._device = device
+        self._process = process
+        self._commands: dict[str, Callable[[Answer], Answer]] = {
+            "help": self._help,
+            "state": self._state,
+            "counts": self._counts,
+            "fault_on": self._fault_on,
+            "fault_off": self._fault_off,
+            "fault_list": self._fault_list,
+            "modifications": self._modifications,
+            "brown_out": self._brown_out,
+            "inputs": self._inputs,
+            "disconnect": self._disconnect,
+            "reconnect": self._reconnect,
+            "kill": self._kill,
+        }
+
+    def execute(self, line: bytes) -> bytes:
+        """The answer to one line, newline included."""
+        try:
+            request = json.loads(line)
+            answer = {"ok": True, **self._command(request)(request)}
+        except (ControlError, FaultError, BoardError) as error:
+            answer = {"ok": False, "error": str(error)}
+        except (ValueError, RecursionError):
+            answer = {"ok": False, "error": "not a line of JSON"}
+        return json.dumps(answer).encode() + b"\n"
+
+    def _command(self, request: object) -> Callable[[Answer], Answer]:
+        name = request.get("do") if isinstance(request, dict) else None
+        if not isinstance(name, str) or name not in self._commands:
+            raise ControlError(f'write {{"do": COMMAND}} with one of {", ".join(self._commands)}')
+        return self._commands[name]
+
+    # --- commands
+
+    def _help(self, _: Answer) -> Answer:
+        """What commands there are."""
+        return {"commands": {name: (command.__doc__ or "").strip() for name, command in self._commands.items()}}
+
+    def _state(self, _: Answer) -> Answer:
+        """Board, set points, gains, the latest stop, the arm, the clock."""
+        board = self._device.board
+        memory = board.memory
+        columns = [memory.values(name) for name in ("gain_p", "gain_i", "gain_d")]
+        return {
+            "time_us": board.time_us,
+            "tick": board.tick,
+            "powered": board.powered,
+            "boots": board.counters.boots,
+            "frozen": board.frozen,
+            "stop": dataclasses.asdict(self._device.bridge.stops),
+            "set_points": memory.values("set_point"),
+            "gains": [list(gains) for gains in zip(*columns, strict=True)],
+            "missed": board.counters.set_points_missed,
+            "angles_rad": board.plant.joint_angles,
+            "motor_volts": list(board.plant.motor_volts),
+            "stalled_joints": sorted(board.plant.stalled_joints),
+            "process_outputs": board.process_outputs,
+            "gripper_closed": board.gripper_closed,
+            "clock": self._process.clock(),
+        }
+
+    def _counts(self, _: Answer) -> Answer:
+        """Injected faults by name and direction, and what bridge and board have counted."""
+        bridge, link = self._device.bridge, self._device.link
+        return {
+            "faults": self._device.faults.counts(),
+            "bridge": {
+                **dataclasses.asdict(link.counts),
+                "answered": dict(bridge.answered),
+                "refused": dict(bridge.refused),
+                "lost_bytes": self._process.lost_bytes(),
+            },
+            "board": dataclasses.asdict(self._device.board.counters),
+        }
+
+    def _fault_on(self, request: Answer) -> Answer:
+        """Switches a fault on: "fault": "NAME:PARAMETER=VALUE,…"."""
+        entry = self._device.faults.switch_on(_word(request, "fault"))
+        return {"label": entry.label, **describe(entry.fault)}
+
+    def _fault_off(self, request: Answer) -> Answer:
+        """Switches off: "fault": a label, or a name for all faults of that name."""
+        return {"ended": self._device.faults.switch_off(_word(request, "fault"))}
+
+    def _fault_list(self, _: Answer) -> Answer:
+        """Faults that are switched on."""
+        return {"faults": self._device.faults.listing()}
+
+    def _modifications(self, _: Answer) -> Answer:
+        """Hidden physical effects that this mock was started with."""
+        return {"modifications": list(self._device.modifications)}
+
+    def _brown_out(self, _: Answer) -> Answer:
+        """The board's supply fails for a moment."""
+        return self._fault_on({"fault": "brown_out"})
+
+    def _inputs(self, request: Answer) -> Answer:
+        """Puts bits on the process inputs: "bits": 0 to 255."""
+        bits = request.get("bits")
+        if isinstance(bits, bool) or not isinstance(bits, int):
+            raise ControlError('"bits": a whole number from 0 to 255 is needed')
+        self._device.board.set_process_inputs(bits)
+        return {"bits": bits}
+
+    def _disconnect(self, request: Answer) -> Answer:
+        """Cuts the line: "seconds" of the clock until it is back (without: until reconnect)."""
+        seconds = request.get("seconds")
+        if seconds is not None and (isinstance(seconds, bool) or not isinstance(seconds, int | float) or seconds < 0):
+            raise ControlError('"seconds": a number from 0 on, or nothing, is needed')
+        self._process.disconnect(seconds)
+        return {"seconds": seconds}
+
+    def _reconnect(self, _: Answer) -> Answer:
+        """The line is back now."""
+        self._process.reconnect()
+        return {}
+
+    def _kill(self, _: Answer) -> Answer:
+        """The process ends at once, without an answer."""
+        self._process.kill()
+        return {}
+
+
+def _word(request: Answer, key: str) -> str:
+    value = request.get(key)
+    if not isinstance(value, str):
+        raise ControlError(f'"{key}": a word is needed')
+    return value

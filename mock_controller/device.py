@@ -1,0 +1,100 @@
+"""One mock put together: arm, board, faults, bridge and link."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from firmware_protocol.memory_map import MemoryMap, default_memory_map, parse_memory_map
+from mock_controller.board.board import Board
+from mock_controller.board.parameters import BoardParameters, default_board, parse_board
+from mock_controller.bridge.bridge import Bridge
+from mock_controller.bridge.link import Link
+from mock_controller.faults.fault_set import FaultSet
+from mock_controller.faulty_board import FaultyBoard
+from mock_controller.modifications import ModificationError, build_modifications
+from mock_controller.options import Options, OptionsError
+from mock_controller.plant import Plant, PlantParameters, default_plant, parse_plant
+from mock_controller.timeline import Timeline
+
+
+@dataclass(frozen=True)
+class Device:
+    """The parts of one mock."""
+
+    board: Board
+    faults: FaultSet
+    bridge: Bridge
+    link: Link
+    modifications: tuple[str, ...]
+
+
+def build_device(options: Options, disconnect: Callable[[float], None]) -> Device:
+    """Arm, board and bridge as the options say, at board time 0, with the faults switched on.
+
+    `disconnect` cuts the line for so many seconds. Raises ValueError with one clear line for what cannot be.
+    """
+    parameters = _board_parameters(options)
+    modifications = build_modifications(_modification(text) for text in options.modify)
+    plant_parameters = _plant_parameters(options)
+    if options.start is None:
+        plant = Plant(plant_parameters, modifications)
+    else:
+        pairs = zip(parameters.calibrations, options.start, strict=True)
+        plant = Plant(plant_parameters, modifications, [scale.posture_to_rad(posture) for scale, posture in pairs])
+    board = Board(parameters, _memory_map(options), plant, options.seed, modifications)
+    faults = FaultSet(FaultyBoard(board, disconnect), options.seed)
+    bridge = Bridge(Timeline(board, faults), sees_period=options.sample, lock_step=options.lock_step)
+    link = Link(bridge, faults, options.baud)
+    for text in options.fault:
+        faults.switch_on(text)
+    return Device(board, faults, bridge, link, options.modify)
+
+
+def _memory_map(options: Options) -> MemoryMap:
+    path = options.memory_map
+    return default_memory_map() if path is None else parse_memory_map(_text(path, "memory-map"), str(path))
+
+
+def _plant_parameters(options: Options) -> PlantParameters:
+    path = options.plant
+    return default_plant() if path is None else parse_plant(_text(path, "plant"), str(path))[0]
+
+
+def _board_parameters(options: Options) -> BoardParameters:
+    path = options.board
+    parameters = default_board() if path is None else parse_board(_text(path, "board"), str(path))[0]
+    if options.gains is not None:
+        parameters = replace(parameters, default_gains=(options.gains,) * len(parameters.default_gains))
+    return parameters
+
+
+def _text(path: Path, option: str) -> str:
+    try:
+        return path.read_text("utf-8")
+    except OSError as error:
+        raise OptionsError(f"{option}: {path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise OptionsError(f"{option}: {path}: not a text file in UTF-8") from None
+
+
+def _modification(text: str) -> tuple[str, dict[str, object]]:
+    name, _, rest = text.partition(":")
+    values: dict[str, object] = {}
+    for item in filter(None, (part.strip() for part in rest.split(","))):
+        key, equals, value = (part.strip() for part in item.partition("="))
+        if not equals:
+            raise ModificationError(f"modification {name}: {item!r}: write parameter=value")
+        values[key] = _number(value)
+    return name.strip(), values
+
+
+def _number(text: str) -> Any:
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text

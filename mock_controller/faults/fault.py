@@ -1,0 +1,131 @@
+"""What a fault is: a name, checked parameters, a span of board time, and where it acts."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import random
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal, Protocol
+
+Direction = Literal["to_controller", "to_host"]
+
+
+class FaultError(ValueError):
+    """A fault that does not exist, or a parameter it cannot have."""
+
+
+def parameter(meaning: str, default: Any, low: float = -math.inf, high: float = math.inf) -> Any:
+    """A dataclass field: a number in [low, high] and what it means (unit included)."""
+    return field(default=default, metadata={"meaning": meaning, "low": low, "high": high})
+
+
+def choice(meaning: str, default: str, allowed: Iterable[str]) -> Any:
+    """A dataclass field: one of several words."""
+    return field(default=default, metadata={"meaning": meaning, "allowed": tuple(allowed)})
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Bytes on their way, `delay_us` later than they would have come.
+
+    Where `holds_line` is set, everything behind waits for them; else later bytes may overtake them.
+    """
+
+    data: bytes
+    delay_us: int = 0
+    holds_line: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """Base of all faults. `start` and `duration` are seconds of board time from the moment it is switched on."""
+
+    name: ClassVar[str]
+    start: float = parameter("s of board time until it sets in", 0.0, 0.0, 1e6)
+    duration: float = parameter("s of board time that it lasts", math.inf, 0.0)
+    seed: int = parameter("of its own random numbers; by default made from the mock's seed", -1, -1, 2**63)
+
+    @classmethod
+    def summary(cls) -> str:
+        """One line: the first of its description."""
+        return (cls.__doc__ or "").strip().splitlines()[0]
+
+
+@dataclass(frozen=True, kw_only=True)
+class WireFault(Fault):
+    """A fault of the line: strikes a frame with probability `rate`, in one direction or both."""
+
+    rate: float = parameter("probability a frame", 1.0, 0.0, 1.0)
+    direction: str = choice("which frames", "both", ("both", "to_controller", "to_host"))
+
+    def strike(self, data: bytes, dice: random.Random) -> list[Chunk]:
+        """What becomes of one encoded frame, delimiters included. Time does not concern it."""
+        raise NotImplementedError
+
+
+class FaultyParts(Protocol):
+    """What faults other than those of the line may do to board, arm and connection."""
+
+    @property
+    def time_us(self) -> int:
+        """Board time."""
+        ...
+
+    def hold_memory_at_fetch(self) -> None:
+        """The host's side keeps the shared memory busy while the controller wants it next."""
+        ...
+
+    def brown_out(self) -> None:
+        """The board's supply fails for a moment and it starts again; the arm stays where it is."""
+        ...
+
+    def stall_joint(self, joint: int) -> None:
+        """A joint jams where it is."""
+        ...
+
+    def free_joint(self, joint: int) -> None:
+        """A jammed joint moves again."""
+        ...
+
+    def stick_potentiometer(self, joint: int) -> None:
+        """A joint's reading stays what it is."""
+        ...
+
+    def crackle_potentiometer(self, joint: int, counts: float) -> None:
+        """A joint's reading gets noise of so many ADC counts rms."""
+        ...
+
+    def repair_potentiometer(self, joint: int) -> None:
+        """A joint's reading is right again."""
+        ...
+
+    def disconnect(self, seconds: float) -> None:
+        """The line is cut, and back after `seconds` of the host's clock."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartFault(Fault):
+    """A fault of board, arm or connection: begins, perhaps acts in every period, ends."""
+
+    def begin(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:
+        """Sets in."""
+
+    def each_period(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:
+        """Called once before every control period while it lasts."""
+
+    def end(self, parts: FaultyParts) -> None:
+        """Is over."""
+
+
+class Count(Protocol):
+    """Counts one injection."""
+
+    def __call__(self) -> None: ...
+
+
+def fields_of(kind: type[Fault]) -> dict[str, dataclasses.Field[Any]]:
+    """The parameters of a fault class by name."""
+    return {item.name: item for item in dataclasses.fields(kind)}

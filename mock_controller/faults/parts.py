@@ -1,0 +1,84 @@
+"""Faults of the shared memory, the sensors, the arm and the supply."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+from typing import ClassVar
+
+from mock_controller.faults.fault import Count, FaultyParts, PartFault, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class BusyMemory(PartFault):
+    """The shared memory is busy when the controller wants it: set points are missed in that period."""
+
+    name: ClassVar[str] = "busy_memory"
+    rate: float = parameter("probability a control period", 1.0, 0.0, 1.0)
+
+    def each_period(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:
+        if dice.random() < self.rate:
+            count()
+            parts.hold_memory_at_fetch()
+
+
+@dataclass(frozen=True, kw_only=True)
+class StuckPotentiometer(PartFault):
+    """A joint's potentiometer keeps showing what it showed. Counted once a period."""
+
+    name: ClassVar[str] = "stuck_potentiometer"
+    joint: int = parameter("1 to 6", 1, 1, 6)
+
+    def begin(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
+        parts.stick_potentiometer(self.joint)
+
+    def each_period(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
+        count()
+
+    def end(self, parts: FaultyParts) -> None:
+        parts.repair_potentiometer(self.joint)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoisyPotentiometer(PartFault):
+    """A worn potentiometer: a joint's readings scatter. Counted once a period."""
+
+    name: ClassVar[str] = "noisy_potentiometer"
+    joint: int = parameter("1 to 6", 1, 1, 6)
+    counts: float = parameter("ADC counts rms", 20.0, 0.0, 4095.0)
+
+    def begin(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
+        parts.crackle_potentiometer(self.joint, self.counts)
+
+    def each_period(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
+        count()
+
+    def end(self, parts: FaultyParts) -> None:
+        parts.repair_potentiometer(self.joint)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StalledJoint(PartFault):
+    """A joint jams where it is."""
+
+    name: ClassVar[str] = "stalled_joint"
+    joint: int = parameter("1 to 6", 1, 1, 6)
+
+    def begin(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
+        count()
+        parts.stall_joint(self.joint)
+
+    def end(self, parts: FaultyParts) -> None:
+        parts.free_joint(self.joint)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BrownOut(PartFault):
+    """The board's supply fails for a moment: it starts again with its defaults, the arm where it was."""
+
+    name: ClassVar[str] = "brown_out"
+    duration: float = parameter("does not matter: it happens once", 0.0, 0.0)
+
+    def begin(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
+        count()
+        parts.brown_out()

@@ -1,0 +1,89 @@
+"""Lock-step: board time moves only when the host asks for it, and runs repeat to the bit.
+
+A *turn* belongs to the host. It begins when a whole piece, ended by its delimiter, has come in, and every piece is
+one turn, whether it is a frame, damaged, or lost to a fault: so it does not matter how the operating system cut the
+host's bytes, and an unfinished piece is simply waited for. In its turn the bridge
+
+1. carries out the piece, which lets board time pass: memory accesses, the line, a `Sample` up to the next period,
+   an `Advance`;
+2. waits until nothing is owed: no request waits for its moment and all that has been sent has left the line;
+3. if it has still sent nothing, and something is delayed by a fault, waits for that, for at most
+   `HOST_PATIENCE_US` of board time: that is how long the host is taken to wait for a reply in vain;
+4. ends the turn with IDLE_MARK. One mark for each piece, always: a host that counts knows what has been lost.
+
+What is delayed for longer comes in a later turn.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from firmware_protocol.dialect import IDLE_MARK
+from mock_controller.bridge.link import Link
+from mock_controller.bridge.pieces import PieceSplitter
+
+HOST_PATIENCE_US = 20_000
+"""How long the host is taken to wait for a reply that may still come: one control period."""
+SLICE_US = 500_000
+"""Board time after which long work is interrupted to look after the control port."""
+
+
+class LockStepPace:
+    """Drives one link, turn by turn."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._splitter = PieceSplitter()
+        self._pieces: deque[bytes] = deque()
+        self._in_turn = False
+        self._has_sent = False
+        self._patience_ends_us = 0
+
+    def hang_up(self) -> None:
+        """The host is gone."""
+        self._splitter.reset()
+        self._pieces.clear()
+        self._in_turn = False
+        self._link.hang_up()
+
+    def receive(self, data: bytes) -> None:
+        """Takes what the host has sent."""
+        self._pieces.extend(self._splitter.feed(data))
+
+    def timeout_s(self) -> float | None:
+        """How long there is nothing to do: not at all, or until the host speaks."""
+        return 0.0 if self._in_turn or self._pieces else None
+
+    def work(self) -> bytes:
+        """Does what there is to do, for at most SLICE_US of board time or so; the bytes for the host."""
+        output = bytearray()
+        slice_ends = self._link.time_us + SLICE_US
+        while self._link.time_us < slice_ends and (self._in_turn or self._pieces):
+            if not self._in_turn:
+                self._begin_turn(self._pieces.popleft())
+            elif self._go_on(output, slice_ends):
+                output += IDLE_MARK
+                self._in_turn = False
+        return bytes(output)
+
+    def _begin_turn(self, piece: bytes) -> None:
+        self._link.receive_piece(piece)
+        self._in_turn = piece.endswith(b"\0")
+        self._has_sent = False
+        self._patience_ends_us = self._link.time_us + HOST_PATIENCE_US
+
+    def _go_on(self, output: bytearray, slice_ends: int) -> bool:
+        """One step of a turn; whether that was the last."""
+        link = self._link
+        if link.owes:
+            link.run_until(min(link.next_event_us() or 0, slice_ends))
+        elif link.delayed and not self._has_sent and link.time_us < self._patience_ends_us:
+            link.run_until(min(link.next_event_us() or 0, self._patience_ends_us, slice_ends))
+        else:
+            return True
+        sent = link.take_output()
+        output += sent
+        self._has_sent = self._has_sent or bool(sent)
+        if link.owes:
+            self._patience_ends_us = max(self._patience_ends_us, link.time_us + HOST_PATIENCE_US)
+        return False

@@ -1,0 +1,154 @@
+"""What the mock can be told when it is started: command line, or the same words in a TOML file."""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from firmware_protocol.memory_map import JOINTS
+from firmware_protocol.units import GAIN_MAX, POSTURE_UNITS
+
+Posture = Annotated[int, Field(ge=0, lt=POSTURE_UNITS)]
+Gain = Annotated[int, Field(ge=0, le=GAIN_MAX)]
+
+
+class OptionsError(ValueError):
+    """An option that cannot be; the message is one line that says which and what is allowed."""
+
+
+class Options(BaseModel):
+    """Everything about one mock that can be chosen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    pty: bool = False
+    link: Path | None = None
+    tcp: str | None = None
+    control: str = "127.0.0.1:0"
+    owned: bool = False
+    lock_step: bool = False
+    sample: bool = True
+    baud: Annotated[int, Field(ge=300, le=4_000_000)] | None = None
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    start: Annotated[tuple[Posture, ...], Field(min_length=JOINTS, max_length=JOINTS)] | None = None
+    gains: tuple[Gain, Gain, Gain] | None = None
+    memory_map: Path | None = None
+    plant: Path | None = None
+    board: Path | None = None
+    modify: tuple[str, ...] = ()
+    fault: tuple[str, ...] = ()
+
+
+def read_options(arguments: list[str]) -> Options:
+    """Options from command-line arguments and the file that `--config` names; arguments win, lists are joined.
+
+    Raises OptionsError; `--help` prints and leaves (SystemExit).
+    """
+    given = vars(_parser().parse_args(arguments))
+    if given.pop("help_faults"):
+        from mock_controller.faults.registry import table
+
+        print(table())
+        raise SystemExit(0)
+    config: Path | None = given.pop("config")
+    chosen = {} if config is None else _read_file(config)
+    for key, value in given.items():
+        if value is None:
+            continue
+        if key in ("modify", "fault"):
+            value = [*chosen.get(key, ()), *value]  # noqa: PLW2901
+        chosen[key] = value
+    try:
+        options = Options.model_validate(chosen)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = " ".join(str(part) for part in first["loc"]).replace("_", "-")
+        raise OptionsError(f"{where}: {first['msg'].lower()}, is {_shown(first['input'])}") from None
+    if options.pty and options.tcp:
+        raise OptionsError("pty and tcp: give one of them")
+    if not (options.pty or options.tcp):
+        raise OptionsError("nowhere to be reached: give --pty or --tcp HOST:PORT")
+    if options.link is not None and not options.pty:
+        raise OptionsError("link: a name for the pseudo-terminal needs --pty")
+    return options
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _read_file(path: Path) -> dict[str, Any]:
+    try:
+        return {key.replace("-", "_"): value for key, value in tomllib.loads(path.read_text("utf-8")).items()}
+    except OSError as error:
+        raise OptionsError(f"config: {path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise OptionsError(f"config: {path}: not TOML: {error}") from None
+
+
+def _numbers(text: str) -> list[str]:
+    return [part.strip() for part in text.split(",")]
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> Any:
+        raise OptionsError(message)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="python -m mock_controller",
+        description="An MA2000 arm with its motor controller, reached through a pseudo-terminal or a TCP port. "
+        "Prints one JSON line with its addresses when it is ready, and runs until it is interrupted.",
+        argument_default=None,
+        allow_abbrev=False,
+    )
+    where = parser.add_argument_group("where it is reached (one connection at a time)")
+    where.add_argument("--pty", action="store_true", default=None, help="a pseudo-terminal in raw mode")
+    where.add_argument("--link", type=Path, metavar="PATH", help="symbolic link to the pseudo-terminal")
+    where.add_argument("--tcp", metavar="HOST:PORT", help="a TCP port; 127.0.0.1:0 takes any free one")
+    where.add_argument(
+        "--control",
+        metavar="ADDRESS",
+        help="control port: HOST:PORT or unix:PATH (default 127.0.0.1:0), none for no control port",
+    )
+    where.add_argument("--owned", action="store_true", default=None, help="end when standard input ends")
+
+    time = parser.add_argument_group("time and line")
+    time.add_argument(
+        "--lock-step",
+        action="store_true",
+        default=None,
+        help="board time moves only when the host asks; runs repeat to the bit",
+    )
+    time.add_argument("--baud", type=int, metavar="N", help="bytes take their time on a line of N baud (off)")
+    time.add_argument(
+        "--no-sample",
+        dest="sample",
+        action="store_false",
+        default=None,
+        help="a bridge that does not see the controller's period: no consistent snapshots",
+    )
+
+    machine = parser.add_argument_group("the machine")
+    machine.add_argument("--seed", type=int, metavar="N", help="of everything random (0)")
+    machine.add_argument("--start", type=_numbers, metavar="P1,…,P6", help="start posture, six posture units 0-999")
+    machine.add_argument("--gains", type=_numbers, metavar="P,I,D", help="default gains of all joints, 0-20 (2,0,0)")
+    machine.add_argument("--memory-map", type=Path, metavar="FILE", help="another memory map (TOML)")
+    machine.add_argument("--plant", type=Path, metavar="FILE", help="another arm (TOML)")
+    machine.add_argument("--board", type=Path, metavar="FILE", help="another motor controller (TOML)")
+    machine.add_argument(
+        "--modify", action="append", metavar="NAME:KEY=VALUE,…", help="a hidden physical effect; may be repeated"
+    )
+
+    parser.add_argument("--fault", action="append", metavar="NAME:KEY=VALUE,…", help="a fault; may be repeated")
+    parser.add_argument("--help-faults", action="store_true", help="list faults and their parameters, and leave")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="the same options in a TOML file")
+    return parser

@@ -1,0 +1,80 @@
+"""Real time: the board's time follows the clock, and never drifts from it.
+
+The board is moved on at the very moments when something happens: a period begins, the drive changes, a snapshot is
+complete, bytes have left the line, the host has spoken. Between two of them lies little to simulate (some 0.5 ms of
+work at most). A process that was not given the processor in time catches up event by event, listening in between, and
+counts what was late.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mock_controller.board.board import Board
+from mock_controller.bridge.link import Link
+
+EVENTS_AT_ONCE = 6
+"""Most of the controller's events (three a period) that are simulated before the host is listened to again."""
+LATE_US = 2_000
+"""A controller's event that is simulated so much after its moment counts as late."""
+
+
+@dataclass
+class Lateness:
+    """How far the simulation fell behind the clock."""
+
+    late_ticks: int = 0
+    """Periods that began in the board more than LATE_US after their moment."""
+    worst_us: int = 0
+
+
+class RealTimePace:
+    """Drives one link by a clock (µs, monotonic); board time at construction is the clock's present."""
+
+    def __init__(self, link: Link, board: Board, clock_us: Callable[[], int]) -> None:
+        self._link = link
+        self._board = board
+        self._clock_us = clock_us
+        self.zero_us = clock_us() - board.time_us
+        """Reading of the clock at board time 0."""
+        self.lateness = Lateness()
+
+    def hang_up(self) -> None:
+        """The host is gone."""
+        self._link.hang_up()
+
+    def receive(self, data: bytes) -> None:
+        """Takes what the host has sent: it has arrived now, or, if the board is behind, as early as can be."""
+        self._move_on()
+        self._link.receive(data)
+
+    def work(self) -> bytes:
+        """Does what is due; the bytes for the host."""
+        self._move_on()
+        return self._link.take_output()
+
+    def timeout_s(self) -> float:
+        """How long nothing is due."""
+        due = self._board.next_event_us
+        event = self._link.next_event_us()
+        if event is not None:
+            due = min(due, event)
+        return max(due - self._now_us(), 0) * 1e-6
+
+    def _now_us(self) -> int:
+        return self._clock_us() - self.zero_us
+
+    def _move_on(self) -> None:
+        """Moves the board on to the present, or by a few events if it is far behind."""
+        for _ in range(EVENTS_AT_ONCE):
+            due, now = self._board.next_event_us, self._now_us()
+            if due > now:
+                self._link.run_until(now)
+                return
+            tick = self._board.tick
+            self._link.run_until(due)
+            if self._board.tick != tick:
+                late = self._now_us() - due
+                self.lateness.worst_us = max(self.lateness.worst_us, late)
+                self.lateness.late_ticks += late > LATE_US

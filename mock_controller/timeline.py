@@ -1,0 +1,49 @@
+"""Board and faults on one time axis: time passes in the board, and faults set in and end at their moments."""
+
+from __future__ import annotations
+
+from mock_controller.board.board import Board
+from mock_controller.faults.fault_set import FaultSet
+
+_BEFORE_PERIOD_US = 1
+"""How long before a period begins its faults are prepared."""
+
+
+class Timeline:
+    """The board's time, with faults on it."""
+
+    def __init__(self, board: Board, faults: FaultSet) -> None:
+        self.board = board
+        self.faults = faults
+        self._period_us = board.parameters.timing.period
+        self._prepared_us = -1
+
+    @property
+    def time_us(self) -> int:
+        """Board time."""
+        return self.board.time_us
+
+    def next_period_us(self) -> int:
+        """When the controller's next period begins, as far as the last one tells; else when it next does anything."""
+        newest = self.board.snapshots.newest()
+        if newest is None:
+            return self.board.next_event_us
+        past = self.board.time_us - newest.time_us
+        return newest.time_us + (past // self._period_us + 1) * self._period_us
+
+    def run_until(self, time_us: int) -> None:
+        """Lets time pass up to `time_us`; a time already past changes nothing."""
+        while self.faults.active:
+            prepare_us = self.next_period_us() - _BEFORE_PERIOD_US
+            if prepare_us <= self._prepared_us:
+                prepare_us = self._prepared_us + self._period_us
+            change_us = self.faults.next_change_us()
+            stop_us = prepare_us if change_us is None else min(prepare_us, change_us)
+            if stop_us > time_us:
+                break
+            self.board.run_until(stop_us)
+            self.faults.make_changes()
+            if stop_us == prepare_us:
+                self._prepared_us = prepare_us
+                self.faults.each_period()
+        self.board.run_until(time_us)
