@@ -1,0 +1,23 @@
+"""The controller as the host uses it: set points out, whole snapshots in, stop at any moment."""
+
+from daq.driver.clock import Clock, LockStepClock, RealClock
+from daq.driver.controller import EVERY_JOINT, Controller, ControllerStatus, Identity
+from daq.driver.errors import ControllerRestartedError, GainsNotTakenError, NoSampleError, ProtocolVersionError
+from daq.driver.snapshot import BoardSnapshot
+from daq.driver.stop import StopConfirmation
+
+__all__ = [
+    "EVERY_JOINT",
+    "BoardSnapshot",
+    "Clock",
+    "Controller",
+    "ControllerRestartedError",
+    "ControllerStatus",
+    "GainsNotTakenError",
+    "Identity",
+    "LockStepClock",
+    "NoSampleError",
+    "ProtocolVersionError",
+    "RealClock",
+    "StopConfirmation",
+]

@@ -1,0 +1,246 @@
+"""The motor controller as the host uses it: what the source's host routines do, over any link.
+
+DRIVESA    one set point for the current motion            `set_points({joint: posture})`
+SAMOVE     set points of a step, all joints together       `set_points`, or `next_snapshot(set_points=…)`
+CONTPATH   plays a stored path of ministeps                `next_snapshot(set_points=…)` once a period
+LEADSA     current values while the arm is led by hand     `next_snapshot()`
+REPORTG    reads the gains                                 `gains()`
+SETG       writes the gains of a motion                    `set_gains(joint, p, i, d)`
+REPORTEPP  errors, positions, powers                       `errors_positions_powers()`, `next_snapshot()`
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Self
+
+from daq.driver.clock import Clock, LockStepClock, RealClock
+from daq.driver.double_read import DoubleReader
+from daq.driver.errors import GainsNotTakenError, ProtocolVersionError
+from daq.driver.sampling import Deliveries, MemorySampling, RingSampling, Sampling
+from daq.driver.set_point_watch import SetPointWatch
+from daq.driver.snapshot import BoardSnapshot
+from daq.driver.stop import StopConfirmation
+from daq.link import Link, LinkCounters, LinkError, LinkState, RequestRefusedError
+from daq.transport import TransportError
+from firmware_protocol.commands import (
+    ALL_JOINTS,
+    PROTOCOL_VERSION,
+    Capability,
+    ErrorsPositionsPowers,
+    Gains,
+    GainsSet,
+    GripperSet,
+    Hello,
+    HelloReply,
+    JointReading,
+    OutputsWritten,
+    Process,
+    ReadProcess,
+    ReadStatus,
+    Release,
+    Released,
+    ReportErrorsPositionsPowers,
+    ReportGains,
+    SetGains,
+    SetGripper,
+    SetPointsTaken,
+    Status,
+    StatusFlag,
+    WriteOutputs,
+    joints_of,
+    mask_of,
+)
+from firmware_protocol.memory_map import MemoryMap, default_memory_map
+
+EVERY_JOINT = joints_of(ALL_JOINTS)
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What a controller says about itself. `period_s` is its control period, `boots` counts its resets."""
+
+    version: int
+    capabilities: Capability
+    period_s: float
+    ring_depth: int
+    boots: int
+    restarted: bool = False
+    """It has been reset since this host last asked."""
+
+    @property
+    def simulated(self) -> bool:
+        """Whether no arm is behind it."""
+        return Capability.SIMULATED in self.capabilities
+
+
+@dataclass(frozen=True)
+class ControllerStatus:
+    """Board and link at one moment. `missed` counts the periods without new set points since the board's reset."""
+
+    tick: int
+    flags: StatusFlag
+    boots: int
+    missed: int
+    link: LinkState
+    counters: LinkCounters
+
+
+class Controller:
+    """One motor controller. Every method may raise LinkError (LinkTimeoutError, LinkLostError), RequestRefusedError.
+
+    `stop` may be called from any thread at any moment; everything else from one thread at a time.
+    """
+
+    def __init__(self, link: Link, memory_map: MemoryMap | None = None) -> None:
+        self.link = link
+        self.memory_map = memory_map or default_memory_map()
+        self._watch = SetPointWatch()
+        self.identity = self._ask_identity()
+        self.clock: Clock = LockStepClock(link, self.period_s) if link.lock_step else RealClock()
+        self._sampling = self._make_sampling()
+
+    @classmethod
+    def connect(cls, url: str, memory_map: MemoryMap | None = None) -> Self:
+        """The controller at a port URL, greeted. Raises TransportError, LinkError, ProtocolVersionError."""
+        link = Link.open(url)
+        try:
+            return cls(link, memory_map)
+        except BaseException:
+            link.close()
+            raise
+
+    @property
+    def period_s(self) -> float:
+        """Control period in s."""
+        return self.identity.period_s
+
+    @property
+    def counters(self) -> LinkCounters:
+        """Everything counted since the link was opened."""
+        return self.link.counters
+
+    def hello(self) -> Identity:
+        """Greets the controller again, after a reconnection or a restart; `restarted` tells of the latter.
+
+        Moves nothing. Raises ProtocolVersionError.
+        """
+        before = self.identity
+        self.identity = self._ask_identity(before.boots)
+        self._watch.forget()
+        if isinstance(self.clock, LockStepClock):
+            self.clock.synchronise()
+        self._sampling = self._make_sampling()
+        return self.identity
+
+    def set_points(self, postures: Mapping[int, int]) -> SetPointsTaken:
+        """Sends set points (joint → posture units 0–999), which the controller takes together.
+
+        Raises ControllerRestartedError, and RequestRefusedError when the arm has been stopped.
+        """
+        return self._sampling.write(postures)
+
+    def next_snapshot(
+        self,
+        after: int | None = None,
+        joints: Sequence[int] = EVERY_JOINT,
+        set_points: Mapping[int, int] | None = None,
+    ) -> BoardSnapshot:
+        """The oldest snapshot newer than tick `after`; None waits for the next to be made.
+
+        Passing each snapshot's tick on as the next `after` yields every period once, in order; those that are gone
+        are counted in `missing_before`. `set_points` travel with the question, in the same write. Never a torn
+        or stale reading. Raises ControllerRestartedError, NoSampleError; RequestRefusedError when the set points were
+        refused: the snapshot is still to be had.
+        """
+        return self._sampling.next(after, joints, set_points or {})
+
+    def stop(self) -> StopConfirmation:
+        """Freezes the arm at its measured posture. At once, from any thread, as often as one likes; never raises
+        for a link that fails: the confirmation says what is known."""
+        try:
+            stopped = self.link.stop()
+        except LinkError as error:
+            return StopConfirmation(sent=error.sent, acknowledged=False, problem=str(error))
+        except RequestRefusedError as error:
+            return StopConfirmation(sent=True, acknowledged=False, problem=str(error))
+        frozen = dict(zip(EVERY_JOINT, stopped.postures, strict=True))
+        self._watch.replaced(frozen, stopped.tick + 1)
+        return StopConfirmation(sent=True, acknowledged=True, tick=stopped.tick, frozen=frozen)
+
+    def release(self) -> None:
+        """Ends the freeze; the set points stay where the stop put them."""
+        self.link.request(Release(), Released)
+
+    def gains(self) -> dict[int, tuple[int, int, int]]:
+        """Joint → (P, I, D), each 0–20."""
+        return dict(zip(EVERY_JOINT, self.link.request(ReportGains(), Gains).gains, strict=True))
+
+    def set_gains(self, joint: int, p: int, i: int, d: int) -> None:
+        """Writes the gains of a joint and reads them back. Raises GainsNotTakenError, ProtocolError outside 0–20."""
+        self.link.request(SetGains(joint, p, i, d), GainsSet)
+        read = self.gains()[joint]
+        if read != (p, i, d):
+            raise GainsNotTakenError(f"joint {joint}: gains {(p, i, d)} written, {read} read back")
+
+    def errors_positions_powers(self, joints: Sequence[int] = EVERY_JOINT) -> dict[int, JointReading]:
+        """Readings as the memory holds them now. A value may be torn: to look at, never to record."""
+        reply = self.link.request(ReportErrorsPositionsPowers(mask_of(tuple(joints))), ErrorsPositionsPowers)
+        return dict(reply.joints)
+
+    def process(self) -> Process:
+        """Process inputs and outputs (bit fields) and gripper."""
+        return self.link.request(ReadProcess(), Process)
+
+    def write_outputs(self, mask: int, values: int) -> None:
+        """Process outputs in `mask` take the bits of `values`."""
+        self.link.request(WriteOutputs(mask, values), OutputsWritten)
+
+    def set_gripper(self, *, closed: bool) -> None:
+        """Closes or opens the gripper."""
+        self.link.request(SetGripper(int(closed)), GripperSet)
+
+    def status(self) -> ControllerStatus:
+        """Board and link now."""
+        reply = self.link.request(ReadStatus(), Status)
+        flags = StatusFlag(reply.status)
+        return ControllerStatus(reply.tick, flags, reply.boots, reply.missed, self.link.state, self.counters)
+
+    def close(self) -> None:
+        """Ends the connection. Sends nothing: the arm stays at its last set points."""
+        self.link.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _ask_identity(self, boots_before: int | None = None) -> Identity:
+        reply = self.link.request(Hello(), HelloReply)
+        if reply.version != PROTOCOL_VERSION:
+            raise ProtocolVersionError(
+                f"{self.link.url}: the controller speaks protocol {reply.version}, this software {PROTOCOL_VERSION}: "
+                "update the older one"
+            )
+        identity = Identity(
+            reply.version,
+            Capability(reply.capabilities),
+            reply.period_us * 1e-6,
+            reply.ring_depth,
+            reply.boots,
+            restarted=boots_before is not None and reply.boots != boots_before,
+        )
+        if Capability.LOCK_STEP in identity.capabilities and not self.link.lock_step:
+            raise TransportError(f"{self.link.url}: this controller runs in lock-step: add ?lock_step=1 to the URL")
+        if identity.restarted:
+            self.link.tally.count("restarts")
+        self.link.set_period(identity.period_s)
+        return identity
+
+    def _make_sampling(self) -> Sampling:
+        deliveries = Deliveries(self.link, self.clock, self.period_s, self._watch)
+        if Capability.SAMPLE in self.identity.capabilities:
+            return RingSampling(deliveries)
+        return MemorySampling(deliveries, DoubleReader(self.link, self.memory_map, self.clock, self.period_s))

@@ -1,0 +1,196 @@
+"""One snapshot after the other, each period once and in order: from the bridge's ring, or from the memory itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+from daq.driver.clock import Clock, LockStepClock
+from daq.driver.double_read import DoubleReader
+from daq.driver.errors import ControllerRestartedError, NoSampleError
+from daq.driver.set_point_watch import SentSetPoints, SetPointWatch
+from daq.driver.snapshot import BoardSnapshot, Consistency
+from daq.driver.tick_time import TickTime
+from daq.link import Link, LinkTimeoutError, RequestRefusedError, expect
+from firmware_protocol.commands import (
+    AFTER_NEWEST,
+    JointReading,
+    ReadStatus,
+    Reply,
+    Sample,
+    SetPointsTaken,
+    Snapshot,
+    Status,
+    StatusFlag,
+    WriteSetPoints,
+    mask_of,
+)
+
+MOST_MISSING = 10
+"""Periods in a row without a consistent reading after which the memory counts as unreadable."""
+
+
+class Sampling(Protocol):
+    """How snapshots are had from one controller."""
+
+    def write(self, postures: Mapping[int, int]) -> SetPointsTaken:
+        """Sends set points (joint → posture units), taken together."""
+        ...
+
+    def next(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
+        """The oldest snapshot newer than tick `after` (None: the next to be made), set points being sent with it."""
+        ...
+
+
+class Deliveries:
+    """What both ways of sampling share: time stamps, missed set points, restarts, and their counts."""
+
+    def __init__(self, link: Link, clock: Clock, period_s: float, watch: SetPointWatch) -> None:
+        self.link = link
+        self.clock = clock
+        self.period_s = period_s
+        self.watch = watch
+
+    def send(self, postures: Mapping[int, int]) -> tuple[SentSetPoints, WriteSetPoints]:
+        """The request for a batch of set points, noted as sent."""
+        return self.watch.sending(postures), WriteSetPoints(tuple(sorted(postures.items())))
+
+    def taken(self, batch: SentSetPoints, request: WriteSetPoints, reply: Reply, due: int | None) -> SetPointsTaken:
+        """The confirmation of a batch, which must show from period `due` on (None: as the confirmation says).
+
+        Raises RequestRefusedError and ControllerRestartedError.
+        """
+        try:
+            confirmation = expect(request, reply, SetPointsTaken)
+        except RequestRefusedError:
+            self.watch.withdrawn(batch)
+            raise
+        self.check_restart(confirmation.status)
+        self.watch.confirmed(batch, confirmation.tick + 1 if due is None else due)
+        return confirmation
+
+    def check_restart(self, status: int) -> None:
+        """Raises ControllerRestartedError when the status says that the board has been reset."""
+        if status & StatusFlag.RESTARTED:
+            self.link.tally.count("restarts")
+            self.watch.forget()
+            raise ControllerRestartedError(
+                "the controller has restarted (a dip of its supply?): its set points and gains are those of power-up; "
+                "check the arm, then connect again"
+            )
+
+    def deliver(
+        self,
+        tick: int,
+        after: int | None,
+        times: tuple[float, float],
+        joints: tuple[tuple[int, JointReading], ...],
+        flags: StatusFlag,
+        by: Consistency,
+    ) -> BoardSnapshot:
+        """A snapshot, with everything counted that it shows. `times` are host time and tick time (s)."""
+        missing = 0 if after is None else tick - after - 1
+        missed = self.watch.missed(tick, joints) or StatusFlag.SET_POINT_MISSED in flags
+        snapshot = BoardSnapshot(tick, *times, joints, flags, by, missing, missed)
+        tally = self.link.tally
+        for name, amount in (
+            ("missing_samples", missing),
+            ("missed_set_points", missed),
+            ("late", snapshot.jitter > self.period_s),
+        ):
+            if amount:
+                tally.count(name, amount)
+        return snapshot
+
+
+class RingSampling:
+    """Through SAMPLE: the bridge keeps consistent snapshots with their ticks, and waits for the next one."""
+
+    def __init__(self, deliveries: Deliveries) -> None:
+        self._deliveries = deliveries
+        self._tick_time = TickTime(deliveries.period_s)
+
+    def write(self, postures: Mapping[int, int]) -> SetPointsTaken:
+        """Set points without a sample."""
+        batch, request = self._deliveries.send(postures)
+        (reply,) = self._deliveries.link.exchange(request)
+        return self._deliveries.taken(batch, request, reply, None)
+
+    def next(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
+        """Set points and question travel in one write."""
+        question = Sample(AFTER_NEWEST if after is None else after, mask_of(tuple(joints)))
+        if not postures:
+            (answer,) = self._ask(question)
+        else:
+            batch, request = self._deliveries.send(postures)
+            confirmation, answer = self._ask(request, question)
+            self._deliveries.taken(batch, request, confirmation, None)
+        return self._received(expect(question, answer, Snapshot), after)
+
+    def _ask(self, *requests: WriteSetPoints | Sample) -> tuple[Reply, ...]:
+        link = self._deliveries.link
+        try:
+            return link.exchange(*requests)
+        except LinkTimeoutError:
+            # A board that restarted counts its ticks anew: the one that was waited for is far away.
+            self._deliveries.check_restart(link.request(ReadStatus(), Status).status)
+            raise
+
+    def _received(self, reply: Snapshot, after: int | None) -> BoardSnapshot:
+        deliveries = self._deliveries
+        deliveries.check_restart(reply.status)
+        if after is not None and reply.tick <= after:
+            raise NoSampleError(f"the controller sent tick {reply.tick}, asked for one after {after}")
+        if isinstance(deliveries.clock, LockStepClock):
+            deliveries.clock.tick_seen(reply.tick)
+        now = deliveries.clock.now()
+        times = (now, self._tick_time.arrived(reply.tick, now))
+        return deliveries.deliver(reply.tick, after, times, reply.joints, StatusFlag(reply.status), "sample")
+
+
+class MemorySampling:
+    """Without SAMPLE: the memory is read twice in every period of the host's own clock.
+
+    Tick 1 is the period of the first reading. Host and board count periods with clocks of their own: over hours one
+    of them gets ahead, and a period is then read twice or left out without anyone knowing.
+    """
+
+    def __init__(self, deliveries: Deliveries, reader: DoubleReader) -> None:
+        self._deliveries = deliveries
+        self._reader = reader
+        self._start: float | None = None
+
+    def write(self, postures: Mapping[int, int]) -> SetPointsTaken:
+        """Set points; by the host's estimate they are taken one period after they have been confirmed."""
+        batch, request = self._deliveries.send(postures)
+        (reply,) = self._deliveries.link.exchange(request)
+        return self._deliveries.taken(batch, request, reply, self._current_tick() + 2)
+
+    def next(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
+        """Sends the set points, waits for the next period of the host's clock, and reads."""
+        if postures:
+            self.write(postures)
+        deliveries = self._deliveries
+        for tick in self._ticks_to_come(after):
+            scheduled = self._time_of(tick)
+            deliveries.clock.sleep_until(scheduled)
+            joints_read = self._reader.read(joints)
+            if joints_read is not None:
+                times = (deliveries.clock.now(), scheduled)
+                return deliveries.deliver(tick, after, times, joints_read, StatusFlag(0), "double-read")
+        raise NoSampleError(f"no consistent reading of the shared memory in {MOST_MISSING} periods")
+
+    def _ticks_to_come(self, after: int | None) -> range:
+        current = self._current_tick()
+        first = current + 1 if after is None else max(after + 1, current)
+        return range(first, first + MOST_MISSING)
+
+    def _current_tick(self) -> int:
+        now = self._deliveries.clock.now()
+        if self._start is None:
+            self._start = now
+        return int((now - self._start) / self._deliveries.period_s)
+
+    def _time_of(self, tick: int) -> float:
+        assert self._start is not None
+        return self._start + tick * self._deliveries.period_s

@@ -1,0 +1,78 @@
+"""Finds set points that the controller missed: what a snapshot shows it used is not what was sent (section 6.3)."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from firmware_protocol.commands import JointReading
+
+
+@dataclass(eq=False)
+class SentSetPoints:
+    """All set points in force after one batch was sent. From period `due` on the controller must show them, or later
+    ones; None as long as nobody has confirmed them."""
+
+    postures: dict[int, int]
+    due: int | None = None
+
+    def shown_by(self, joints: tuple[tuple[int, JointReading], ...]) -> bool:
+        """Whether the controller used these set points in a period."""
+        return all(reading.set_point == self.postures[joint] for joint, reading in joints if joint in self.postures)
+
+
+@dataclass
+class SetPointWatch:
+    """What has been sent, in order.
+
+    A batch that the board confirmed with tick T was in its memory before period T+1 began, so T+1 must show it; the
+    period in which it arrives may or may not. That is the pipeline of one period: a snapshot is right when it shows
+    the newest batch that was due, or any sent after that one. Anything older has been missed. Batches are sent as
+    increments upon those before, so each entry holds the set points of all joints commanded so far.
+
+    A snapshot's set point is what the board says it took or, read from the memory, what position + error come to.
+    The detection is exact where the board's ticks are known. With the host's own estimate of ticks a batch is due one
+    period later, and a single miss amid a stream of new set points may pass for a late arrival.
+    """
+
+    _sent: list[SentSetPoints] = field(default_factory=list)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def sending(self, postures: Mapping[int, int]) -> SentSetPoints:
+        """Takes note of a batch that is about to be written: from now on it may show."""
+        with self._lock:
+            before = self._sent[-1].postures if self._sent else {}
+            batch = SentSetPoints({**before, **postures})
+            self._sent.append(batch)
+            return batch
+
+    def confirmed(self, batch: SentSetPoints, due: int) -> None:
+        """The board has confirmed a batch: from period `due` on it must show."""
+        with self._lock:
+            batch.due = due
+
+    def withdrawn(self, batch: SentSetPoints) -> None:
+        """The board has refused a batch."""
+        with self._lock:
+            if batch in self._sent:
+                self._sent.remove(batch)
+
+    def replaced(self, postures: Mapping[int, int], due: int) -> None:
+        """A stop has put other set points in force; what was sent before counts no longer."""
+        with self._lock:
+            self._sent = [*self._sent[-1:], SentSetPoints(dict(postures), due)]
+
+    def forget(self) -> None:
+        """Nothing is known of the set points in force."""
+        with self._lock:
+            self._sent.clear()
+
+    def missed(self, tick: int, joints: tuple[tuple[int, JointReading], ...]) -> bool:
+        """Whether period `tick` shows set points older than those due. False while nothing is due."""
+        with self._lock:
+            due = [i for i, batch in enumerate(self._sent) if batch.due is not None and batch.due <= tick]
+            if not due:
+                return False
+            del self._sent[: due[-1]]
+            return not any(batch.shown_by(joints) for batch in self._sent)

@@ -1,0 +1,59 @@
+"""What the driver delivers: one control period of the board, whole and told apart from every other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from firmware_protocol.commands import JointReading, StatusFlag
+
+Consistency = Literal["sample", "double-read"]
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSnapshot:
+    """One control period, consistent over its joints.
+
+    `host_time` is the clock (s) when it arrived, `tick_time` the estimated clock of its tick. With "double-read" the
+    tick is the host's own estimate, and the set points are those that position and error show the controller used.
+    """
+
+    tick: int
+    host_time: float
+    tick_time: float
+    joints: tuple[tuple[int, JointReading], ...]
+    """(joint, reading), joints ascending. Set point in posture units, position and error in ADC counts, power in
+    DAC counts."""
+    flags: StatusFlag
+    consistent_by: Consistency
+    missing_before: int = 0
+    """Periods between the sample before and this one that have none."""
+    set_points_missed: bool = False
+    """The controller did not take what was in its memory when the period began."""
+
+    @property
+    def tick_is_estimate(self) -> bool:
+        """Whether the tick's number comes from the host's clock and not from the board."""
+        return self.consistent_by == "double-read"
+
+    @property
+    def jitter(self) -> float:
+        """Time (s) by which this sample came later than the quickest ones after their ticks."""
+        return self.host_time - self.tick_time
+
+    @property
+    def positions(self) -> dict[int, int]:
+        """Joint → position in ADC counts."""
+        return {joint: reading.position for joint, reading in self.joints}
+
+    @property
+    def set_points(self) -> dict[int, int]:
+        """Joint → set point in posture units that the controller used."""
+        return {joint: reading.set_point for joint, reading in self.joints}
+
+    def __getitem__(self, joint: int) -> JointReading:
+        """Reading of a joint (from 1). Raises KeyError when it was not sampled."""
+        for number, reading in self.joints:
+            if number == joint:
+                return reading
+        raise KeyError(joint)

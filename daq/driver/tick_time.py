@@ -1,0 +1,31 @@
+"""When a tick was, by the host's clock, from the times at which samples arrived."""
+
+from __future__ import annotations
+
+from collections import deque
+
+WINDOW_TICKS = 500
+"""10 s of samples: two quartz clocks that differ by 100 ppm drift 1 ms apart meanwhile."""
+
+
+class TickTime:
+    """Lower envelope of arrival times: a sample may come late, but never before its tick.
+
+    Over the last WINDOW_TICKS ticks, offset = min(arrival_k − k · period), and tick k was at offset + k · period.
+    The estimate is late by the shortest way from board to host (the reply's time on the line), which no clock of
+    the host's can tell from the tick itself.
+    """
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        self._lowest: deque[tuple[int, float]] = deque()
+
+    def arrived(self, tick: int, time_s: float) -> float:
+        """Takes note of a sample of `tick` that arrived at `time_s`; returns the estimated time (s) of the tick."""
+        offset = time_s - tick * self._period_s
+        while self._lowest and self._lowest[-1][1] >= offset:
+            self._lowest.pop()
+        self._lowest.append((tick, offset))
+        while self._lowest[0][0] <= tick - WINDOW_TICKS:
+            self._lowest.popleft()
+        return self._lowest[0][1] + tick * self._period_s

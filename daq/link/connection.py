@@ -1,0 +1,145 @@
+"""One channel at a time with its dialect: numbered requests out, replies in, and what is wrong when it has ended."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+
+from daq.link.counters import Tally
+from daq.link.errors import LinkLostError
+from daq.link.pending import PendingReplies, Transaction
+from daq.link.timing import LinkTiming, copies_of
+from daq.transport import ByteChannel, ChannelError
+from firmware_protocol.commands import Request, Sample
+from firmware_protocol.dialect import LinkDialect
+
+
+class Connection:
+    """Shared by all threads that speak to one controller.
+
+    `changed` guards everything but the writing, and is notified when a reply has come or the channel has ended.
+    The write lock is held for one write only, so that a stop never waits for another thread's reply; numbers are
+    given out under it, so that the order on the wire is the order of the numbers.
+    """
+
+    def __init__(
+        self,
+        channel: ByteChannel,
+        dialect: LinkDialect,
+        timing: LinkTiming,
+        tally: Tally,
+        now: Callable[[], float],
+    ) -> None:
+        self.now = now
+        self.timing = timing
+        self.tally = tally
+        self.changed = threading.Condition(threading.Lock())
+        self._channel = channel
+        self._dialect = dialect
+        self._pending = PendingReplies(tally)
+        self._write_lock = threading.Lock()
+        self._failure: str | None = None
+
+    @property
+    def damaged(self) -> int:
+        """Pieces of input that were no whole reply."""
+        return self._dialect.damaged
+
+    @property
+    def description(self) -> str:
+        """Where the channel leads."""
+        return self._channel.description
+
+    @property
+    def failure(self) -> str | None:
+        """Why the channel has ended; None while it has not."""
+        return self._failure
+
+    def begin(self, requests: Sequence[Request]) -> list[Transaction]:
+        """Writes new requests, all in one write. Raises LinkLostError; ProtocolError for what no frame can carry."""
+        with self._write_lock:
+            self.check()
+            with self.changed:
+                transactions = [self._pending.begin(request) for request in requests]
+            try:
+                self._write(transactions)
+            except BaseException:
+                self.forget(transactions)
+                raise
+        return transactions
+
+    def repeat(self, transactions: Sequence[Transaction], ahead: Sequence[Request] = ()) -> list[Transaction]:
+        """Writes requests again under their numbers, behind new ones `ahead`; returns these. Raises LinkLostError."""
+        with self._write_lock:
+            self.check()
+            self.tally.count("retries", len(transactions))
+            with self.changed:
+                first = [self._pending.begin(request) for request in ahead]
+            self._write([*first, *transactions])
+        return first
+
+    def receive(self, timeout_s: float) -> bytes:
+        """What has arrived, its replies matched. One thread at a time. Raises LinkLostError."""
+        try:
+            data = self._channel.read(timeout_s)
+        except ChannelError as error:
+            raise self.fail(str(error)) from error
+        if data:
+            replies = self._dialect.feed(data)
+            now = self.now()
+            with self.changed:
+                for sequence, reply in replies:
+                    transaction = self._pending.match(sequence, reply, now)
+                    if transaction is not None:
+                        self._note_round_trip(transaction)
+        return data
+
+    def forget(self, transactions: Sequence[Transaction]) -> None:
+        """Ends the wait for those that are still without reply."""
+        with self.changed:
+            for transaction in transactions:
+                self._pending.forget(transaction)
+
+    def fail(self, why: str) -> LinkLostError:
+        """Ends the channel; every thread that waits is told. Returns the error to raise."""
+        if self._failure is None:
+            self._failure = why
+        self._channel.close()
+        with self.changed:
+            self.changed.notify_all()
+        return LinkLostError(self._failure)
+
+    def replace(self, channel: ByteChannel) -> None:
+        """Goes on over a new channel after a failure; numbers go on too, so no old reply is taken for a new one."""
+        with self._write_lock, self.changed:
+            self._dialect.reset()
+            self._channel = channel
+            self._failure = None
+
+    def close(self) -> None:
+        """Ends the channel for good."""
+        self.fail(f"{self.description}: closed")
+
+    def check(self) -> None:
+        """Raises LinkLostError when the channel has ended."""
+        if self._failure is not None:
+            raise LinkLostError(self._failure)
+
+    def _write(self, transactions: Sequence[Transaction]) -> None:
+        frames = b""
+        now = self.now()
+        for transaction in transactions:
+            request = transaction.request
+            frames += self._dialect.encode(transaction.sequence, request) * copies_of(request)
+            transaction.written += 1
+            transaction.written_at = now
+            transaction.deadline = now + self.timing.reply_timeout_s(request, len(frames))
+        try:
+            self._channel.write(frames)
+        except ChannelError as error:
+            raise self.fail(str(error)) from error
+
+    def _note_round_trip(self, transaction: Transaction) -> None:
+        # Of a repeated request nobody knows which copy was answered; a sample waits for its tick.
+        if self.timing.measured and transaction.written == 1 and not isinstance(transaction.request, Sample):
+            self.tally.round_trip(transaction.answered_at - transaction.written_at)

@@ -1,0 +1,111 @@
+"""What a link has been through, counted; an immutable copy is part of every status and trace."""
+
+from __future__ import annotations
+
+import bisect
+import threading
+from dataclasses import dataclass, fields
+
+
+@dataclass(frozen=True)
+class RoundTrips:
+    """Times from writing a request to having its reply, in s, of requests that are answered at once and were asked
+    once. None before the first. Not measured in lock-step, where they would be times of another machine's clock."""
+
+    count: int = 0
+    mean_s: float | None = None
+    p50_s: float | None = None
+    p99_s: float | None = None
+    max_s: float | None = None
+
+
+@dataclass(frozen=True)
+class LinkCounters:
+    """All since the link was opened."""
+
+    requests: int = 0
+    """Transactions begun."""
+    retries: int = 0
+    """Repetitions written."""
+    timeouts: int = 0
+    """Waits for a reply that ended without one."""
+    damaged: int = 0
+    """Pieces of input that were no whole reply (CRC, stuffing, length)."""
+    stale: int = 0
+    """Replies to nothing that is waited for."""
+    duplicates: int = 0
+    """Second replies to a request already answered."""
+    refused: int = 0
+    """Requests that the controller would not carry out."""
+    torn: int = 0
+    """Readings caught with the bytes of two periods; none was delivered."""
+    missed_set_points: int = 0
+    """Periods in which the controller did not take the set points that were in its memory."""
+    missing_samples: int = 0
+    """Periods of which no sample was delivered."""
+    late: int = 0
+    """Samples that came more than one period after the tick they describe."""
+    restarts: int = 0
+    """Resets of the board that were noticed."""
+    reconnections: int = 0
+    """New channels after a lost one."""
+    round_trips: RoundTrips = RoundTrips()
+
+    def numbers(self) -> dict[str, float]:
+        """All as name → number, for a trace's record; round-trip times as `round_trip_p99_s` and so on."""
+        counts = {f.name: float(getattr(self, f.name)) for f in fields(self) if f.name != "round_trips"}
+        trips = {f"round_trip_{f.name}": getattr(self.round_trips, f.name) for f in fields(self.round_trips)}
+        return counts | {name: float(value) for name, value in trips.items() if value is not None}
+
+
+COUNTED = frozenset(f.name for f in fields(LinkCounters)) - {"damaged", "round_trips"}
+
+_FINEST_S = 10e-6
+_STEP = 1.1
+_EDGES_S = tuple(_FINEST_S * _STEP**i for i in range(120))
+"""Upper edges of the histogram's classes: 10 µs to 0.84 s, each a tenth above the one before."""
+
+
+class Tally:
+    """The counters while they run; safe to use from any thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._counts = dict.fromkeys(COUNTED, 0)
+        self._trips = [0] * (len(_EDGES_S) + 1)
+        self._trip_sum_s = 0.0
+        self._trip_max_s = 0.0
+
+    def count(self, name: str, by: int = 1) -> None:
+        """Adds to one of the counters named in LinkCounters."""
+        with self._lock:
+            self._counts[name] += by
+
+    def round_trip(self, seconds: float) -> None:
+        """Adds one round trip."""
+        with self._lock:
+            self._trips[bisect.bisect_left(_EDGES_S, seconds)] += 1
+            self._trip_sum_s += seconds
+            self._trip_max_s = max(self._trip_max_s, seconds)
+
+    def snapshot(self, damaged: int) -> LinkCounters:
+        """All counters at this moment; `damaged` is the dialect's own count."""
+        with self._lock:
+            return LinkCounters(**self._counts, damaged=damaged, round_trips=self._summary())
+
+    def _summary(self) -> RoundTrips:
+        count = sum(self._trips)
+        if not count:
+            return RoundTrips()
+        return RoundTrips(
+            count, self._trip_sum_s / count, self._quantile(0.5 * count), self._quantile(0.99 * count), self._trip_max_s
+        )
+
+    def _quantile(self, wanted: float) -> float:
+        """Upper edge (s) of the class in which the `wanted`-th round trip lies; within 10 % of its time."""
+        seen = 0
+        for edge, trips in zip(_EDGES_S, self._trips, strict=False):
+            seen += trips
+            if seen >= wanted:
+                return min(edge, self._trip_max_s)
+        return self._trip_max_s

@@ -1,0 +1,42 @@
+"""What a transaction can end in besides its reply."""
+
+from __future__ import annotations
+
+from daq.contracts.errors import DaqError
+from firmware_protocol.commands import Refusal
+
+
+class LinkError(DaqError):
+    """The controller cannot be spoken to."""
+
+    sent = False
+    """Whether the request had been written when it failed, and may have been obeyed."""
+
+
+class LinkTimeoutError(LinkError):
+    """No reply to one request, after all its repetitions."""
+
+
+class LinkLostError(LinkError):
+    """The channel has ended; nothing is asked again until `Link.reconnect` has succeeded."""
+
+
+class RequestRefusedError(DaqError):
+    """The controller answered that it will not. Nothing has changed there."""
+
+    def __init__(self, request: str, reason: int) -> None:
+        self.request = request
+        self.reason = reason
+        super().__init__(f"the controller refused {request}: {_EXPLANATION.get(reason, f'unknown reason {reason}')}")
+
+
+_EXPLANATION: dict[int, str] = {
+    Refusal.UNKNOWN_OPCODE: "it does not know this request",
+    Refusal.BAD_LENGTH: "the request has a wrong length",
+    Refusal.BAD_ADDRESS: "the address lies outside its shared memory",
+    Refusal.BAD_VALUE: "a value is out of range",
+    Refusal.NOT_CAPABLE: "its bridge cannot do this",
+    Refusal.FROZEN: "it has been stopped and holds its posture until it is released",
+    Refusal.NOTHING_NEW: "there is nothing new",
+    Refusal.STALE: "a later command (a stop, perhaps) has already been obeyed",
+}

@@ -1,0 +1,178 @@
+"""The link to a controller: requests in, replies out, whatever happens to the bytes between."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from enum import StrEnum
+from typing import Protocol, Self, TypeVar
+
+from daq.link.connection import Connection
+from daq.link.counters import LinkCounters, Tally
+from daq.link.errors import LinkError, LinkLostError, RequestRefusedError
+from daq.link.timed_exchange import TimedExchange
+from daq.link.timing import CLEAN_TRANSACTIONS, LinkTiming
+from daq.link.turn_exchange import TurnExchange
+from daq.transport import Endpoint, ReconnectDelay, TransportError, open_endpoint
+from firmware_protocol.commands import Refused, Reply, Request, Stop, Stopped
+from firmware_protocol.dialect import FramedDialect, LinkDialect
+
+R = TypeVar("R", bound=Reply)
+
+
+class LinkState(StrEnum):
+    """How well the controller can be spoken to."""
+
+    CONNECTED = "connected"
+    DEGRADED = "degraded"
+    """Requests had to be repeated lately."""
+    LOST = "lost"
+    """The channel has ended, or the last request was never answered."""
+
+
+class Wait(Protocol):
+    """What `reconnect` waits with; `threading.Event` is one."""
+
+    def wait(self, timeout: float) -> bool:
+        """Waits; True ends the attempts."""
+        ...
+
+
+class Link:
+    """Transactions with one controller, from any thread.
+
+    Requests that are written together are answered in order and cost one round trip. A request is repeated with its
+    number until it is answered or its budget is used up, and then the link is lost. `stop` goes ahead of everything
+    that is not yet written.
+    """
+
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        dialect: LinkDialect | None = None,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.tally = Tally()
+        self._endpoint = endpoint
+        timing = LinkTiming(endpoint.bytes_per_second, measured=not endpoint.lock_step)
+        self._connection = Connection(endpoint.connect(), dialect or FramedDialect(), timing, self.tally, now)
+        self._exchange = TurnExchange(self._connection) if endpoint.lock_step else TimedExchange(self._connection)
+        self._clean = CLEAN_TRANSACTIONS
+        self._unanswered = False
+
+    @classmethod
+    def open(cls, url: str, dialect: LinkDialect | None = None) -> Self:
+        """A link to the controller at a port URL; nothing is sent. Raises TransportError."""
+        endpoint = open_endpoint(url)
+        try:
+            return cls(endpoint, dialect)
+        except BaseException:
+            endpoint.close()
+            raise
+
+    @property
+    def url(self) -> str:
+        """Port URL as the user wrote it."""
+        return self._endpoint.url
+
+    @property
+    def control(self) -> str | None:
+        """URL of the mock's control port; None for anything but mock://."""
+        return self._endpoint.control
+
+    @property
+    def lock_step(self) -> bool:
+        """Whether the controller's time stands still between requests."""
+        return self._endpoint.lock_step
+
+    @property
+    def state(self) -> LinkState:
+        """How well the controller can be spoken to now."""
+        if self._connection.failure is not None or self._unanswered:
+            return LinkState.LOST
+        return LinkState.CONNECTED if self._clean >= CLEAN_TRANSACTIONS else LinkState.DEGRADED
+
+    @property
+    def counters(self) -> LinkCounters:
+        """Everything counted so far."""
+        return self.tally.snapshot(self._connection.damaged)
+
+    def set_period(self, period_s: float) -> None:
+        """Tells the control period, for which `Sample` may have to wait."""
+        self._connection.timing = replace(self._connection.timing, period_s=period_s)
+
+    def request(self, request: Request, reply: type[R]) -> R:
+        """The reply to one request. Raises RequestRefusedError, LinkTimeoutError, LinkLostError, ProtocolError."""
+        (answer,) = self.exchange(request)
+        return expect(request, answer, reply)
+
+    def exchange(self, *requests: Request) -> tuple[Reply, ...]:
+        """The replies to requests written together, in their order; a refusal is a reply.
+
+        Raises LinkTimeoutError when one of them is never answered, LinkLostError; ProtocolError for a wrong value.
+        """
+        try:
+            transactions = self._exchange.run(requests)
+        except LinkError:
+            self._unanswered = True
+            raise
+        self._unanswered = False
+        at_once = all(transaction.written == 1 for transaction in transactions)
+        self._clean = self._clean + 1 if at_once else 0
+        replies = tuple(transaction.reply for transaction in transactions if transaction.reply is not None)
+        refused = sum(isinstance(reply, Refused) for reply in replies)
+        if refused:
+            self.tally.count("refused", refused)
+        return replies
+
+    def stop(self) -> Stopped:
+        """Freezes the arm. Written twice at once, ahead of all that waits. Raises LinkTimeoutError, LinkLostError."""
+        return self.request(Stop(), Stopped)
+
+    def reconnect(self, wait: Wait | None = None, delay: ReconnectDelay | None = None) -> None:
+        """Opens a new channel after a lost one, again and again until it succeeds or `wait.wait` returns True.
+
+        Nothing is sent over it: what was under way has failed, and only the caller may start motion again.
+        Raises LinkLostError when the wait was ended.
+        """
+        pause = wait or threading.Event()
+        self._connection.fail("connection given up in order to connect again")
+        error = "not tried"
+        for seconds in (delay or ReconnectDelay()).delays():
+            if pause.wait(seconds):
+                break
+            try:
+                channel = self._endpoint.connect()
+            except TransportError as reason:
+                error = str(reason)
+                continue
+            self._connection.replace(channel)
+            self.tally.count("reconnections")
+            self._unanswered = False
+            self._clean = 0
+            return
+        raise LinkLostError(f"not connected again: {error}")
+
+    def close(self) -> None:
+        """Ends the channel, and the mock's process where there is one. May be called twice."""
+        self._connection.close()
+        self._endpoint.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"Link({self.url}, {self.state})"
+
+
+def expect(request: Request, reply: Reply, kind: type[R]) -> R:
+    """`reply` as the kind that answers `request`. Raises RequestRefusedError for a refusal."""
+    if isinstance(reply, Refused):
+        raise RequestRefusedError(type(request).__name__, reply.reason)
+    assert isinstance(reply, kind)
+    return reply

@@ -1,0 +1,73 @@
+"""Requests that wait for their replies: numbers given out, replies matched, everything else dropped and counted.
+
+Pure bookkeeping without a clock, a lock or a channel; `Link` guards it with its own lock.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+from daq.link.counters import Tally
+from daq.link.timing import reply_opcode
+from firmware_protocol.commands import Refused, Reply, Request
+
+SEQUENCE_NUMBERS = 0x10000
+REMEMBERED = 256
+"""Answered requests whose second replies are told apart from stale ones."""
+
+
+@dataclass(eq=False)
+class Transaction:
+    """One request on its way: its number, how often it was written, when the last wait ends, and its reply."""
+
+    request: Request
+    sequence: int
+    written: int = 0
+    written_at: float = 0.0
+    deadline: float = 0.0
+    reply: Reply | None = None
+    answered_at: float = 0.0
+
+
+@dataclass
+class PendingReplies:
+    """The transactions that wait, by sequence number."""
+
+    tally: Tally
+    _waiting: dict[int, Transaction] = field(default_factory=dict)
+    _answered: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
+    _next: int = 0
+
+    def begin(self, request: Request) -> Transaction:
+        """A transaction under the next free sequence number."""
+        while self._next in self._waiting:
+            self._next = (self._next + 1) % SEQUENCE_NUMBERS
+        transaction = Transaction(request, self._next)
+        self._waiting[self._next] = transaction
+        self._next = (self._next + 1) % SEQUENCE_NUMBERS
+        self.tally.count("requests")
+        return transaction
+
+    def match(self, sequence: int, reply: Reply, now: float) -> Transaction | None:
+        """The transaction that `reply` ends; None for a reply that nobody waits for, which is counted."""
+        transaction = self._waiting.get(sequence)
+        if transaction is None or not _answers(reply, transaction.request):
+            asked = reply.opcode if isinstance(reply, Refused) else reply.OPCODE & 0x7F
+            self.tally.count("duplicates" if (sequence, asked) in self._answered else "stale")
+            return None
+        transaction.reply = reply
+        transaction.answered_at = now
+        self.forget(transaction)
+        self._answered.append((sequence, transaction.request.OPCODE))
+        return transaction
+
+    def forget(self, transaction: Transaction) -> None:
+        """Ends the wait for a transaction: a reply that still comes is stale."""
+        self._waiting.pop(transaction.sequence, None)
+
+
+def _answers(reply: Reply, request: Request) -> bool:
+    if isinstance(reply, Refused):
+        return reply.opcode == request.OPCODE
+    return reply_opcode(request) == reply.OPCODE

@@ -1,0 +1,63 @@
+"""How long to wait for a reply, and how often to ask. Every figure that decides about patience stands here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from firmware_protocol.commands import REPLIES, Request, Sample, Stop
+from firmware_protocol.framing import FRAME_OVERHEAD, MAX_PAYLOAD
+
+REPLY_MARGIN_S = 0.025
+"""Beyond the time on the line: what bridge, adapter (a USB one holds bytes for up to 16 ms) and host may take."""
+STOP_MARGIN_S = 0.010
+"""A stop is asked again sooner: a repetition costs nothing."""
+RETRIES = 8
+"""Repetitions of one request. With one frame in ten damaged, one transaction in 10^6 fails for good."""
+STOP_RETRIES = 50
+STOP_COPIES = 2
+"""A stop is written twice at once: the second copy costs 0.8 ms at 115200 baud, a time-out 20 times that."""
+LOCK_STEP_WATCHDOG_S = 10.0
+"""Lock-step keeps no wall time, but a process that says nothing for this long is dead."""
+CLEAN_TRANSACTIONS = 100
+"""After a repetition the link counts as degraded until this many transactions have gone through at once."""
+
+MAX_FRAME_BYTES = MAX_PAYLOAD + FRAME_OVERHEAD
+
+
+@dataclass(frozen=True)
+class LinkTiming:
+    """Time-outs that follow from the line and from the controller's period."""
+
+    bytes_per_second: float
+    period_s: float = 0.020
+    """Control period; `Sample` waits for at most one."""
+    retries: int = RETRIES
+    measured: bool = True
+    """Whether round trips have a meaning; in lock-step they have none."""
+
+    def reply_timeout_s(self, request: Request, bytes_ahead: int) -> float:
+        """How long (s) a reply to `request` may take when `bytes_ahead` bytes, its own included, are being sent.
+
+        The reply may wait for another one of full length that was already on its way.
+        """
+        line = (bytes_ahead + 2 * MAX_FRAME_BYTES) / self.bytes_per_second
+        if isinstance(request, Stop):
+            return line + STOP_MARGIN_S
+        waiting = self.period_s if isinstance(request, Sample) else 0.0
+        return line + REPLY_MARGIN_S + waiting
+
+    def retries_of(self, request: Request) -> int:
+        """How often `request` is repeated before it counts as failed."""
+        return STOP_RETRIES if isinstance(request, Stop) else self.retries
+
+
+def copies_of(request: Request) -> int:
+    """How often `request` is written at once."""
+    return STOP_COPIES if isinstance(request, Stop) else 1
+
+
+def reply_opcode(request: Request) -> int:
+    """Opcode of the reply that answers `request`."""
+    opcode = request.OPCODE | 0x80
+    assert opcode in REPLIES
+    return opcode

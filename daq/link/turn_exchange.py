@@ -1,0 +1,92 @@
+"""Transactions in lock-step: host and controller take turns, and no clock of this machine decides anything."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Sequence
+
+from daq.link.connection import Connection
+from daq.link.errors import LinkError, LinkTimeoutError
+from daq.link.pending import Transaction
+from daq.link.timed_exchange import no_reply
+from daq.link.timing import LOCK_STEP_WATCHDOG_S, copies_of
+from firmware_protocol.commands import Advance, Request
+from firmware_protocol.dialect import IDLE_MARK
+
+_BETWEEN_ZEROS = re.compile(rb"[^\0]+")
+
+
+class TurnExchange:
+    """The controller answers each frame with all it has to say, and then IDLE_MARK.
+
+    A request without its reply when all frames have had their marks has timed out. The controller's time is then
+    moved on by as much as the wait would have taken in real time, and the request is written again: faults cost what
+    they cost in reality, and every run repeats to the bit. A second thread, with a stop for example, has its turn
+    after the current one, at the same instant of the controller's time.
+    """
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._turn = threading.Lock()
+
+    def run(self, requests: Sequence[Request]) -> list[Transaction]:
+        """Writes `requests` together, returns when all have replies.
+
+        Raises LinkTimeoutError, LinkLostError, ProtocolError.
+        """
+        connection = self._connection
+        with self._turn:
+            transactions = connection.begin(requests)
+            try:
+                self._listen(requests)
+                while waiting := [transaction for transaction in transactions if transaction.reply is None]:
+                    self._ask_again(waiting)
+            except LinkError as error:
+                error.sent = True
+                raise
+            finally:
+                connection.forget(transactions)
+        return transactions
+
+    def _ask_again(self, waiting: Sequence[Transaction]) -> None:
+        connection = self._connection
+        connection.tally.count("timeouts", len(waiting))
+        for transaction in waiting:
+            if transaction.written > connection.timing.retries_of(transaction.request):
+                raise LinkTimeoutError(no_reply(connection, transaction))
+        waited_s = min(connection.timing.reply_timeout_s(transaction.request, 0) for transaction in waiting)
+        wait = Advance(round(waited_s * 1e6))
+        passed = connection.repeat(waiting, ahead=[wait])
+        try:
+            self._listen([wait, *(transaction.request for transaction in waiting)])
+        finally:
+            connection.forget(passed)
+
+    def _listen(self, written: Sequence[Request]) -> None:
+        """Takes in everything up to the last of the marks that the controller owes for `written`."""
+        owed = sum(copies_of(request) for request in written)
+        marks = MarkCounter()
+        while marks.seen < owed:
+            data = self._connection.receive(LOCK_STEP_WATCHDOG_S)
+            if not data:
+                why = f"{self._connection.description}: silent for {LOCK_STEP_WATCHDOG_S} s in the middle of a turn"
+                raise self._connection.fail(why)
+            marks.feed(data)
+
+
+class MarkCounter:
+    """Counts idle marks in a stream: a run of n zeros holds n // 4, since frames add at most two to a run."""
+
+    def __init__(self) -> None:
+        self.seen = 0
+        self._run = 0
+
+    def feed(self, data: bytes) -> None:
+        """Takes the next bytes, however they were cut."""
+        pieces = _BETWEEN_ZEROS.split(data)
+        for index, zeros in enumerate(pieces):
+            self._run = len(zeros) if index else self._run + len(zeros)
+            whole = self._run // len(IDLE_MARK)
+            self.seen += whole
+            self._run -= whole * len(IDLE_MARK)

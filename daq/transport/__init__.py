@@ -1,0 +1,20 @@
+"""Bytes to and from a controller: over a serial port, a pseudo-terminal, TCP, or a mock that it starts itself."""
+
+from daq.transport.channel import ByteChannel, ChannelError
+from daq.transport.endpoint import Endpoint, open_endpoint
+from daq.transport.reconnect import ReconnectDelay
+from daq.transport.url import MockPort, PortUrl, SerialPort, TcpPort, TransportError, parse_port_url
+
+__all__ = [
+    "ByteChannel",
+    "ChannelError",
+    "Endpoint",
+    "MockPort",
+    "PortUrl",
+    "ReconnectDelay",
+    "SerialPort",
+    "TcpPort",
+    "TransportError",
+    "open_endpoint",
+    "parse_port_url",
+]

@@ -1,0 +1,139 @@
+"""From a port URL to an open channel, again and again: what a connection needs that outlives one of its channels."""
+
+from __future__ import annotations
+
+import socket
+from typing import Protocol
+
+import serial
+
+from daq.transport.channel import ByteChannel, DescriptorChannel
+from daq.transport.mock_process import MockProcess, start_mock
+from daq.transport.url import MockPort, PortUrl, SerialPort, TcpPort, TransportError, parse_port_url
+
+CONNECT_TIMEOUT_S = 3.0
+BITS_PER_BYTE = 10
+"""On the line: start bit, eight data bits, stop bit."""
+
+
+class Endpoint(Protocol):
+    """A place where a controller is reached."""
+
+    @property
+    def url(self) -> str:
+        """As the user wrote it."""
+        ...
+
+    @property
+    def lock_step(self) -> bool:
+        """Whether the time of the controller stands still until the host asks for more."""
+        ...
+
+    @property
+    def bytes_per_second(self) -> float:
+        """What the line carries in one direction."""
+        ...
+
+    @property
+    def control(self) -> str | None:
+        """URL of the mock's control port, where faults are switched; None for anything but mock://."""
+        ...
+
+    def connect(self) -> ByteChannel:
+        """A new channel. Raises TransportError: one line that says who, what, and what to do."""
+        ...
+
+    def close(self) -> None:
+        """Gives back what the endpoint owns (a mock's process). May be called twice."""
+        ...
+
+
+def open_endpoint(url: str) -> Endpoint:
+    """The endpoint of a URL; a mock is started. Nothing is sent. Raises TransportError."""
+    port = parse_port_url(url)
+    if isinstance(port, MockPort):
+        return MockEndpoint(url, port, start_mock(port))
+    return PortEndpoint(url, port)
+
+
+class PortEndpoint:
+    """A serial port or a TCP server: nothing to own between two channels."""
+
+    control: str | None = None
+
+    def __init__(self, url: str, port: SerialPort | TcpPort) -> None:
+        self.url = url
+        self.lock_step = isinstance(port, TcpPort) and port.lock_step
+        self.bytes_per_second = port.baud / BITS_PER_BYTE
+        self._port = port
+
+    def connect(self) -> ByteChannel:
+        """A new channel."""
+        return connect(self._port)
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+
+class MockEndpoint:
+    """A mock's process and the address where it listens."""
+
+    def __init__(self, url: str, port: MockPort, process: MockProcess) -> None:
+        self.url = url
+        self.lock_step = port.lock_step
+        self.bytes_per_second = port.baud / BITS_PER_BYTE
+        self.control = process.control
+        self._process = process
+
+    def connect(self) -> ByteChannel:
+        """A new channel to the same process. Raises TransportError when it has ended."""
+        self._process.check_running()
+        port = parse_port_url(self._process.url)
+        return connect(port)
+
+    def close(self) -> None:
+        """Ends the process."""
+        self._process.close()
+
+
+def connect(port: PortUrl) -> ByteChannel:
+    """A channel to a serial port or TCP server. Raises TransportError."""
+    match port:
+        case SerialPort():
+            return _connect_serial(port)
+        case TcpPort():
+            return _connect_tcp(port)
+        case MockPort():
+            raise TransportError("a mock is started with open_endpoint and has an address of its own")
+
+
+def _connect_serial(port: SerialPort) -> ByteChannel:
+    try:
+        device = serial.Serial(port.device, port.baud, timeout=0, exclusive=True)
+    except (serial.SerialException, OSError, ValueError) as error:
+        raise TransportError(_why_serial_failed(port.device, error)) from error
+    device.reset_input_buffer()
+    return DescriptorChannel(device.fileno(), port.device, device.close)
+
+
+def _why_serial_failed(device: str, error: Exception) -> str:
+    text = str(error)
+    if "exclusively lock" in text or "Resource busy" in text:
+        return f"{device} is in use by another program: end that one, or stop the arm with `daq stop`"
+    if "No such file" in text:
+        return f"{device} does not exist: `daq ports` lists the ports that do"
+    if "Permission denied" in text:
+        return f"{device} may not be opened by this user: join the group that owns it (often `dialout`)"
+    return f"{device} cannot be opened as a serial port: {text}"
+
+
+def _connect_tcp(port: TcpPort) -> ByteChannel:
+    where = f"{port.host}:{port.port}"
+    try:
+        connection = socket.create_connection((port.host, port.port), CONNECT_TIMEOUT_S)
+    except ConnectionRefusedError as error:
+        raise TransportError(f"nothing listens at {where}: is the bridge, or the mock, running there?") from error
+    except OSError as error:
+        raise TransportError(f"{where} cannot be reached: {error}") from error
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return DescriptorChannel(connection.fileno(), where, connection.close)
