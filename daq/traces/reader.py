@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import TRACE_FORMAT, Trace, TraceEvent, TraceRecord
-from daq.traces import disk, layout
+from daq.traces import cache, disk, layout
 from daq.traces.scan import Scan, payloads, scan
 
 
@@ -27,10 +27,20 @@ def read_trace(path: Path) -> Trace:
         data = path.read_bytes()
     except OSError as error:
         raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
+    if path.name.endswith(layout.PART_SUFFIX):
+        return trace_of(scan(data, str(path)), str(path))
+    worth_it = len(data) >= cache.WORTH_IT
+    key = cache.key_of(data) if worth_it else ""
+    cached = cache.load(path, key) if worth_it else None
+    if cached is not None:
+        return cached
     found = scan(data, str(path))
-    if found.damage and not path.name.endswith(layout.PART_SUFFIX):
+    if found.damage:
         raise TraceError(f"{path}: is damaged after byte {found.good_bytes} of {len(data)}: {found.damage}")
-    return trace_of(found, str(path))
+    trace = trace_of(found, str(path))
+    if worth_it:
+        cache.store(path, key, trace)
+    return trace
 
 
 def trace_of(found: Scan, origin: str) -> Trace:
@@ -58,7 +68,7 @@ def record_of(start: dict[str, str], end: dict[str, str] | None, origin: str) ->
             version = fields["format"]
             raise TraceError(f"{origin}: has format {version} of a newer version; this one reads up to {TRACE_FORMAT}")
         if end is not None:
-            fields |= {"outcome": end["outcome"], "counters": json.loads(end["counters"])}
+            fields |= {"outcome": end["outcome"] or None, "counters": json.loads(end["counters"])}
         return TraceRecord.model_validate_json(json.dumps(fields))
     except (KeyError, ValueError, TypeError, AttributeError) as error:
         raise TraceError(f"{origin}: its metadata is not that of a trace: {_one_line(error)}") from error

@@ -21,16 +21,16 @@ ONE_CHUNK_A_FLUSH = 1 << 40
 def open_mcap(stream: IO[bytes]) -> Writer:
     """An MCAP writer as all traces are written: zstd, one chunk a flush, checksums over chunks and the data section."""
     writer = Writer(stream, chunk_size=ONE_CHUNK_A_FLUSH, compression=CompressionType.ZSTD, enable_data_crcs=True)
-    writer.start(library=f"ma2000-daq/{version('ma2000-daq')}")
+    writer.start(library=software())
     return writer
 
 
 def outcome_metadata(
-    outcome: Outcome, counters: Mapping[str, float], samples: int, duration: float, remark: str = ""
+    outcome: Outcome | None, counters: Mapping[str, float], samples: int, duration: float, remark: str = ""
 ) -> dict[str, str]:
     """The metadata record at the end of a trace."""
     return {
-        "outcome": outcome,
+        "outcome": outcome or "",
         "counters": layout.compact(dict(counters)).decode(),
         "samples": str(samples),
         "duration": repr(duration),
@@ -110,12 +110,17 @@ class Recording:
         """End the chunk: what was added so far can be read back once the stream's bytes are."""
         self._mcap.flush()  # type: ignore[no-untyped-call]
 
-    def finish(self, outcome: Outcome, counters: Mapping[str, float]) -> None:
+    def finish(self, outcome: Outcome | None, counters: Mapping[str, float]) -> None:
         """Write the outcome, the index and the end of the file."""
         self._mcap.flush()  # type: ignore[no-untyped-call]
         duration = self.last_time - (self._first.time if self._first else 0.0)
         self._mcap.add_metadata(layout.END_METADATA, outcome_metadata(outcome, counters, self.samples, duration))
         self._mcap.finish()  # type: ignore[no-untyped-call]
+
+
+def software() -> str:
+    """This software and its version, for `TraceRecord.software`."""
+    return f"ma2000-daq/{version('ma2000-daq')}"
 
 
 def utc_now() -> datetime:

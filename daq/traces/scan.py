@@ -11,13 +11,14 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
+from typing import IO
 
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Metadata, Schema
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, Metadata, Schema
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from daq.contracts.errors import TraceError
@@ -25,6 +26,8 @@ from daq.contracts.errors import TraceError
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<BQHIQQ")
 _CRC = struct.Struct("<I")
+_LARGEST_METADATA = 1 << 26
+"""Bytes: a length beyond it is damage, and is not read."""
 _UNREADABLE = (ValueError, struct.error, McapError, zstandard.ZstdError, RuntimeError, MemoryError)
 """What mcap's parsers and the decompressors raise on damaged bytes."""
 
@@ -162,3 +165,16 @@ def _uncompressed(chunk: Chunk) -> bytes:
 
 def _stream(body: memoryview) -> ReadDataStream:
     return ReadDataStream(BytesIO(body))
+
+
+def first_metadata(stream: IO[bytes], origin: str) -> tuple[str, dict[str, str]]:
+    """Name and content of the first metadata record, read without the rest of the file. Raises TraceError."""
+    try:
+        for record in StreamReader(stream, emit_chunks=True, record_size_limit=_LARGEST_METADATA).records:
+            if isinstance(record, Metadata):
+                return record.name, record.metadata
+            if not isinstance(record, Header):
+                break
+    except _UNREADABLE as error:
+        raise TraceError(f"{origin}: ends or is damaged before its first metadata") from error
+    raise TraceError(f"{origin}: does not begin with a metadata record, so it is not a trace")

@@ -1,0 +1,175 @@
+"""Which traces a folder has: what each says about itself, without reading its samples."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+from typing import Literal
+
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from pydantic import BaseModel, ConfigDict
+
+from daq.contracts.errors import TraceError
+from daq.contracts.trace import Outcome, TraceRecord
+from daq.traces import disk, layout
+from daq.traces.reader import read_trace, record_of
+from daq.traces.scan import first_metadata
+
+State = Literal["finished", "recording", "unfinished", "unreadable"]
+"""`recording`: a living process writes it; `unfinished`: left by a crash, `salvage` finishes it."""
+
+LAST = "last"
+"""Instead of a number or a name: the newest finished trace."""
+
+
+class TraceSummary(BaseModel):
+    """One file of a folder of traces. What is not known is None: of an unfinished trace, how long it is."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    path: Path
+    state: State
+    size: int
+    """Bytes."""
+    trace_id: str | None = None
+    created: datetime | None = None
+    source: str | None = None
+    robot: str | None = None
+    kind: str | None = None
+    """Kind of trajectory, where the trace is of an experiment."""
+    name: str | None = None
+    joints: tuple[int, ...] = ()
+    outcome: Outcome | None = None
+    samples: int | None = None
+    duration: float | None = None
+    """s between the first and the last sample."""
+    problem: str | None = None
+
+
+def list_traces(folder: Path) -> tuple[TraceSummary, ...]:
+    """Summaries of all traces in a folder, the oldest first, unreadable ones with their problem.
+
+    Raises TraceError when the folder cannot be read.
+    """
+    folder = Path(folder)
+    try:
+        paths = [entry for entry in folder.iterdir() if entry.name.endswith((layout.SUFFIX, layout.PART_SUFFIX))]
+    except OSError as error:
+        raise TraceError(f"{folder}: cannot be read: {disk.reason(error)}") from error
+    summaries = []
+    for path in paths:
+        try:
+            summaries.append(summary_of(path))
+        except FileNotFoundError:
+            continue  # finished, salvaged or deleted in this moment
+    return tuple(sorted(summaries, key=lambda summary: (_moment(summary), summary.path.name)))
+
+
+def summary_of(path: Path) -> TraceSummary:
+    """What one file says about itself. Raises FileNotFoundError when it is not there."""
+    path = Path(path)
+    size = path.stat().st_size
+    unfinished = path.name.endswith(layout.PART_SUFFIX)
+    try:
+        if unfinished:
+            state: State = "recording" if disk.is_being_written(path) else "unfinished"
+            start, end = _beginning(path), None
+        else:
+            state = "finished"
+            start, end = _metadata(path)
+        record = record_of(start, end, str(path))
+        joints = tuple(int(joint) for joint in start["joints"].split())
+        extent = (int(end["samples"]), float(end["duration"])) if end else (None, None)
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        problem = f"{path}: cannot be read: {disk.reason(error)}"
+    except TraceError as error:
+        problem = str(error)
+    except (KeyError, ValueError) as error:
+        problem = f"{path}: its metadata is not that of a trace: {error}"
+    else:
+        return _summary(path, state, size, record, joints, *extent)
+    return TraceSummary(path=path, state="unreadable", size=size, problem=problem)
+
+
+def find_trace(folder: Path, wanted: str) -> Path:
+    """The trace that `wanted` names: a path, `last`, or the beginning of a trace's number or of a file's name.
+
+    Raises TraceError when there is none, or when several begin so.
+    """
+    path = Path(wanted)
+    if path.is_file():
+        return path
+    folder = Path(folder)
+    summaries = list_traces(folder) if folder.is_dir() else ()
+    if wanted == LAST:
+        finished = [summary for summary in summaries if summary.state == "finished"]
+        if not finished:
+            raise TraceError(f"{folder}: has no finished trace yet")
+        return finished[-1].path
+    found = [
+        summary.path
+        for summary in summaries
+        if wanted and (summary.path.name.startswith(wanted) or (summary.trace_id or "").startswith(wanted))
+    ]
+    if not found:
+        raise TraceError(f"trace {wanted!r}: is not a file, and no trace in {folder} has a number or name like it")
+    if len(found) > 1:
+        names = ", ".join(path.name for path in found[:4])
+        raise TraceError(f"trace {wanted!r}: {len(found)} traces in {folder} begin so: {names}; give more of it")
+    return found[0]
+
+
+def _moment(summary: TraceSummary) -> float:
+    return summary.created.timestamp() if summary.created else 0.0
+
+
+def _summary(
+    path: Path,
+    state: State,
+    size: int,
+    record: TraceRecord,
+    joints: tuple[int, ...],
+    samples: int | None,
+    duration: float | None,
+) -> TraceSummary:
+    spec = record.spec
+    return TraceSummary(
+        path=path,
+        state=state,
+        size=size,
+        trace_id=record.trace_id,
+        created=record.created,
+        source=record.source,
+        robot=record.robot,
+        kind=spec.trajectory.kind if spec else None,
+        name=spec.name if spec else None,
+        joints=joints,
+        outcome=record.outcome,
+        samples=samples,
+        duration=duration,
+    )
+
+
+def _metadata(path: Path) -> tuple[dict[str, str], dict[str, str] | None]:
+    """Metadata at the start and the end of a finished trace, through its index. Raises TraceError."""
+    try:
+        with path.open("rb") as stream:
+            found = {metadata.name: metadata.metadata for metadata in make_reader(stream).iter_metadata()}
+    except (McapError, ValueError) as error:
+        read_trace(path)  # says in one line what is wrong with it
+        raise TraceError(f"{path}: its index cannot be read: {error}") from error
+    if layout.START_METADATA not in found:
+        raise TraceError(f"{path}: is an MCAP file, but not a trace: it has no metadata {layout.START_METADATA!r}")
+    return found[layout.START_METADATA], found.get(layout.END_METADATA)
+
+
+def _beginning(path: Path) -> dict[str, str]:
+    """Metadata at the start of a file that has no end yet. Raises TraceError."""
+    with path.open("rb") as stream:
+        name, metadata = first_metadata(stream, str(path))
+    if name != layout.START_METADATA:
+        raise TraceError(f"{path}: is an MCAP file, but not a trace: it does not begin as one")
+    return metadata

@@ -1,0 +1,233 @@
+"""Traces as plain CSV, for other rigs and other tools, with a TOML beside it for what columns cannot say."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import re
+import tomllib
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from daq.contracts.errors import DaqError, TraceError
+from daq.contracts.machine import load_machine, shipped_machines
+from daq.contracts.trace import Floats, Outcome, Trace, TraceRecord
+from daq.traces import disk
+from daq.traces.naming import new_trace_id
+from daq.traces.recording import software
+
+SIGNALS = ("set_point", "position", "drive", "velocity")
+"""Columns a joint may have, after which comes `_` and its number. Only `position` is needed."""
+
+_COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-6])")
+
+
+class Beside(BaseModel):
+    """The TOML beside a CSV file. `machine` is the name of a shipped machine or a path from the TOML's folder."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    source: Literal["mock", "real", "imported"] = "imported"
+    machine: str | None = None
+    robot: str | None = None
+    joints: tuple[Annotated[int, Field(ge=1, le=6)], ...] | None = None
+    """Joints to take from the columns; all of them when None."""
+    drive_unit: Literal["V", "N·m", "N"] | None = None
+    period: Annotated[float, Field(gt=0)] | None = None
+    created: datetime | None = None
+    outcome: Outcome | None = None
+    operator: str | None = None
+    notes: str = ""
+
+
+def toml_path(path: Path) -> Path:
+    """The TOML beside a CSV file."""
+    return path.with_suffix(".toml")
+
+
+def export_csv(trace: Trace, path: Path) -> Path:
+    """Write `time` and the signals that the trace has, and the TOML beside it. Numbers read back exactly.
+
+    The same trace gives the same bytes. Raises TraceError when a file cannot be written.
+    """
+    path = Path(path)
+    header = ["time"]
+    columns: list[Floats] = [trace.time]
+    for index, joint in enumerate(trace.joints):
+        for name in SIGNALS:
+            signal = getattr(trace, name)
+            if signal is not None:
+                header.append(f"{name}_{joint}")
+                columns.append(signal[:, index])
+    try:
+        with path.open("w", encoding="utf-8", newline="") as stream:
+            stream.write(",".join(header) + "\n")
+            stream.writelines(
+                ",".join(map(repr, row)) + "\n" for row in zip(*(c.tolist() for c in columns), strict=True)
+            )
+        toml_path(path).write_text(_beside_text(trace), encoding="utf-8")
+    except OSError as error:
+        raise TraceError(f"{path}: cannot be written: {disk.reason(error)}") from error
+    return path
+
+
+def import_csv(path: Path) -> Trace:
+    """The trace in a CSV file and, where there is one, the TOML beside it.
+
+    Raises TraceError with one line that names the row (from 1, the header is row 1) and the column of what is wrong:
+    a missing or unknown column, text, NaN, time that does not increase, rows of unequal length.
+    """
+    path = Path(path)
+    beside = _read_beside(toml_path(path))
+    header, table = _read_table(path)
+    joints = _joints(path, header, beside)
+    wrong = np.argwhere(np.diff(table[:, 0]) <= 0)
+    if len(wrong):
+        row = int(wrong[0][0]) + 1
+        before, value = table[row - 1, 0], table[row, 0]
+        raise TraceError(f"{path}: row {row + 2}, column 'time': {value} does not increase after {before}")
+    signals: dict[str, Any] = {}
+    for name in SIGNALS:
+        having = [joint for joint in joints if f"{name}_{joint}" in header]
+        if having and len(having) < len(joints):
+            lacking = next(joint for joint in joints if joint not in having)
+            raise TraceError(f"{path}: row 1: column '{name}_{lacking}' is missing; joint {having[0]} has one")
+        if having:
+            signals[name] = table[:, [header.index(f"{name}_{joint}") for joint in joints]]
+    return Trace(_record(path, beside), joints, table[:, 0], **signals)
+
+
+def _record(path: Path, beside: Beside) -> TraceRecord:
+    machine = None
+    if beside.machine is not None:
+        named = beside.machine in shipped_machines()
+        try:
+            machine = load_machine(beside.machine if named else str(path.parent / beside.machine))
+        except DaqError as error:
+            raise TraceError(f"{toml_path(path)}: machine: {error}") from error
+    return TraceRecord(
+        trace_id=new_trace_id(),
+        created=beside.created or datetime.now(UTC),
+        software=software(),
+        source=beside.source,
+        robot=beside.robot or (machine.name if machine else path.stem),
+        machine=machine,
+        operator=beside.operator,
+        period=beside.period,
+        drive_unit=beside.drive_unit,
+        notes=beside.notes,
+        outcome=beside.outcome,
+    )
+
+
+def _joints(path: Path, header: list[str], beside: Beside) -> tuple[int, ...]:
+    found = sorted(int(name.removeprefix("position_")) for name in header if name.startswith("position_"))
+    wanted = beside.joints or tuple(found)
+    for joint in wanted:
+        if joint not in found:
+            raise TraceError(f"{path}: row 1: column 'position_{joint}' is missing; it has {', '.join(header)}")
+    if not wanted:
+        raise TraceError(f"{path}: row 1: column 'position_1' is missing; it has {', '.join(header)}")
+    return wanted
+
+
+def _read_table(path: Path) -> tuple[list[str], Floats]:
+    """Header and numbers (rows, columns), all finite. Raises TraceError."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            rows = csv.reader(stream)
+            header = [name.strip() for name in next(rows, [])]
+            _check_header(path, header)
+            return header, np.array(list(_numbers(path, header, rows))).reshape(-1, len(header))
+    except OSError as error:
+        raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
+    except UnicodeDecodeError as error:
+        raise TraceError(f"{path}: is not text in UTF-8") from error
+    except csv.Error as error:
+        raise TraceError(f"{path}: is not CSV: {error}") from error
+
+
+def _check_header(path: Path, header: list[str]) -> None:
+    allowed = f"allowed are time and {', '.join(f'{name}_N' for name in SIGNALS)} with N from 1 to 6"
+    if not header or header == [""]:
+        raise TraceError(f"{path}: row 1: no column names; {allowed}")
+    if len(header) == 1 and re.search(r"[;\t]", header[0]):
+        raise TraceError(f"{path}: row 1: columns must be separated by commas")
+    for position, name in enumerate(header):
+        if name != "time" and not _COLUMN.fullmatch(name):
+            raise TraceError(f"{path}: row 1, column {position + 1}: {name!r} is not known; {allowed}")
+        if name in header[:position]:
+            raise TraceError(f"{path}: row 1, column {position + 1}: {name!r} comes twice")
+    if header[0] != "time":
+        raise TraceError(f"{path}: row 1: the first column must be 'time', it is {header[0]!r}")
+
+
+def _numbers(path: Path, header: list[str], rows: Iterable[list[str]]) -> Iterable[list[float]]:
+    for number, row in enumerate(rows, start=2):
+        if not row:
+            continue
+        if len(row) != len(header):
+            raise TraceError(f"{path}: row {number}: has {len(row)} values for {len(header)} columns")
+        try:
+            values = [float(text) for text in row]
+        except ValueError:
+            values = [math.nan]
+        if not math.isfinite(sum(values)) or "_" in "".join(row):
+            _refuse_value(path, number, header, row)
+        yield values
+
+
+def _refuse_value(path: Path, number: int, header: list[str], row: list[str]) -> None:
+    """Raises TraceError for the first value of a row that is not a finite number, if there is one."""
+    for name, text in zip(header, row, strict=True):
+        try:
+            finite = math.isfinite(float(text)) and "_" not in text  # Python's float reads 1_000
+        except ValueError:
+            finite = False
+        if not finite:
+            raise TraceError(f"{path}: row {number}, column {name!r}: {text!r} is not a finite number")
+
+
+def _read_beside(path: Path) -> Beside:
+    if not path.exists():
+        return Beside()
+    try:
+        return Beside.model_validate(tomllib.loads(path.read_text("utf-8")))
+    except OSError as error:
+        raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise TraceError(f"{path}: is not TOML: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise TraceError(f"{path}: {where}: {first['msg']} (got {first['input']!r})") from error
+
+
+def _beside_text(trace: Trace) -> str:
+    record = trace.record
+    machine = record.machine.name if record.machine and record.machine.name in shipped_machines() else None
+    created = record.created.astimezone(UTC).isoformat().replace("+00:00", "Z")
+    values: dict[str, str | None] = {
+        "source": _toml_text(record.source),
+        "machine": _toml_text(machine),
+        "robot": _toml_text(record.robot),
+        "joints": str(list(trace.joints)),
+        "drive_unit": _toml_text(record.drive_unit),
+        "period": None if record.period is None else repr(float(record.period)),
+        "created": created,
+        "outcome": _toml_text(record.outcome),
+        "operator": _toml_text(record.operator),
+        "notes": _toml_text(record.notes or None),
+    }
+    return "".join(f"{key} = {value}\n" for key, value in values.items() if value is not None)
+
+
+def _toml_text(text: str | None) -> str | None:
+    """A TOML string: JSON's escapes are TOML's, but for DEL, which TOML wants escaped."""
+    return None if text is None else json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")

@@ -1,0 +1,78 @@
+"""Writing a whole trace at once: what was imported, or made by computation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+from daq.contracts.errors import TraceError
+from daq.contracts.sample import SampleRow
+from daq.contracts.trace import Trace
+from daq.traces import disk, layout
+from daq.traces.naming import part_path
+from daq.traces.recording import Recording
+from daq.traces.writer import ROWS_A_CHUNK
+
+
+def write_trace(trace: Trace, path: Path) -> Path:
+    """Write `trace` to a new file at `path`, so that it is there whole or not at all. Returns `path`.
+
+    Raises TraceError when the file exists or cannot be written.
+    """
+    path = Path(path)
+    part = part_path(path)
+    if path.exists():
+        raise TraceError(f"{path}: exists already; a trace is never written over")
+    try:
+        with disk.create_locked(part) as stream:
+            try:
+                recording = Recording(stream, trace.record, trace.joints, _signals(trace), {})
+                for event in trace.events:
+                    recording.event(event)
+                for number, row in enumerate(_rows(trace), start=1):
+                    recording.row(row)
+                    if number % ROWS_A_CHUNK == 0:
+                        recording.flush()
+                recording.finish(trace.record.outcome, trace.record.counters)
+                disk.sync(stream)
+                disk.rename(part, path)
+            except BaseException:
+                part.unlink(missing_ok=True)
+                raise
+    except OSError as error:
+        raise TraceError(f"{path}: cannot be written: {disk.reason(error)}") from error
+    return path
+
+
+def _signals(trace: Trace) -> tuple[str, ...]:
+    names = (*layout.RECORDED_SIGNALS, "velocity")
+    return tuple(name for name in names if getattr(trace, name) is not None)
+
+
+def _rows(trace: Trace) -> Iterator[SampleRow]:
+    """Rows in which a signal that the trace has not is NaN, or 0 where it is an integer."""
+    absent = (math.nan,) * len(trace.joints)
+    columns = {
+        name: None if getattr(trace, name) is None else getattr(trace, name).tolist()
+        for name in ("tick", "host_time", "status", "set_point", "error", "drive", "velocity", "power_raw")
+    }
+
+    def values(name: str, row: int) -> tuple[float, ...]:
+        column = columns[name]
+        return absent if column is None else tuple(column[row])
+
+    ticks, arrivals, flags, powers = (columns[name] for name in ("tick", "host_time", "status", "power_raw"))
+    for row, (time, position) in enumerate(zip(trace.time.tolist(), trace.position.tolist(), strict=True)):
+        yield SampleRow(
+            tick=row if ticks is None else ticks[row],
+            time=time,
+            host_time=time if arrivals is None else arrivals[row],
+            set_point=values("set_point", row),
+            position=tuple(position),
+            error=values("error", row),
+            drive=values("drive", row),
+            power_raw=(0,) * len(trace.joints) if powers is None else tuple(powers[row]),
+            status=0 if flags is None else flags[row],
+            velocity=() if columns["velocity"] is None else values("velocity", row),
+        )

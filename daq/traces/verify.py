@@ -1,0 +1,182 @@
+"""Is a trace what it claims to be? Checksums, ticks, gaps, events, outcome, and whether its signals agree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from pydantic import BaseModel, ConfigDict
+
+from daq.contracts.errors import TraceError
+from daq.contracts.machine import Machine
+from daq.contracts.trace import Trace
+from daq.traces import disk, layout
+from daq.traces.reader import trace_of
+from daq.traces.scan import Scan, scan
+
+Level = Literal["error", "warning", "note"]
+"""error: do not trust it; warning: know it before you use it; note: for information."""
+
+MISSING_COUNTER = "missing_samples"
+COUNTS_OFF = 1.0
+"""ADC counts that set point − position may differ from the error: one rounding between posture units and counts."""
+PERIODS_OFF = 0.01
+"""Control periods that time may differ from tick times period: time is the board's own."""
+
+
+class Finding(BaseModel):
+    """One thing that was found, in one line."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    level: Level
+    check: str
+    message: str
+
+
+class Verification(BaseModel):
+    """All that was found in one file. `trustworthy` is whether none of it is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    path: Path
+    findings: tuple[Finding, ...]
+
+    @property
+    def trustworthy(self) -> bool:
+        """Whether nothing that was found is an error."""
+        return all(finding.level != "error" for finding in self.findings)
+
+
+def verify(path: Path) -> Verification:
+    """Check everything about a trace file that the file itself allows to check; never uses the cache.
+
+    Raises TraceError only when the file cannot be read from the disk.
+    """
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
+    return Verification(path=path, findings=tuple(_findings(path, data)))
+
+
+def _findings(path: Path, data: bytes) -> Iterator[Finding]:
+    try:
+        found = scan(data, str(path))
+        yield from _file(path, data, found)
+        trace = trace_of(found, str(path))
+    except TraceError as error:
+        yield Finding(level="error", check="trace", message=str(error))
+        return
+    yield from _outcome(trace)
+    yield from _ticks(trace)
+    yield from _events(trace)
+    yield from _signals(trace)
+
+
+def _file(path: Path, data: bytes, found: Scan) -> Iterator[Finding]:
+    if found.damage is not None:
+        message = f"readable up to byte {found.good_bytes} of {len(data)}: {found.damage}"
+        level: Level = "warning" if path.name.endswith(layout.PART_SUFFIX) else "error"
+        yield Finding(level=level, check="file", message=message)
+        return
+    try:
+        with path.open("rb") as stream:
+            summary = make_reader(stream, validate_crcs=True).get_summary()
+    except (McapError, ValueError) as error:
+        yield Finding(level="error", check="index", message=f"the index cannot be read: {error}")
+        return
+    if summary is None or summary.statistics is None:
+        yield Finding(level="warning", check="index", message="has no index: other tools open it slowly")
+    elif summary.statistics.chunk_count != len(found.chunks):
+        message = f"the index names {summary.statistics.chunk_count} chunks, the file has {len(found.chunks)}"
+        yield Finding(level="error", check="index", message=message)
+
+
+def _outcome(trace: Trace) -> Iterator[Finding]:
+    outcome = trace.record.outcome
+    if outcome is None and trace.record.source != "imported":
+        yield Finding(level="warning", check="outcome", message="has no outcome: the recording has not ended")
+    elif outcome not in ("complete", None):
+        yield Finding(level="warning", check="outcome", message=f"the run ended as {outcome!r}")
+    if len(trace) == 0:
+        yield Finding(level="warning", check="samples", message="has no samples")
+
+
+def _ticks(trace: Trace) -> Iterator[Finding]:
+    if trace.tick is None or len(trace) < 2:
+        return
+    steps = np.diff(trace.tick)
+    if (steps <= 0).any():
+        row = int(np.argmax(steps <= 0)) + 1
+        yield Finding(level="error", check="ticks", message=f"tick {trace.tick[row]} follows {trace.tick[row - 1]}")
+        return
+    gaps = int((steps > 1).sum())
+    if gaps:
+        first = float(trace.time[int(np.argmax(steps > 1))])
+        message = f"{trace.missing} samples are missing in {gaps} gaps, the first after {first:.3f} s"
+        yield Finding(level="warning", check="gaps", message=message)
+    counted = trace.record.counters.get(MISSING_COUNTER)
+    if counted is not None and counted < trace.missing:
+        message = f"{trace.missing} samples are missing, the link counted {counted:.0f}"
+        yield Finding(level="error", check="counters", message=message)
+    period = trace.record.period
+    if period is not None:
+        off = np.abs((trace.time - trace.time[0]) - (trace.tick - trace.tick[0]) * period) / period
+        if off.max() > PERIODS_OFF:
+            row = int(off.argmax())
+            message = f"time is {off[row]:.3g} periods off the tick at sample {row}"
+            yield Finding(level="error", check="time", message=message)
+    if trace.host_time is not None:
+        lateness = (trace.host_time - trace.host_time[0]) - (trace.time - trace.time[0])
+        spread = float(np.quantile(lateness, 0.99) - np.quantile(lateness, 0.01)) * 1e3
+        message = f"arrival against the board's clock: {spread:.2f} ms between the 1st and the 99th percentile"
+        yield Finding(level="note", check="arrival", message=message)
+
+
+def _events(trace: Trace) -> Iterator[Finding]:
+    last = trace.record.period or 0.0
+    last += float(trace.time[-1]) if len(trace) else 0.0
+    outside = [event for event in trace.events if not 0 <= event.time <= last]
+    if outside and len(trace):
+        event = outside[0]
+        message = f"{len(outside)} events lie outside the record, the first {event.kind!r} at {event.time:.3f} s"
+        yield Finding(level="note", check="events", message=message)
+    if trace.record.outcome == "complete":
+        bad = [event.kind for event in trace.events if event.kind in ("fault", "link_lost", "restart", "stop")]
+        if bad:
+            message = f"claims to be complete, but has events {', '.join(sorted(set(bad)))}"
+            yield Finding(level="error", check="events", message=message)
+
+
+def _signals(trace: Trace) -> Iterator[Finding]:
+    if trace.set_point is None or trace.error is None or len(trace) == 0:
+        return
+    for column, joint in enumerate(trace.joints):
+        count = _rad_a_count(trace.record.machine, joint)
+        if count is None:
+            message = f"joint {joint}: its sensor is not known, so error = set point − position was not checked"
+            yield Finding(level="note", check="error", message=message)
+            continue
+        off = np.abs(trace.set_point[:, column] - trace.position[:, column] - trace.error[:, column]) / count
+        wrong = int((off > COUNTS_OFF).sum())
+        if wrong:
+            row = int(off.argmax())
+            message = (
+                f"joint {joint}: error is not set point − position in {wrong} of {len(trace)} samples; "
+                f"worst {off[row]:.1f} counts at {trace.time[row]:.3f} s"
+            )
+            yield Finding(level="error", check="error", message=message)
+
+
+def _rad_a_count(machine: Machine | None, joint: int) -> float | None:
+    """Size of a sensor's count in rad (m), None where no sensor is known."""
+    if machine is None or joint > len(machine.joints):
+        return None
+    sensor = machine.joint(joint).sensor
+    return None if sensor is None else float(sensor.range.value) / 2**sensor.bits
