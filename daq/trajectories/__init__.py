@@ -2,9 +2,10 @@
 
 from daq.trajectories.move import MOVE_SPEED, plan_move
 from daq.trajectories.planner import plan, start_angles
+from daq.trajectories.presets import PRESETS, Preset, preset
 from daq.trajectories.set_points import Mark, Plan, PlanPreview, control_period, make_plan, snapped
 
 __all__ = [
-    "MOVE_SPEED", "Mark", "Plan", "PlanPreview", "control_period", "make_plan", "plan", "plan_move", "snapped",
-    "start_angles",
+    "MOVE_SPEED", "PRESETS", "Mark", "Plan", "PlanPreview", "Preset", "control_period", "make_plan", "plan",
+    "plan_move", "preset", "snapped", "start_angles",
 ]  # fmt: skip

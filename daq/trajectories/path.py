@@ -18,9 +18,10 @@ def path(move: Path, joints: tuple[int, ...], start: Floats, within: Floats, per
 
     Raises SpecError when it does not: the arm has to be brought there first.
     """
+    for number, row in enumerate(move.positions, start=1):
+        if len(row) != len(joints):
+            raise SpecError(f"path: row {number} has {len(row)} angles, the experiment has {len(joints)} joints")
     points = np.array(move.positions)
-    if points.ndim != 2 or points.shape[1] != len(joints):
-        raise SpecError(f"path: rows of different length; every row needs {len(joints)} angles")
     for column, joint in enumerate(joints):
         if abs(points[0, column] - start[column]) > within[column]:
             raise SpecError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Several
+from dataclasses import replace
 
 import numpy as np
 
@@ -126,7 +127,9 @@ def _simple_piece(
             piece = multisine(move, joints, amplitudes, period)
         case Cubic():
             piece = cubic(move, amplitudes, period)
-    return piece
+    if len(joints) > 1:
+        return piece
+    return replace(piece, marks=tuple(replace(mark, joint=joints[0]) for mark in piece.marks))
 
 
 def _require_joints(spec: ExperimentSpec, machine: Machine) -> None:

@@ -1,0 +1,139 @@
+"""Experiments that have a name: the source's ramp, the set that tells hidden effects apart, and a trace to hold out.
+
+The diagnostic set has five parts, each for effects that the others confuse: A excites one joint at a time, B reverses
+slowly (friction), C makes small steps (quantiser, dead zone, backlash), D goes fast and saturates every drive (gain
+against viscous friction against sensor gain, supply limit), E repeats ramps and slow reversals at a second posture
+(load, posture-dependent effects). Amplitudes and times are choices, made for the MA2000's joints 1–3 at P = 2: its
+drives saturate at 63.5 ADC counts (4.2°) of error, and its set points pause at 127 (8.4°).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import (
+    Cubic,
+    ExperimentSpec,
+    Multisine,
+    Pause,
+    Ramp,
+    Segment,
+    Sequence,
+    Simple,
+    SlowRamp,
+    Staircase,
+    Step,
+)
+
+MAJOR = (1, 2, 3)
+
+
+@dataclass(frozen=True)
+class Preset:
+    """An experiment by name, with one line that says what it is for."""
+
+    description: str
+    spec: ExperimentSpec
+
+
+def preset(name: str) -> Preset:
+    """The preset of that name. Raises SpecError with the names there are."""
+    if name not in PRESETS:
+        raise SpecError(f"preset {name!r}: there is none of that name; there are {', '.join(PRESETS)}")
+    return PRESETS[name]
+
+
+def _by_joint(*degrees: float) -> dict[int, float]:
+    return {joint: math.radians(amplitude) for joint, amplitude in zip(MAJOR, degrees, strict=True)}
+
+
+def _segment(move: Simple, *joints: int) -> Segment:
+    return Segment(move=move, joints=joints or None)
+
+
+def _there_and_back(degrees: tuple[float, ...], duration: float, rest: float, *joints: int) -> list[Segment]:
+    """A ramp out, a rest, a ramp back, a rest; one value in `degrees` a joint."""
+    segments = []
+    for sign in (1.0, -1.0):
+        amplitude = {j: sign * math.radians(a) for j, a in zip(joints or MAJOR, degrees, strict=True)}
+        segments.append(_segment(Ramp(amplitude=amplitude, duration=duration), *joints))
+        if rest:
+            segments.append(_segment(Pause(duration=rest)))
+    return segments
+
+
+def _one_joint_at_a_time() -> list[Segment]:
+    return [segment for joint in MAJOR for segment in _there_and_back((21.6,), 0.65, 0.85, joint)]
+
+
+def _slow_reversals() -> list[Segment]:
+    ratios = ((5.0, 3.0, -2.0), (-2.0, 5.0, 3.0), (3.0, -2.0, 5.0))
+    speed = math.radians(5.0)
+    return [_segment(SlowRamp(amplitude=_by_joint(*ratio), speed=speed, reversals=3)) for ratio in ratios]
+
+
+def _small_steps() -> list[Segment]:
+    return [
+        _segment(Staircase(amplitude=_by_joint(3 * size, -3 * size, 3 * size), steps=3, dwell=0.5))
+        for size in (0.3, 1.0, 3.0)
+    ]
+
+
+def _fast_and_saturating() -> list[Segment]:
+    segments = []
+    for size, rest in ((3.0, 0.58), (-3.0, 0.58), (7.5, 0.78), (-7.5, 0.78)):
+        segments += [_segment(Step(amplitude=math.radians(size))), _segment(Pause(duration=rest))]
+    # Joint 2 is the slow one: about 43 °/s is all that its drive can do.
+    segments += _there_and_back((15.0, 9.0, 15.0), 0.22, 0.78)
+    segments += _there_and_back((30.0, 18.0, 30.0), 0.42, 0.98)
+    return segments + _there_and_back((30.0,), 0.70, 0.0, 2)
+
+
+def _second_posture() -> list[Segment]:
+    there = (40.0, 35.0, -50.0)
+    back = tuple(-angle for angle in there)
+    slow = SlowRamp(amplitude=_by_joint(4.0, -6.0, 6.0), speed=math.radians(4.0), reversals=3)
+    return [
+        _segment(Cubic(amplitude=_by_joint(*there), duration=3.0)),
+        _segment(Pause(duration=0.5)),
+        *_there_and_back((21.6, 21.6, 21.6), 0.66, 0.84),
+        _segment(slow),
+        _segment(Pause(duration=0.5)),
+        _segment(Cubic(amplitude=_by_joint(*back), duration=3.0)),
+    ]
+
+
+def _sequence(name: str, segments: list[Segment]) -> ExperimentSpec:
+    return ExperimentSpec(trajectory=Sequence(segments=tuple(segments)), joints=MAJOR, hold=1.0, name=name)
+
+
+PARTS = {
+    "a": ("one joint at a time, ±21.6° in 0.65 s", _one_joint_at_a_time()),
+    "b": ("slow reversals at 2 to 5 °/s, another ratio of the joints each time", _slow_reversals()),
+    "c": ("staircases of 0.3°, 1° and 3°", _small_steps()),
+    "d": ("steps and fast ramps of 3° to 30° that saturate every drive", _fast_and_saturating()),
+    "e": ("ramps and slow reversals at a second posture", _second_posture()),
+}
+
+PRESETS: dict[str, Preset] = {
+    "ramp": Preset("the source's experiment: joints 1-3 through 21.6° in 0.65 s", ExperimentSpec(name="ramp")),
+    "diagnostic": Preset(
+        "parts a to e one after the other, about 55 s: tells hidden effects apart",
+        _sequence("diagnostic", [segment for _, segments in PARTS.values() for segment in segments]),
+    ),
+    **{
+        f"diagnostic-{letter}": Preset(description, _sequence(f"diagnostic-{letter}", segments))
+        for letter, (description, segments) in PARTS.items()
+    },
+    "held-out": Preset(
+        "10 s of multisine that no fit has seen, to judge a model by",
+        ExperimentSpec(
+            trajectory=Multisine(amplitude=_by_joint(12.0, 8.0, 12.0), lowest=0.1, highest=0.8, tones=8, seed=1991),
+            joints=MAJOR,
+            hold=1.0,
+            name="held-out",
+        ),
+    ),
+}

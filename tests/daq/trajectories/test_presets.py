@@ -1,0 +1,65 @@
+"""Named experiments: they are allowed on the machine that ships, and take the time they say."""
+
+import math
+
+import numpy as np
+import pytest
+
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import ExperimentSpec
+from daq.safety import check_plan
+from daq.trajectories import PRESETS, Plan, plan, preset, start_angles
+from tests.daq.trajectories.machines import MA2000
+
+
+def made(name: str) -> Plan:
+    spec = preset(name).spec
+    return plan(spec, MA2000, start_angles(spec, MA2000))
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_preset_is_allowed_on_the_ma2000(name: str) -> None:
+    assert check_plan(made(name), MA2000, MA2000.limits) == []
+
+
+@pytest.mark.parametrize("name", [name for name in PRESETS if name != "ramp"])
+def test_all_but_the_ramp_end_where_they_began(name: str) -> None:
+    plan = made(name)
+    assert (plan.postures[-1] == plan.postures[0]).all()
+
+
+def test_the_diagnostic_set_takes_about_55_seconds() -> None:
+    assert made("diagnostic").duration == pytest.approx(55, abs=2.5)
+
+
+def test_the_ramp_is_the_default_experiment() -> None:
+    assert preset("ramp").spec == ExperimentSpec(name="ramp")
+
+
+def test_part_a_moves_one_joint_at_a_time() -> None:
+    speeds = np.diff(made("diagnostic-a").angles, axis=0) != 0
+    assert speeds.any(axis=0)[:3].all()
+    assert speeds.sum(axis=1).max() == 1
+
+
+def test_part_b_is_slow() -> None:
+    speeds = np.abs(np.diff(made("diagnostic-b").angles, axis=0)) / 0.02
+    assert math.degrees(speeds.max()) == pytest.approx(5)
+
+
+def test_part_d_asks_every_drive_for_more_than_its_dac_has() -> None:
+    counts = MA2000.calibration(1).rad_per_count
+    plan = made("diagnostic-d")
+    steps = np.abs(np.diff(plan.angles, axis=0)[plan.jumps[1:]]).max(axis=0)[:3] / counts
+    assert (steps * 2 > 127).all()
+
+
+def test_part_e_is_at_another_posture() -> None:
+    plan = made("diagnostic-e")
+    middle = plan.angles[len(plan) // 2, :3] - plan.angles[0, :3]
+    assert (np.abs(middle) > math.radians(25)).all()
+
+
+def test_an_unknown_preset_is_refused_with_the_names_there_are() -> None:
+    with pytest.raises(SpecError, match=r"preset 'dance': .* ramp, diagnostic, diagnostic-a"):
+        preset("dance")
