@@ -76,11 +76,13 @@ class Finished(_Message):
 
 
 class Failed(_Message):
-    """Nothing was recorded: why, in one line, and the exit code that goes with it."""
+    """Nothing was recorded: why, in one line, and the exit code that goes with it. `needs_consent`: the robot is real
+    and waits for the operator's word."""
 
     kind: Literal["failed"] = "failed"
     message: str
     exit_code: int
+    needs_consent: bool = False
 
 
 Report = Annotated[Progress | EventHappened | Sampled | Finished | Failed, Field(discriminator="kind")]

@@ -10,12 +10,12 @@ from __future__ import annotations
 import contextlib
 import os
 import socket
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import platformdirs
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from daq.contracts.errors import ReachError
@@ -48,22 +48,33 @@ class StopAttempt:
 
 
 def runtime_folder() -> Path:
-    """Folder of the stop sockets; readable by its owner alone unless DAQ_RUNTIME_FOLDER names a shared one."""
+    """Folder of the stop sockets: DAQ_RUNTIME_FOLDER, else the session's own, else one of this user's under /tmp."""
     if FOLDER_VARIABLE in os.environ:
         return Path(os.environ[FOLDER_VARIABLE])
-    return Path(platformdirs.user_runtime_dir("ma2000-daq"))
+    session = os.environ.get("XDG_RUNTIME_DIR")
+    if session and Path(session).is_dir():
+        return Path(session) / "ma2000-daq"
+    return Path(tempfile.gettempdir()) / f"ma2000-daq-{os.getuid()}"
+
+
+def _own_folder() -> Path:
+    """The folder, made if need be. Raises ReachError when it is another user's: /tmp belongs to everyone."""
+    folder = runtime_folder()
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if FOLDER_VARIABLE not in os.environ and folder.stat().st_uid != os.getuid():
+        raise ReachError(f"stop socket folder {folder} belongs to another user: set {FOLDER_VARIABLE}")
+    return folder
 
 
 @contextlib.contextmanager
 def stop_listener(robot: str) -> Iterator[socket.socket]:
     """A listening socket for stop requests of one robot, removed at the end. Raises ReachError when it cannot be made:
     a robot that cannot be stopped from outside is not moved."""
-    folder = runtime_folder()
-    path = folder / f"{robot}-{os.getpid()}.sock"
+    path = runtime_folder() / f"{robot}-{os.getpid()}.sock"
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         try:
-            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            _own_folder()
             path.unlink(missing_ok=True)
             listener.bind(str(path))
             listener.listen(16)

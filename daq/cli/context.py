@@ -45,13 +45,24 @@ class Invocation:
 
     @property
     def port(self) -> str:
-        """The port of the command line, of the configuration, or the mock: said aloud when it is the mock by default."""
+        """The port of the command line or the configuration; the mock by default, which is then said aloud."""
         if self.port_option is not None:
             return self.port_option
         if self.settings.robot.port is None and not self.told:
             self.told = True
             console().print("No robot is configured: using the mock controller (no arm moves). See `daq config show`.")
         return self.settings.port
+
+    @property
+    def memory_map_text(self) -> str | None:
+        """Text of the configured memory map; None for the one that ships. Raises SpecError."""
+        path = self.settings.robot.memory_map
+        if path is None:
+            return None
+        from daq.config.robot_files import load_memory_map
+
+        load_memory_map(path)
+        return path.read_text("utf-8")
 
     @property
     def trace_folder(self) -> Path:

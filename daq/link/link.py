@@ -83,6 +83,11 @@ class Link:
         return self._endpoint.control
 
     @property
+    def bytes_per_second(self) -> float:
+        """What the line carries in each direction; infinite where nothing limits it."""
+        return self._endpoint.bytes_per_second
+
+    @property
     def lock_step(self) -> bool:
         """Whether the controller's time stands still between requests."""
         return self._endpoint.lock_step

@@ -1,0 +1,5 @@
+"""`python -m daq.acquisition`."""
+
+from daq.acquisition.process import main
+
+raise SystemExit(main())

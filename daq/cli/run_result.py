@@ -1,0 +1,144 @@
+"""Carries out an experiment for the command line: dry run, consent, progress, result."""
+
+from __future__ import annotations
+
+import math
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from daq.cli.context import Invocation, console, print_json
+from daq.contracts.errors import SafetyError
+
+if TYPE_CHECKING:
+    from daq.acquisition.messages import Failed, Finished, Job
+    from daq.contracts.experiment import ExperimentSpec
+    from daq.contracts.machine import Machine
+
+_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+EXIT_CODES = {"complete": 0, "stopped": 6, "fault": 5, "interrupted": 5}
+
+
+def carry_out(
+    call: Invocation, spec: ExperimentSpec, *, folder: Path | None, dry_run: bool, consent: bool, as_json: bool
+) -> Finished | None:
+    """Runs `spec` as this invocation says, prints the result, and ends with its exit code unless it is complete.
+
+    Returns None for a dry run.
+    """
+    machine = call.settings.machine()
+    if dry_run:
+        preview(spec, machine, as_json)
+        return None
+    finished = acquire(call, spec, machine, folder or call.trace_folder, consent)
+    if as_json:
+        print_json(finished.model_dump(mode="json"))
+    else:
+        print_result(finished)
+    if finished.outcome != "complete":
+        raise typer.Exit(EXIT_CODES[finished.outcome])
+    return finished
+
+
+def acquire(call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Path, consent: bool) -> Finished:
+    """Runs `spec` in an acquisition process, showing its progress; Ctrl-C freezes the arm.
+
+    Where a real arm waits for consent and a person can be asked, asks. Raises AcquisitionFailedError.
+    """
+    from daq.acquisition.messages import Finished, Job
+
+    job = Job(
+        url=call.port,
+        machine=machine,
+        limits=machine.limits,
+        spec=spec,
+        folder=folder,
+        robot=call.settings.robot.name,
+        memory_map=call.memory_map_text,
+        moves_real_arm=consent,
+    )
+    end = _shown(job)
+    if not isinstance(end, Finished) and end.needs_consent and console().is_terminal:
+        if not typer.confirm(f"{job.url} is a real arm and will move. Is its workspace clear?", err=True):
+            raise AcquisitionFailedError("not agreed: nothing moved", end.exit_code)
+        end = _shown(job.model_copy(update={"moves_real_arm": True}))
+    if not isinstance(end, Finished):
+        raise AcquisitionFailedError(end.message, end.exit_code)
+    return end
+
+
+def _shown(job: Job) -> Finished | Failed:
+    """One acquisition process, its progress and events on the terminal, Ctrl-C passed on as a stop."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from daq.acquisition import messages
+    from daq.acquisition.parent import Acquisition
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[text]}"), TimeElapsedColumn())
+    with Acquisition(job) as process, Progress(*columns, console=console(), transient=True) as bar:
+        handlers = {number: signal.signal(number, lambda *_: process.stop()) for number in _STOP_SIGNALS}
+        task = bar.add_task(job.spec.trajectory.kind, total=1.0, text="connecting")
+        try:
+            for report in process:
+                if isinstance(report, messages.Progress):
+                    bar.update(task, completed=report.fraction, text=report.text)
+                elif isinstance(report, messages.EventHappened) and report.event.kind not in ("start", "end"):
+                    event = report.event
+                    bar.console.print(
+                        f"[dim]{event.time:8.2f} s[/dim]  {event.kind.replace('_', ' ')}: {event.message}"
+                    )
+                elif isinstance(report, messages.Finished | messages.Failed):
+                    return report
+        finally:
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
+    raise AssertionError("an acquisition always ends with a report")
+
+
+class AcquisitionFailedError(SafetyError):
+    """What the acquisition process reported instead of a trace, with its own exit code."""
+
+    def __init__(self, message: str, exit_code: int) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code  # type: ignore[misc]
+
+
+def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
+    """What the motion would be, and what speaks against it. Raises SafetyError when something does."""
+    from daq.safety import check_plan, unchecked
+    from daq.trajectories import plan, start_angles
+
+    motion = plan(spec, machine, start_angles(spec, machine))
+    shown = motion.preview()
+    violations = check_plan(motion, machine, machine.limits)
+    if as_json:
+        print_json({"preview": shown.as_data(), "violations": [str(v) for v in violations]})
+    else:
+        every = f"every {shown.period * 1e3:g} ms"
+        print(f"{spec.trajectory.kind}: {shown.duration:.2f} s, {shown.set_points} set points {every}")
+        for joint in shown.joints:
+            if joint.moves:
+                angles = [math.degrees(a) for a in (joint.start, joint.end, joint.lowest, joint.highest)]
+                print(
+                    f"  joint {joint.joint}: {angles[0]:.2f}° → {angles[1]:.2f}°, between {angles[2]:.2f}° and "
+                    f"{angles[3]:.2f}°, at most {math.degrees(joint.top_speed):.1f}°/s"
+                )
+        for line in unchecked(machine, machine.limits):
+            print(f"  {line}")
+    if violations:
+        raise SafetyError(f"refused: {'; '.join(map(str, violations))}")
+    if not as_json:
+        print("  nothing speaks against it; nothing was sent")
+
+
+def print_result(finished: Finished) -> None:
+    """The end of a run, for people."""
+    counters = finished.counters
+    print(f"{finished.outcome}: {finished.samples} samples, {finished.missing} missing" + (
+        f" — {finished.reason}" if finished.reason else ""
+    ))  # fmt: skip
+    told = ("retries", "damaged", "torn", "missed_set_points", "restarts")
+    print("link: " + ", ".join(f"{name.replace('_', ' ')} {counters.get(name, 0):.0f}" for name in told))
+    print(f"trace: {finished.trace}")

@@ -1,0 +1,41 @@
+"""Snapshots of the board in counts, turned into rows in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from daq.contracts.machine import Machine
+from daq.contracts.sample import SampleRow
+from daq.driver import BoardSnapshot
+
+
+class RowMaker:
+    """Turns the snapshots of one record into rows. Time 0 is the first tick it is given.
+
+    Raises SpecError for joints without sensor or DC motor.
+    """
+
+    def __init__(self, machine: Machine, joints: Sequence[int], period: float) -> None:
+        self.joints = tuple(joints)
+        self._period = period
+        self._calibrations = [machine.calibration(joint) for joint in joints]
+        self._scales = [machine.joint(joint).dc_motor.scale for joint in joints]
+        self._first: int | None = None
+
+    def row(self, snapshot: BoardSnapshot) -> SampleRow:
+        """One period, angles in rad, drive in volts at the motor before any supply limit."""
+        if self._first is None:
+            self._first = snapshot.tick
+        readings = [snapshot[joint] for joint in self.joints]
+        both = list(zip(self._calibrations, readings, strict=True))
+        return SampleRow(
+            tick=snapshot.tick,
+            time=(snapshot.tick - self._first) * self._period,
+            host_time=snapshot.host_time,
+            set_point=tuple(own.posture_to_rad(reading.set_point) for own, reading in both),
+            position=tuple(own.counts_to_rad(reading.position) for own, reading in both),
+            error=tuple(own.rad_per_count * reading.error for own, reading in both),
+            drive=tuple(scale.counts_to_volts(r.power) for scale, r in zip(self._scales, readings, strict=True)),
+            power_raw=tuple(reading.power for reading in readings),
+            status=int(snapshot.flags),
+        )
