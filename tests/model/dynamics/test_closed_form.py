@@ -1,0 +1,181 @@
+"""The generated closed form is that of its sources, and describes the same arm as the recursions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from model.dynamics import effective_inertia, recursive, three_joint, three_joint_motion
+from model.dynamics.dual import DUAL_STEP
+from model.dynamics.effective_inertia import effective_parameters, has_closed_form
+from model.dynamics.rod_arm import LENGTH_2, PUBLISHED_INERTIA, SIZE, RodArm, effective_from_rods
+from model.generation.printing import source_hash, text_hash
+from model.kinematics.chain import Chain, ChainError, FloatArray, Joint
+from tests.model.dynamics.chains import OFFSET_ARM, TABLE_7_9, dual, random_chain, random_link, random_state
+
+UPPER = np.triu_indices(3)
+REGENERATE = "run python -m model.generation and commit the result"
+C_HEADER = Path(__file__).parents[3] / "benchmarks" / "three_joint.h"
+
+
+def general_arm(seed: int) -> Chain:
+    """Links of any shape on the closed form's geometry."""
+    rng = np.random.default_rng(seed)
+    joints = (
+        Joint(alpha=np.pi / 2, d=0.3, rotor_inertia=0.3),
+        Joint(a=0.3, d=0.07, rotor_inertia=0.2),
+        Joint(a=0.2, d=-0.04, alpha=0.6, rotor_inertia=0.1),
+    )
+    links = tuple(random_link(rng) for _ in joints)
+    return Chain(joints, links, gravity=np.array([1.0, -2.0, -9.0]), load=0.7, load_position=rng.normal(size=3))
+
+
+@numba.njit
+def evaluate(q: FloatArray, v: FloatArray, torque: FloatArray, p: FloatArray):  # type: ignore[no-untyped-def]  # noqa: ANN201
+    level = three_joint.mass_matrix_and_bias(q[1], q[2], v[0], v[1], v[2], p)
+    inertia = three_joint.mass_matrix(q[1], q[2], p)
+    velocity = three_joint.velocity_torques(q[1], q[2], v[0], v[1], v[2], p)
+    gravity = three_joint.gravity_torques(q[0], q[1], q[2], p)
+    tilted = three_joint.horizontal_gravity_torques(q[0], q[1], q[2], p)
+    t1, t2, t3 = torque[0] - tilted[0], torque[1] - tilted[1], torque[2] - tilted[2]
+    motion = three_joint_motion.accelerations(q[1], q[2], v[0], v[1], v[2], t1, t2, t3, p)
+    return level, inertia, velocity, gravity, tilted, motion
+
+
+@pytest.mark.parametrize("chain", [TABLE_7_9.chain(), OFFSET_ARM.chain(), *map(general_arm, range(5))])
+def test_closed_form_agrees_with_the_recursion(chain: Chain) -> None:
+    arrays, p = chain.arrays(), effective_parameters(chain)
+    for seed in range(10):
+        q, v, torque = random_state(seed, 3)
+        level, inertia, velocity, gravity, tilted, motion = evaluate(q, v, torque, p)
+        expected = recursive.mass_matrix(arrays, q)[UPPER]
+        np.testing.assert_allclose(inertia, expected, atol=1e-13)
+        np.testing.assert_allclose(level[:6], expected, atol=1e-13)
+        np.testing.assert_allclose(velocity, recursive.velocity_torques(arrays, q, v), atol=1e-12)
+        np.testing.assert_allclose(gravity, recursive.gravity_torques(arrays, q), atol=1e-12)
+        whole = np.asarray(level[6:]) + tilted
+        np.testing.assert_allclose(whole, np.asarray(velocity) + gravity, atol=1e-12)
+        free = recursive.forward_dynamics(arrays, q, v, torque)
+        np.testing.assert_allclose(motion, free, rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize("arm", [TABLE_7_9, OFFSET_ARM])
+def test_rods_have_the_effective_parameters_of_their_chain(arm: RodArm) -> None:
+    np.testing.assert_allclose(effective_from_rods(arm.vector()), effective_parameters(arm.chain()), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("mass", "load", "length", "excess"),
+    [
+        (0.2321, 1.0, 0.137, 0.22),  # table 7.2
+        (0.64424, 1.11327, 0.32245, 0.13),  # table 7.3
+        (0.229105, 1.017110, 0.129856, 0.22),  # table 7.5
+        (0.286792, 1.219998, 0.167525, 0.22),  # table 7.7
+        (0.290461, 1.250307, 0.168410, 0.22),  # table 7.9
+    ],
+)
+def test_published_inertia_exceeds_the_exact_one(mass: float, load: float, length: float, excess: float) -> None:
+    arm = replace(TABLE_7_9, mass_3=mass, load=load, length_3=length)
+    exact = effective_from_rods(arm.vector())[effective_inertia.I3_ZZ]
+    published = effective_from_rods(replace(arm, published_inertia=True).vector())[effective_inertia.I3_ZZ]
+    assert exact == pytest.approx(mass * length**2 / 3 + load * length**2)
+    assert published / exact - 1 == pytest.approx(excess, abs=0.005)
+
+
+def test_published_inertia_changes_nothing_but_the_inertia_of_link_3() -> None:
+    exact = effective_from_rods(OFFSET_ARM.vector())
+    published = effective_from_rods(replace(OFFSET_ARM, published_inertia=True).vector())
+    changed = {effective_inertia.NAMES[i] for i in np.flatnonzero(exact != published)}
+    assert changed == {"I3_ZZ", "I3_YY_XX"}
+
+
+def test_sensitivities_to_physical_parameters_are_exact() -> None:
+    rods = replace(OFFSET_ARM, published_inertia=True).vector()
+    q, v, torque = random_state(4, 3)
+    for parameter in range(SIZE):
+        if parameter == PUBLISHED_INERTIA:
+            continue
+        stepped = rods.astype(complex)
+        stepped[parameter] += 1j * DUAL_STEP
+        motion = evaluate(q.astype(complex), v.astype(complex), torque.astype(complex), effective_from_rods(stepped))[-1]
+        exact = np.imag(motion) / DUAL_STEP
+        wide = central_difference(rods, parameter, q, v, torque)
+        np.testing.assert_allclose(exact, wide, rtol=1e-6, atol=1e-6)
+
+
+def central_difference(
+    rods: FloatArray, parameter: int, q: FloatArray, v: FloatArray, torque: FloatArray
+) -> FloatArray:
+    step = 1e-5
+    sides = []
+    for sign in (1, -1):
+        moved = rods.copy()
+        moved[parameter] += sign * step
+        sides.append(np.asarray(evaluate(q, v, torque, effective_from_rods(moved))[-1]))
+    return (sides[0] - sides[1]) / (2 * step)
+
+
+def test_real_part_of_a_dual_evaluation_is_the_real_evaluation() -> None:
+    rods = OFFSET_ARM.vector()
+    stepped = rods.astype(complex)
+    stepped[LENGTH_2] += 1j * DUAL_STEP
+    q, v, torque = random_state(4, 3)
+    real = evaluate(q, v, torque, effective_from_rods(rods))[-1]
+    twin = evaluate(q.astype(complex), v.astype(complex), torque.astype(complex), effective_from_rods(stepped))[-1]
+    np.testing.assert_allclose(np.real(twin), real, rtol=1e-13)
+
+
+def test_recursion_gives_the_same_sensitivity_to_a_mass() -> None:
+    chain = random_chain(2, 4)
+    q, v, torque = (x.astype(complex) for x in random_state(2, 4))
+    arrays = dual(chain.arrays())
+    arrays.inertial[2, 0] += 1j * DUAL_STEP
+    exact = recursive.forward_dynamics(arrays, q, v, torque).imag / DUAL_STEP
+    sides = []
+    for sign in (1, -1):
+        moved = chain.arrays()
+        moved.inertial[2, 0] += sign * 1e-5
+        sides.append(recursive.forward_dynamics(moved, q.real.copy(), v.real.copy(), torque.real.copy()))
+    np.testing.assert_allclose(exact, (sides[0] - sides[1]) / 2e-5, rtol=1e-6, atol=1e-7)
+
+
+def test_generated_module_belongs_to_its_sources() -> None:
+    assert source_hash() == three_joint.SOURCE_HASH, REGENERATE
+    assert f"source {source_hash()} " in C_HEADER.read_text(encoding="utf-8"), REGENERATE
+
+
+def test_generated_module_was_not_edited() -> None:
+    text = Path(three_joint.__file__).read_text(encoding="utf-8")
+    _, body = text.split(f'TEXT_HASH = "{three_joint.TEXT_HASH}"\n\n\n')
+    assert text_hash(body) == three_joint.TEXT_HASH, REGENERATE
+    header = C_HEADER.read_text(encoding="utf-8")
+    body = header.split("#include <math.h>\n\n")[1]
+    assert f"text {text_hash(body)} " in header, REGENERATE
+
+
+@pytest.mark.slow
+def test_generating_again_gives_the_committed_module() -> None:
+    from model.generation.derivation import derive, in_effective_parameters
+    from model.generation.expressions import routines
+    from model.generation.printing import c_header, python_module
+
+    generated = routines(in_effective_parameters(derive()))
+    assert python_module(generated) == Path(three_joint.__file__).read_text(encoding="utf-8")
+    assert c_header(generated) == C_HEADER.read_text(encoding="utf-8")
+
+
+def test_layout_names_are_the_index_constants() -> None:
+    assert len(effective_inertia.NAMES) == effective_inertia.SIZE
+    for index, name in enumerate(effective_inertia.NAMES):
+        assert getattr(effective_inertia, name) == index
+
+
+def test_a_chain_of_another_shape_has_no_closed_form() -> None:
+    assert has_closed_form(TABLE_7_9.chain())
+    assert not has_closed_form(random_chain(1, 3))
+    with pytest.raises(ChainError, match="closed form needs three revolute joints"):
+        effective_parameters(random_chain(1, 2))
