@@ -1,0 +1,18 @@
+"""`daq mock`: a mock controller that others can connect to, as a process of its own."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import typer
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []})
+def mock(context: typer.Context) -> None:
+    """Start the mock controller; all options are its own: `daq mock --help`."""
+    # The mock is reached through a port, never by a call: this process becomes it.
+    sys.stdout.flush()
+    os.execv(sys.executable, [sys.executable, "-m", "mock_controller", *context.args])
