@@ -1,0 +1,165 @@
+"""A plan is judged as a whole before anything moves; every objection is one clear line."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.limits import JointLimits, Limits
+from daq.safety import check_move_to_start, check_plan, largest_step, unchecked
+from daq.trajectories import make_plan, plan, plan_move, start_angles
+from tests.daq.safety.arms import COUNT, LIMITS, MA2000, REST, limits, plan_of
+
+
+def test_the_default_ramp_is_allowed() -> None:
+    spec = ExperimentSpec()
+    assert check_plan(plan(spec, MA2000, start_angles(spec, MA2000)), MA2000, LIMITS) == []
+
+
+@pytest.mark.parametrize(
+    ("joint", "target", "line"),
+    [
+        (2, 3.95, r"joint 2: 226\.32° at 10\.00 s: allowed are -44\.69° to 224\.60°"),
+        (2, -0.8, r"joint 2: -45\.84° at 10\.00 s: allowed are -44\.69° to 224\.60°"),
+        (4, 1.58, r"joint 4: 90\.53° at 10\.00 s: allowed are -89\.38° to 89\.38°"),
+    ],
+)
+def test_joint_range(joint: int, target: float, line: str) -> None:
+    way = np.linspace(REST[joint - 1], target, 501)
+    (found, *_) = [v for v in check_plan(plan_of(joint, *way), MA2000, LIMITS) if v.rule == "range"]
+    assert str(found) == line.replace("\\", "")
+    assert (found.joint, found.time, found.value) == (joint, pytest.approx(10.0), pytest.approx(target))
+
+
+def test_range_without_limits_is_still_the_range_of_set_points() -> None:
+    way = np.linspace(math.pi, math.pi + math.radians(140), 1001)
+    (found,) = check_plan(plan_of(1, *way), MA2000, Limits())
+    assert str(found) == "joint 1: posture 1019 at 20.00 s: allowed are 0 to 999"
+    (found,) = check_plan(plan_of(1, *(2 * math.pi - way)), MA2000, Limits())
+    assert str(found) == "joint 1: posture -19 at 20.00 s: allowed are 0 to 999"
+
+
+def test_the_posture_next_to_a_limit_inside_it_is_allowed() -> None:
+    """Rest posture and limits are written in rad; set points are whole postures. Half a unit is not a violation."""
+    high = REST[0] + 0.1
+    inside = limits(joints=(JointLimits(high=high),))
+    assert check_plan(plan_of(1, REST[0], high + 0.002), MA2000, inside) == []
+    assert [v.rule for v in check_plan(plan_of(1, REST[0], high + 0.003), MA2000, inside)] == ["range"]
+
+
+def test_speed_is_that_of_the_planned_angles_not_of_the_rounded_set_points() -> None:
+    """At 0.118 rad/s half of all periods send one unit, which would be 0.236 rad/s, and half none."""
+    own = limits(joints=(JointLimits(speed=0.12),))
+    way = REST[0] + 0.118 * 0.02 * np.arange(100)
+    plan = plan_of(1, *way)
+    assert np.diff(plan.postures[:, 0]).max() * 1.5 * math.pi / 1000 / 0.02 > 0.12
+    assert check_plan(plan, MA2000, own) == []
+
+
+def test_too_fast_names_the_fastest_moment() -> None:
+    (found,) = check_plan(plan_of(1, math.pi, 3.15, 3.2, 3.21), MA2000, LIMITS)
+    assert str(found).startswith("joint 1: 143.2 °/s at 0.02 s: allowed are up to 91.7 °/s")
+
+
+def test_a_step_is_judged_by_its_size_and_not_by_its_speed() -> None:
+    assert check_plan(plan_of(1, math.pi, math.pi + 115 * COUNT, jumps=True), MA2000, LIMITS) == []
+    (found,) = check_plan(plan_of(1, math.pi, math.pi + 116 * COUNT, jumps=True), MA2000, LIMITS)
+    assert str(found) == (
+        "joint 1: step of 7.65° at 0.02 s: allowed are up to 7.58° (following-error limit less 12 counts)"
+    )
+
+
+def test_a_joint_of_smaller_range_may_make_smaller_steps() -> None:
+    assert largest_step(MA2000, LIMITS, 4) == pytest.approx(largest_step(MA2000, LIMITS, 1) / 1.5)  # type: ignore[operator]
+    assert largest_step(MA2000, Limits(), 1) is None
+
+
+def test_floor() -> None:
+    way = np.linspace(REST[1], math.radians(-44), 501)
+    (found,) = check_plan(plan_of(2, *way), MA2000, LIMITS)
+    assert str(found) == "end of link 3: height of -315 mm at 10.00 s: allowed are -300 mm and above"
+
+
+def test_reach() -> None:
+    way = np.linspace(math.radians(90), 0, 501)
+    assert check_plan(plan_of(3, *way), MA2000, limits(reach=0.4545)) == []
+    (found,) = check_plan(plan_of(3, *way), MA2000, limits(reach=0.45))
+    assert str(found) == "end of link 3: 454 mm from the base at 10.00 s: allowed are up to 450 mm"
+
+
+def test_the_floor_is_watched_between_set_points_too() -> None:
+    """Both ends of this jump are above the floor; in its middle the forearm points straight down, 311 mm deep."""
+    ends = np.tile(REST, (2, 1))
+    ends[:, 1] = math.radians(-30)
+    ends[:, 2] = np.radians([-90, -30])
+    jump = make_plan(MA2000, (3,), ends, np.array([False, True]))
+    for row in (0, 1):
+        assert check_plan(make_plan(MA2000, (), ends[row : row + 1]), MA2000, LIMITS) == []
+    (found,) = check_plan(jump, MA2000, limits(following_error_counts=None))
+    assert str(found) == "end of link 3: height of -311 mm at 0.01 s: allowed are -300 mm and above"
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_not_a_number_is_refused(bad: float) -> None:
+    good = plan_of(1, math.pi, 3.15, 3.16)
+    angles = good.angles.copy()
+    angles[2, 4] = bad
+    (found,) = check_plan(dataclasses.replace(good, angles=angles), MA2000, LIMITS)
+    assert str(found) == f"joint 5: set point of {bad} rad at 0.04 s: must be finite"
+    assert check_move_to_start(dataclasses.replace(good, angles=angles), MA2000, LIMITS)[0].rule == "finite"
+
+
+def test_limits_that_are_not_set_are_not_checked_and_said_to_be_so() -> None:
+    assert check_plan(plan_of(1, math.pi, 3.9), MA2000, Limits()) == []
+    lines = unchecked(MA2000, Limits(joints=(JointLimits(low=0, high=1, speed=1), JointLimits(low=0))))
+    assert lines == [
+        "joint 2: high, speed not set, not checked",
+        *(f"joint {joint}: low, high, speed not set, not checked" for joint in range(3, 7)),
+        "floor_height not set, not checked",
+        "reach not set, not checked",
+        "following_error_counts not set, not checked",
+        "following_error_time not set, not checked",
+    ]
+    assert unchecked(MA2000, LIMITS) == ["reach not set, not checked"]
+
+
+def test_an_arm_led_outside_its_limits_may_come_back_but_not_go_further() -> None:
+    outside = [*REST[:3], math.radians(89.8), *REST[4:]]
+    further = [*REST[:3], math.radians(89.95), *REST[4:]]
+    tight = limits(joints=(*LIMITS.joints[:3], JointLimits(low=-1.5, high=1.5, speed=2.0), *LIMITS.joints[4:]))
+    back = plan_move(MA2000, outside, REST.tolist())
+    assert [v.rule for v in check_plan(back, MA2000, tight)] == ["range"]
+    assert check_move_to_start(back, MA2000, tight) == []
+    away = plan_move(MA2000, REST.tolist(), further)
+    assert [v.rule for v in check_move_to_start(away, MA2000, tight)] == ["range"]
+
+
+def test_an_arm_below_the_floor_may_come_back_but_not_go_deeper() -> None:
+    below = [REST[0], math.radians(-43), *REST[2:]]
+    assert check_move_to_start(plan_move(MA2000, below, REST.tolist()), MA2000, LIMITS) == []
+    deeper = [REST[0], math.radians(-44), *REST[2:]]
+    assert check_move_to_start(plan_move(MA2000, below, deeper), MA2000, LIMITS)[0].rule == "floor"
+
+
+@given(st.integers(1, 6), st.lists(st.floats(-3, 3), min_size=2, max_size=8))
+def test_what_passes_is_within_every_limit(joint: int, offsets: list[float]) -> None:
+    plan = plan_of(joint, *(REST[joint - 1] + offset for offset in offsets))
+    own = LIMITS.joint(joint)
+    assert own.low is not None
+    assert own.high is not None
+    assert own.speed is not None
+    angles = plan.angles[:, joint - 1]
+    slack = abs(MA2000.calibration(joint).rad_per_posture_unit) / 2 + 1e-6
+    within = bool((angles >= own.low - slack).all() and (angles <= own.high + slack).all())
+    slow = bool((np.abs(np.diff(angles)) / 0.02 <= own.speed + 1e-6).all())
+    sent = bool(((plan.postures >= 0) & (plan.postures <= 999)).all())
+    if check_plan(plan, MA2000, LIMITS) == []:
+        assert within
+        assert slow
+        assert sent
+    if not (within and slow and sent):
+        assert check_plan(plan, MA2000, LIMITS)

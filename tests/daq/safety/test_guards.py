@@ -1,0 +1,240 @@
+"""What the guards say in each control period."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.limits import Limits
+from daq.safety import RestGuards, RunningGuards
+from daq.trajectories import plan, start_angles
+from firmware_protocol.commands import StatusFlag
+from tests.daq.safety.arms import COUNT, LIMITS, MA2000, REST, limits, row
+
+REST_POSTURES = {1: 500, 2: 333, 3: 500}
+
+
+def running(own: Limits = LIMITS, moving: tuple[int, ...] = (1, 2, 3)) -> RunningGuards:
+    return RunningGuards(MA2000, own, (1, 2, 3), moving)
+
+
+def test_an_arm_that_follows_is_left_alone() -> None:
+    guards = running()
+    for tick in range(5):
+        verdict = guards.check(row(tick, error=(20, 50, 15)), REST_POSTURES)
+        assert verdict == type(verdict)()
+
+
+@pytest.mark.parametrize(("error", "held"), [(127, False), (128, True), (-127, False), (-128, True)])
+def test_set_points_pause_when_the_error_leaves_127_counts(error: int, held: bool) -> None:
+    verdict = running().check(row(0, error=(0, error, 0)), {})
+    assert verdict.hold is held
+    assert [finding.kind for finding in verdict.findings] == (["pause"] if held else [])
+
+
+def test_they_go_on_when_it_is_back_inside() -> None:
+    guards = running()
+    assert guards.check(row(0, error=(130, 0, 0)), {}).hold
+    assert guards.check(row(1, error=(128, 0, 0)), {}).findings == ()
+    verdict = guards.check(row(2, error=(127, 0, 0)), {})
+    assert not verdict.hold
+    assert [(f.kind, f.message) for f in verdict.findings] == [("resume", "set points go on after 0.04 s")]
+
+
+def test_a_pause_that_lasts_is_a_fault() -> None:
+    guards = running()
+    verdicts = [guards.check(row(tick, error=(0, 0, 130)), {}) for tick in range(27)]
+    assert [bool(verdict.trips) for verdict in verdicts] == [False] * 26 + [True]
+    (trip,) = verdicts[-1].trips
+    assert trip.startswith("joint 3: positional error of 130 ADC counts, set points pause outside ±127; ")
+    assert trip.endswith("it lasted 0.52 s, allowed are 0.5 s")
+
+
+def test_time_in_a_pause_starts_anew_after_the_arm_was_back() -> None:
+    guards = running()
+    for tick in range(100):
+        assert not guards.check(row(tick, error=(130 if tick % 20 else 0, 0, 0)), {}).trips
+
+
+def test_without_a_time_limit_a_pause_may_last() -> None:
+    guards = running(limits(following_error_time=None))
+    assert not any(guards.check(row(tick, error=(130, 0, 0)), {}).trips for tick in range(1000))
+
+
+def test_without_a_following_error_limit_nothing_pauses() -> None:
+    assert not running(limits(following_error_counts=None)).check(row(0, error=(2000, 0, 0)), REST_POSTURES).hold
+
+
+@given(st.integers(0, 999), st.integers(-400, 400))
+def test_no_set_point_is_sent_that_is_further_from_the_arm_than_the_limit(posture: int, position: int) -> None:
+    """Whatever happens to host or cable then, the arm stops within the limit of where it is."""
+    verdict = running().check(row(0, error=(0, 0, 0), position=(position, 0, 0)), {1: posture})
+    away = (posture - 500) * 4096 / 1000 - position
+    assert verdict.hold is (abs(away) > 127)
+
+
+def test_a_stuck_joint_ends_in_a_fault_though_its_error_never_passes_the_limit() -> None:
+    guards = running()
+    trips: list[str] = []
+    posture, tick = 500, 0
+    while not trips and tick < 200:
+        verdict = guards.check(row(tick, error=((posture - 500) * 4.096, 0, 0), position=(0, 0, 0)), {1: posture + 2})
+        posture += 0 if verdict.hold else 2
+        trips += verdict.trips
+        tick += 1
+    assert posture == 530
+    assert trips[0].startswith("joint 1: next set point is 131 ADC counts from the arm")
+
+
+def lagging_arm(rate: float) -> tuple[int, bool]:
+    """Plays the default ramp to an arm that closes `rate` of its error each period; (periods, ever held)."""
+    spec = ExperimentSpec()
+    ramp = plan(spec, MA2000, start_angles(spec, MA2000))
+    guards, held = running(), False
+    arm = ramp.angles[0, :3].copy()
+    index = periods = 0
+    while index < len(ramp) - 1:
+        error = ramp.angles[index, :3] - arm
+        sample = row(periods, error=tuple(error / COUNT), position=tuple((arm - REST[:3]) / COUNT))
+        planned = {joint: int(ramp.postures[index + 1, joint - 1]) for joint in (1, 2, 3)}
+        verdict = guards.check(sample, planned)
+        assert not verdict.trips
+        held |= verdict.hold
+        index += 0 if verdict.hold else 1
+        arm += rate * error
+        periods += 1
+    return periods, held
+
+
+def test_the_default_ramp_passes_with_fifty_counts_of_following_error() -> None:
+    periods, held = lagging_arm(rate=0.2)  # settles at (1/0.2) · 10 counts behind
+    assert not held
+    assert periods == 158
+
+
+def test_a_slow_arm_makes_the_plan_wait_and_still_gets_it_all() -> None:
+    periods, held = lagging_arm(rate=0.05)
+    assert held
+    assert periods > 158
+
+
+@pytest.mark.parametrize(
+    ("ticks", "trips"),
+    [
+        ((5, 6, 7), ()),
+        ((5, 5), ("stale sample: tick 5 came twice",)),
+        ((5, 3), ("the board has restarted: tick 3 after 5",)),
+        ((5, 9), ()),
+        ((5, 16), ("10 control periods between ticks 5 and 16 have no sample; allowed are gaps up to 0.2 s",)),
+    ],
+)
+def test_ticks_must_go_on(ticks: tuple[int, ...], trips: tuple[str, ...]) -> None:
+    guards = running()
+    verdicts = [guards.check(row(tick), {}) for tick in ticks]
+    assert sum((verdict.trips for verdict in verdicts), ()) == trips
+
+
+def test_a_gap_is_told() -> None:
+    guards = running()
+    guards.check(row(5), {})
+    (finding,) = guards.check(row(9), {}).findings
+    assert (finding.kind, finding.message) == ("missing", "3 control periods between ticks 5 and 9 have no sample")
+
+
+def test_a_restarted_board_is_a_fault_even_if_its_ticks_go_on() -> None:
+    assert running().check(row(7, status=StatusFlag.RESTARTED), {}).trips == ("the board has restarted: tick 7",)
+
+
+def test_a_board_frozen_by_somebody_else_stops_the_run() -> None:
+    verdict = running().check(row(7, status=StatusFlag.FROZEN), {})
+    assert verdict.stop == "stopped on the board at tick 7"
+    assert not verdict.trips
+
+
+def test_silence_holds_at_once_and_trips_when_it_lasts() -> None:
+    guards = running()
+    guards.check(row(0, host_time=100.0), {})
+    assert guards.silent(100.1).hold
+    assert not guards.silent(100.19).trips
+    assert guards.silent(100.25).trips == ("no fresh sample for 0.25 s, allowed are 0.2 s",)
+
+
+def test_silence_of_an_arm_at_rest_trips_too() -> None:
+    guards = RestGuards(MA2000, LIMITS, (1, 2, 3))
+    guards.check(row(0, host_time=100.0))
+    assert not guards.silent(100.19).trips
+    assert guards.silent(100.25).trips == ("no fresh sample for 0.25 s, allowed are 0.2 s",)
+
+
+def test_silence_from_the_start_counts_from_the_first_wait() -> None:
+    guards = running()
+    assert not guards.silent(50.0).trips
+    assert guards.silent(50.3).trips
+
+
+def test_a_joint_that_should_stand_still_must_stay_at_its_set_point() -> None:
+    guards = running(moving=(1,))
+    assert not guards.check(row(0, error=(100, 40, 0)), {}).trips
+    assert guards.check(row(1, error=(100, -41, 0)), {}).trips == (
+        "joint 2: unexpected motion, 41 ADC counts from its set point, allowed are ±40",
+    )
+
+
+def test_an_arm_at_rest_must_stay_where_it_was() -> None:
+    guards = RestGuards(MA2000, LIMITS, (1, 2, 3))
+    assert not guards.check(row(0, position=(300, 0, 0))).trips
+    assert not guards.check(row(1, position=(340, 0, 0))).trips
+    assert guards.check(row(2, position=(341, 0, 0))).trips == (
+        "joint 1: unexpected motion, 41 ADC counts from where it was, allowed are ±40",
+    )
+
+
+def test_a_joint_led_by_hand_may_move() -> None:
+    guards = RestGuards(MA2000, LIMITS, (1, 2, 3), led=(1,))
+    guards.check(row(0))
+    assert not guards.check(row(1, position=(500, 0, 0))).trips
+
+
+def test_missed_set_points_are_counted_and_a_run_of_them_is_a_fault() -> None:
+    guards = running()
+    missed = StatusFlag.SET_POINT_MISSED
+    for tick in range(10):
+        verdict = guards.check(row(tick, status=missed), {})
+        assert [finding.kind for finding in verdict.findings] == ["missed_set_point"]
+        assert not verdict.trips
+    assert guards.check(row(10, status=missed), {}).trips == ("11 set points missed in a row, allowed are 10",)
+    assert guards.missed_set_points.missed == 11
+
+
+def test_a_set_point_taken_ends_the_run_of_missed_ones() -> None:
+    guards = running()
+    for tick in range(100):
+        status = StatusFlag.SET_POINT_MISSED if tick % 2 else 0
+        assert not guards.check(row(tick, status=status), {}).trips
+    assert guards.missed_set_points.missed == 50
+
+
+def test_a_set_point_other_than_sent_was_missed_too() -> None:
+    start = {1: 500}
+    guards = running()
+    assert not guards.check(row(0), start, expected=start).findings
+    (finding,) = guards.check(row(1), start, expected={1: 502}).findings
+    assert finding.message == "joint 1: tick 1 took posture 500, sent was 502"
+
+
+@given(st.lists(st.tuples(st.integers(-300, 300), st.integers(400, 600)), max_size=60))
+def test_guards_never_raise_and_never_release_what_they_should_hold(seen: list[tuple[int, int]]) -> None:
+    guards = running()
+    for tick, (error, posture) in enumerate(seen):
+        verdict = guards.check(row(tick, error=(error, 0, 0)), {1: posture})
+        ahead = (posture - 500) * 4.096 + error
+        assert verdict.hold is (abs(error) > 127 or abs(ahead) > 127 + 1e-9)
+
+
+def test_rest_is_a_posture_up_to_rounding() -> None:
+    """The tests above count from the rest posture, which lies on a posture for joints 1 and 3."""
+    assert MA2000.calibration(1).posture_to_rad(500) == pytest.approx(math.pi)
+    assert np.isfinite(REST).all()
