@@ -11,6 +11,7 @@ import argparse
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,8 +65,10 @@ def _messages(rng: np.random.Generator) -> Iterator[Message]:
         yield WriteBlock(0xFC00, rng.bytes(14))
 
 
-def traffic(rng: np.random.Generator) -> dict[int, Bytes]:
+@cache
+def traffic(seed: int) -> dict[int, Bytes]:
     """Whole frames, delimiters included, by their length: arrays of POOL rows."""
+    rng = np.random.default_rng(seed)
     pools: dict[int, list[bytes]] = {}
     while not pools or min(map(len, pools.values())) < POOL:
         sequence = int(rng.integers(0, 0x10000))
@@ -230,7 +233,7 @@ def _sent(frames: Bytes) -> set[Frame]:
 def measure(damage: Damage, frames_to_damage: int, seed: int) -> Rate:
     """Damages at least that many frames and counts those taken for something that was not sent."""
     rng = np.random.default_rng(seed)
-    pools = traffic(rng)
+    pools = traffic(seed)
     sent = {length: _sent(pool) for length, pool in pools.items()}
     frames_of_each = -(-frames_to_damage // len(pools))
     total = Rate(0, 0)

@@ -145,14 +145,14 @@ class FrameDecoder:
             self._partial += data[start:end]
 
     def _finish(self) -> Frame | None:
-        encoded = bytes(self._partial)
-        overrun = self._overrun
-        self.reset()
-        if overrun:
+        if self._overrun:
             self.oversized += 1
+            self._overrun = False
             return None
-        if not encoded:
+        if not self._partial:
             return None
+        encoded = bytes(self._partial)
+        self._partial.clear()
         try:
             return decode_body(encoded)
         except ProtocolError:

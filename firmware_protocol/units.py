@@ -94,14 +94,14 @@ class JointCalibration:
         """
         if not math.isfinite(angle_rad):
             raise UnitsError(f"joint {self.joint}: set point of {angle_rad} rad: must be finite")
-        posture = math.floor((angle_rad - self.angle_at_zero_rad) / self.rad_per_posture_unit + 0.5)
-        if not 0 <= posture < POSTURE_UNITS:
+        above_half = (angle_rad - self.angle_at_zero_rad) / self.rad_per_posture_unit + 0.5
+        if not 0 <= above_half < POSTURE_UNITS:
             low, high = sorted((self.posture_to_rad(0), self.posture_to_rad(POSTURE_UNITS - 1)))
             raise UnitsError(
-                f"joint {self.joint}: set point of {math.degrees(angle_rad):.2f}° is outside its range of "
+                f"joint {self.joint}: set point of {math.degrees(angle_rad):.6g}° is outside its range of "
                 f"{math.degrees(low):.2f}° to {math.degrees(high):.2f}°"
             )
-        return posture
+        return math.floor(above_half)
 
 
 @dataclass(frozen=True)

@@ -212,7 +212,7 @@ def vectors() -> dict[str, Any]:
         "protocol_version": c.PROTOCOL_VERSION,
         "crc": [{"data": data.hex(), "crc": f"{crc16(data):04x}"} for data in texts],
         "cobs": _cobs(),
-        "cobs_broken": ["", "00", "02", "0501020304", "0311", "010003", "ff" + "01" * 53, "01" * 56],
+        "cobs_broken": ["", "00", "02", "06010203", "0311", "010003", "ff" + "01" * 53, "01" * 56],
         "frames": _frames(),
         "damaged": _damaged(),
         "refused": _refused(),

@@ -1,0 +1,302 @@
+"""PROTOCOL.md: its tables, figures and examples are those of the code."""
+
+import json
+import math
+import re
+import struct
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from firmware_protocol import commands as c
+from firmware_protocol import framing
+from firmware_protocol.errors import ProtocolError
+from firmware_protocol.framing import Frame, FrameDecoder, crc16, encode_frame, stuff
+from firmware_protocol.memory_map import default_memory_map
+from firmware_protocol.message import Message
+from firmware_protocol.units import GAIN_MAX, counts_to_posture, posture_to_counts
+from tests.protocol.make_vectors import FILE, MESSAGES, as_json
+
+TEXT = (Path(FILE).parent / "PROTOCOL.md").read_text("utf-8")
+PERIOD_S = 0.020
+BITS_PER_BYTE = 10
+
+
+def section(title: str) -> str:
+    """Text under a heading, up to the next one."""
+    match = re.search(rf"^#+ (?:\d+\. )?{re.escape(title)}\n(.*?)(?=^#|\Z)", TEXT, re.DOTALL | re.MULTILINE)
+    assert match, title
+    return match.group(1)
+
+
+def table(title: str) -> list[list[str]]:
+    """Cells of the first table under a heading, without its head."""
+    rows = [line for line in section(title).splitlines() if line.startswith("|")]
+    return [[cell.strip().replace("`", "") for cell in row.strip("|").split("|")] for row in rows[2:]]
+
+
+# ---- frames
+
+
+def test_constants_of_the_frame() -> None:
+    constants = {name: int(value, 0) for name, value in table("Frames")}
+    assert constants == {
+        "largest payload, bytes": framing.MAX_PAYLOAD,
+        "header, bytes": framing.HEADER,
+        "CRC, bytes": framing.CRC_BYTES,
+        "largest body before stuffing, bytes": framing.MAX_BODY,
+        "largest frame with both delimiters, bytes": len(encode_frame(Frame(0, 0, bytes(framing.MAX_PAYLOAD)))),
+        "bytes that a frame adds to its payload": framing.FRAME_OVERHEAD,
+        "CRC of 31 32 33 34 35 36 37 38 39": crc16(b"123456789"),
+    }
+
+
+def test_figures_in_the_text_of_frames() -> None:
+    largest = framing.MAX_PAYLOAD + framing.FRAME_OVERHEAD
+    assert f"takes {largest * BITS_PER_BYTE / 115200 * 1000:.2f} ms at 115200 baud" in section("Frames")
+    assert f"up to a zero, {framing.MAX_ENCODED} at most. When a {framing.MAX_ENCODED + 1}th" in section("Receiving")
+    assert f"Version of the protocol: {c.PROTOCOL_VERSION}." in TEXT
+
+
+def test_a_frame_step_by_step() -> None:
+    steps = {step: bytes.fromhex(data) for step, data in table("A frame step by step")}
+    request = c.WriteSetPoints(((1, 500), (2, 508), (3, 515)))
+    frame = c.to_frame(1, request)
+    header = bytes((len(frame.payload), 1, 0, frame.opcode))
+    with_crc = header + frame.payload + crc16(header + frame.payload).to_bytes(2, "big")
+    assert steps == {
+        "payload": request.pack(),
+        "header and payload": header + frame.payload,
+        "with CRC": with_crc,
+        "stuffed": stuff(with_crc),
+        "on the line": encode_frame(frame),
+    }
+
+
+# ---- messages
+
+CODES = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i8": "b", "i16": "h"}
+FIELD = r"\w+:[ui]\d+"
+
+
+def read_payload(layout: str, payload: bytes) -> dict[str, list[int]]:
+    """A payload read by nothing but the layout that the document gives: values by field, in order."""
+    values: dict[str, list[int]] = {}
+    place = 0
+
+    def take(field: str) -> int:
+        nonlocal place
+        name, kind = field.split(":")
+        (value,) = struct.unpack_from("<" + CODES[kind], payload, place)
+        place += struct.calcsize(CODES[kind])
+        values.setdefault(name, []).append(value)
+        return int(value)
+
+    joints = 0
+    for part in re.findall(rf"[n6]×\([^)]*\)|{FIELD}|bytes", layout):
+        if part == "bytes":
+            values["data"] = list(payload[place:])
+            place = len(payload)
+        elif "×" in part:
+            for _ in range(joints if part[0] == "n" else 6):
+                for field in re.findall(FIELD, part):
+                    take(field)
+        else:
+            take(part)
+            joints = values.get("mask", [0])[0].bit_count()
+    assert place == len(payload)
+    return values
+
+
+def flat(message: Message) -> dict[str, list[int]]:
+    """The same from the message's own fields."""
+    match message:
+        case c.WriteSetPoints():
+            mask = c.mask_of(joint for joint, _ in message.postures)
+            values = {"mask": [mask], "set_point": [posture for _, posture in message.postures]}
+        case c.ErrorsPositionsPowers() | c.Snapshot():
+            values = {"mask": [c.mask_of(joint for joint, _ in message.joints)]}
+            for name in ("set_point", "position", "error", "power"):
+                values[name] = [getattr(reading, name) for _, reading in message.joints]
+            if isinstance(message, c.Snapshot):
+                values |= {"tick": [message.tick], "status": [message.status]}
+        case c.Gains():
+            values = {name: [gains[i] for gains in message.gains] for i, name in enumerate("pid")}
+        case c.Stopped():
+            values = {"tick": [message.tick], "posture": list(message.postures)}
+        case c.Block():
+            values = {"data": list(message.data)}
+        case c.WriteBlock():
+            values = {"address": [message.address], "data": list(message.data)}
+        case _:
+            values = {name: [value] for name, value in as_json(message).items()}
+    return values
+
+
+def documented_messages() -> dict[str, list[str]]:
+    return {row[1]: row for row in (*table("Requests"), *table("Replies"))}
+
+
+def test_every_message_is_in_the_tables_with_its_opcode() -> None:
+    requests = {(int(row[0], 16), row[1], row[4] == "yes") for row in table("Requests")}
+    replies = {(int(row[0], 16), row[1]) for row in table("Replies")}
+    assert requests == {(opcode, kind.__name__, kind.CHANGES_STATE) for opcode, kind in c.REQUESTS.items()}
+    assert replies == {(opcode, kind.__name__) for opcode, kind in c.REPLIES.items()}
+
+
+@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: type(message).__name__)
+def test_layouts_and_lengths(message: Message) -> None:
+    _, _, layout, length, *_ = documented_messages()[type(message).__name__]
+    payload = message.pack()
+    values = read_payload(layout, payload)
+    assert values == flat(message)
+    if "–" in length:
+        least, most = map(int, length.split("–"))
+        assert least <= len(payload) <= most
+    else:
+        fixed, _, joints = length.partition(" + ")
+        a_joint = int(joints.removesuffix("n")) if joints else 0
+        assert len(payload) == int(fixed) + a_joint * values.get("mask", [0])[0].bit_count()
+
+
+def test_ranges_of_values() -> None:
+    ranges = {row[0]: row[1] for row in table("Values")}
+
+    def limits(name: str) -> tuple[int, int]:
+        low, high = ranges[name].replace("−", "-").split("–")
+        return int(low), int(high)
+
+    for name, field in (("set_point in a reading", 0), ("position", 1), ("error", 2), ("power", 3)):
+        for value in limits(name):
+            c.JointReading(*(value if i == field else 0 for i in range(4)))
+        for value in (limits(name)[0] - 1, limits(name)[1] + 1):
+            with pytest.raises(ProtocolError):
+                c.JointReading(*(value if i == field else 0 for i in range(4)))
+    assert limits("p, i, d in SetGains") == (0, GAIN_MAX)
+    assert limits("count in ReadBlock") == (1, c.MAX_READ)
+    assert limits("tick")[1] == c.AFTER_NEWEST
+
+
+@pytest.mark.parametrize(
+    ("title", "kind"), [("Capabilities", c.Capability), ("Status flags", c.StatusFlag), ("Refusals", c.Refusal)]
+)
+def test_codes(title: str, kind: Iterable[Any]) -> None:
+    assert {(int(row[0]), row[1]) for row in table(title)} == {(code.value, code.name) for code in kind}
+
+
+def test_every_example_of_the_conversation_is_what_the_code_says() -> None:
+    rows = table("A conversation")
+    assert len(rows) >= 10
+    for name, sequence, fields, line in rows:
+        (frame,) = FrameDecoder().feed(bytes.fromhex(line))
+        message = c.parse_request(frame) if frame.opcode < 0x80 else c.parse_reply(frame)
+        assert (type(message).__name__, frame.sequence, as_json(message)) == (name, int(sequence), json.loads(fields))
+        assert encode_frame(c.to_frame(frame.sequence, message)) == bytes.fromhex(line)
+
+
+def test_the_conversation_is_true_to_its_own_rules() -> None:
+    said = {row[0]: json.loads(row[2]) for row in reversed(table("A conversation"))}
+    sent = dict(said["WriteSetPoints"]["postures"])
+    readings = dict(said["Snapshot"]["joints"])
+    for joint, reading in readings.items():
+        assert reading["position"] + reading["error"] == posture_to_counts(sent[joint])
+        assert said["Stopped"]["postures"][joint - 1] == counts_to_posture(reading["position"])
+    block, position = bytes.fromhex(said["Block"]["data"]), default_memory_map()["position"]
+    assert position.high is not None
+    for joint, reading in readings.items():
+        low, high = position.low[joint - 1], position.high[joint - 1]
+        start = said["ReadBlock"]["address"]
+        assert position.decode(block[low - start], block[high - start]) == reading["position"]
+
+
+# ---- units, memory, line
+
+
+def test_rounding_tables() -> None:
+    for posture, counts, _, reading, nearest in table("Units and rounding"):
+        assert posture_to_counts(int(posture)) == int(counts)
+        assert counts_to_posture(int(reading)) == int(nearest)
+
+
+def test_the_memory_map_is_the_one_that_ships() -> None:
+    memory_map = default_memory_map()
+
+    def span(addresses: tuple[int, ...] | None) -> str:
+        if addresses is None:
+            return ""
+        assert addresses == tuple(range(addresses[0], addresses[0] + len(addresses)))
+        return f"{addresses[0]:04X}" + (f"–{addresses[-1]:04X}" if len(addresses) > 1 else "")
+
+    rows = []
+    for name, register in memory_map.registers.items():
+        joints = [i + 1 for i, provenance in enumerate(register.provenance) if provenance == "documented"]
+        documented = f"joints {joints[0]}–{joints[-1]}" if joints else "none"
+        bits = f"{register.bits}{' signed' if register.signed else ''}"
+        rows.append([name, register.unit, bits, register.access, span(register.low), span(register.high), documented])
+    assert table("Shared memory") == rows
+    last = memory_map.base + memory_map.size - 1
+    assert f"Readable and writable: {memory_map.base:04X} to {last:04X}." in section("Shared memory")
+
+
+def on_the_line(*messages: Message) -> int:
+    return sum(len(encode_frame(c.to_frame(0, message))) for message in messages)
+
+
+def sampled(joints: int) -> int:
+    reading = c.JointReading(1, 1, 1, 1)
+    mask = (1 << joints) - 1
+    return on_the_line(c.Sample(1, mask), c.Snapshot(1, 0, tuple((i + 1, reading) for i in range(joints))))
+
+
+def commanded(joints: int) -> int:
+    return on_the_line(c.WriteSetPoints(tuple((i + 1, 1) for i in range(joints))), c.SetPointsTaken(1, 0))
+
+
+def most_joints(capacity: float, bytes_of: Any) -> str:
+    fitting = [joints for joints in range(1, 7) if bytes_of(joints) <= capacity]
+    return str(fitting[-1]) if fitting else "none"
+
+
+def test_line_rates() -> None:
+    memory_map = default_memory_map()
+    wanted = [
+        a for name in ("position", "error", "power") for i in range(3) for a in bytes_of_joint(memory_map, name, i)
+    ]
+    count = max(wanted) - min(wanted) + 1
+    twice = 2 * on_the_line(c.ReadBlock(min(wanted), count), c.Block(bytes(count)))
+    stop = on_the_line(c.WriteBlock(0, bytes(c.MAX_WRITE)), c.Stop())
+    whole = {joints: commanded(joints) + sampled(joints) for joints in range(1, 7)}
+    rows = table("Line rate against what can be sampled")
+    assert len(rows) >= 6
+    for row in rows:
+        baud = int(row[0])
+        capacity = baud / BITS_PER_BYTE * PERIOD_S
+        every = math.ceil(whole[3] / capacity)
+        assert row[1:] == [
+            f"{capacity:.1f}",
+            f"{whole[3] / capacity * 100:.0f} %",
+            f"{whole[6] / capacity * 100:.0f} %",
+            most_joints(capacity, whole.__getitem__),
+            most_joints(capacity, sampled),
+            f"{every} period{'s' if every > 1 else ''}",
+            f"{twice / capacity * 100:.0f} %",
+            f"{stop * BITS_PER_BYTE / baud * 1000:.1f}",
+        ]
+
+
+def bytes_of_joint(memory_map: Any, name: str, index: int) -> list[int]:
+    register = memory_map[name]
+    return [register.low[index], *([register.high[index]] if register.high else [])]
+
+
+def test_figures_in_the_text_of_line_rates() -> None:
+    text = section("Line rate against what can be sampled")
+    for joints in range(1, 7):
+        assert sampled(joints) == 29 + 7 * joints
+        assert commanded(joints) + sampled(joints) == 53 + 9 * joints
+    assert "53 + 9n bytes for n joints, 80 for three, 107 for six; Sample alone is 29 + 7n" in text
+    assert f"Sample and its reply alone take {sampled(3) / 230.4 * 100:.0f} %" in text
+    assert f"one joint in every period and send no set points meanwhile: {sampled(1)} of the 38 bytes" in text
+    assert "one block of 35 bytes, twice: 112 bytes" in text

@@ -1,0 +1,130 @@
+"""Every message packs into its payload and back; nothing else gets in, and only ProtocolError comes out."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from firmware_protocol import commands as c
+from firmware_protocol.errors import ProtocolError
+from firmware_protocol.framing import MAX_PAYLOAD, Frame
+from tests.protocol import strategies
+
+REQUEST_KINDS = sorted(c.REQUESTS.values(), key=lambda kind: kind.OPCODE)
+REPLY_KINDS = sorted(c.REPLIES.values(), key=lambda kind: kind.OPCODE)
+
+
+def named(kind: type[c.Message]) -> str:
+    return kind.__name__
+
+
+@pytest.mark.parametrize("kind", REQUEST_KINDS, ids=named)
+@given(data=st.data(), sequence=st.integers(0, 0xFFFF))
+def test_every_request_comes_back(kind: type[c.Request], data: st.DataObject, sequence: int) -> None:
+    request = data.draw(strategies.REQUESTS[kind])
+    frame = c.to_frame(sequence, request)
+    assert frame.sequence == sequence
+    assert c.parse_request(frame) == request
+
+
+@pytest.mark.parametrize("kind", REPLY_KINDS, ids=named)
+@given(data=st.data(), sequence=st.integers(0, 0xFFFF))
+def test_every_reply_comes_back(kind: type[c.Reply], data: st.DataObject, sequence: int) -> None:
+    reply = data.draw(strategies.REPLIES[kind])
+    assert c.parse_reply(c.to_frame(sequence, reply)) == reply
+
+
+@pytest.mark.parametrize("opcode", sorted(c.REQUESTS))
+@given(payload=st.binary(max_size=MAX_PAYLOAD))
+def test_a_request_s_payload_is_taken_as_it_would_be_packed_or_not_at_all(opcode: int, payload: bytes) -> None:
+    try:
+        outcome: bytes | c.Refusal = c.parse_request(Frame(0, opcode, payload)).pack()
+    except ProtocolError as error:
+        outcome = c.refusal_of(error)
+    assert outcome in (payload, c.Refusal.BAD_LENGTH, c.Refusal.BAD_VALUE)
+
+
+@pytest.mark.parametrize("opcode", sorted(c.REPLIES))
+@given(payload=st.binary(max_size=MAX_PAYLOAD))
+def test_a_reply_s_payload_is_taken_as_it_would_be_packed_or_not_at_all(opcode: int, payload: bytes) -> None:
+    try:
+        reply = c.parse_reply(Frame(0, opcode, payload))
+    except ProtocolError:
+        return
+    assert reply.pack() == payload
+
+
+@pytest.mark.parametrize("opcode", range(0x100))
+def test_unknown_opcodes_are_refused_as_such(opcode: int) -> None:
+    for known, parse in ((c.REQUESTS, c.parse_request), (c.REPLIES, c.parse_reply)):
+        if opcode not in known:
+            with pytest.raises(ProtocolError, match="opcode") as caught:
+                parse(Frame(0, opcode, b""))
+            assert c.refusal_of(caught.value) is c.Refusal.UNKNOWN_OPCODE
+
+
+def test_a_reply_has_its_request_s_opcode_with_the_top_bit() -> None:
+    assert {opcode | 0x80 for opcode in c.REQUESTS} == c.REPLIES.keys() - {c.Refused.OPCODE}
+
+
+def test_the_snapshot_of_six_joints_fills_a_frame() -> None:
+    reading = c.JointReading(1, 2, 3, 4)
+    assert len(c.Snapshot(1, 0, tuple((joint, reading) for joint in range(1, 7))).pack()) == MAX_PAYLOAD
+
+
+def test_joint_masks_have_bit_0_for_joint_1() -> None:
+    assert c.joints_of(0b100101) == (1, 3, 6)
+    assert c.mask_of((6, 1, 3)) == 0b100101
+    for joint in (0, 7, -1):
+        with pytest.raises(ProtocolError, match=f"joint {joint}: allowed are 1 to 6"):
+            c.mask_of((joint,))
+
+
+READING = c.JointReading(0, 0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: c.ReadBlock(0xFC20, 0), "ReadBlock: number of bytes of 0: allowed are 1 to 48"),
+        (lambda: c.ReadBlock(0xFC20, 49), "ReadBlock: number of bytes of 49: allowed are 1 to 48"),
+        (lambda: c.ReadBlock(0xFFFF, 2), "2 bytes from FFFF: the address space ends at FFFF"),
+        (lambda: c.ReadBlock(-1, 2), "address of -1: allowed are 0 to 65535"),
+        (lambda: c.WriteBlock(0xFC20, b""), "number of bytes of 0: allowed are 1 to 46"),
+        (lambda: c.WriteBlock(0xFC20, bytes(47)), "number of bytes of 47: allowed are 1 to 46"),
+        (lambda: c.WriteSetPoints(()), "no joints: at least one"),
+        (lambda: c.WriteSetPoints(((2, 1), (1, 2))), "joints 2, 1: each once, in ascending order"),
+        (lambda: c.WriteSetPoints(((1, 1), (1, 2))), "joints 1, 1: each once, in ascending order"),
+        (lambda: c.WriteSetPoints(((7, 1),)), "joint 7: allowed are 1 to 6"),
+        (lambda: c.WriteSetPoints(((1, 1000),)), "joint 1: set point of 1000 posture units: allowed are 0 to 999"),
+        (lambda: c.WriteSetPoints(((1, -1),)), "joint 1: set point of -1 posture units: allowed are 0 to 999"),
+        (lambda: c.WriteSetPoints(((1, float("nan")),)), "joint 1: set point of nan"),
+        (lambda: c.SetGains(0, 1, 1, 1), "joint 0: allowed are 1 to 6"),
+        (lambda: c.SetGains(1, 21, 1, 1), "joint 1: gain P of 21: allowed are 0 to 20"),
+        (lambda: c.SetGains(1, 1, 1, -1), "joint 1: gain D of -1: allowed are 0 to 20"),
+        (lambda: c.Sample(0, 0), "Sample: joint mask 0x00: allowed are 0x01 to 0x3f"),
+        (lambda: c.Sample(1 << 32, 1), "Sample: after of 4294967296: allowed are 0 to 4294967295"),
+        (lambda: c.ReportErrorsPositionsPowers(64), "joint mask 0x40: allowed are 0x01 to 0x3f"),
+        (lambda: c.SetGripper(2), r"gripper 2: allowed are 0 \(open\) and 1 \(closed\)"),
+        (lambda: c.WriteOutputs(256, 0), "WriteOutputs: mask of 256: allowed are 0 to 255"),
+        (lambda: c.Advance(1 << 32), "Advance: microseconds of 4294967296: allowed are 0 to 4294967295"),
+        (lambda: c.HelloReply(1, 65536, 0, 0, 0), "HelloReply: capabilities of 65536: allowed are 0 to 65535"),
+        (lambda: c.Block(b""), "Block: number of bytes of 0: allowed are 1 to 48"),
+        (lambda: c.Gains(((1, 1, 1),)), "Gains: 1 joints, expected 6"),
+        (lambda: c.Gains(((1, 1, 256),) * 6), "joint 1: gain D of 256: allowed are 0 to 255"),
+        (lambda: c.JointReading(1024, 0, 0, 0), "set point of 1024: allowed are 0 to 1023"),
+        (lambda: c.JointReading(0, 4096, 0, 0), "position of 4096: allowed are 0 to 4095"),
+        (lambda: c.JointReading(0, 0, 0, 128), "power of 128: allowed are -128 to 127"),
+        (lambda: c.Snapshot(1, 0, ((3, READING), (2, READING))), "joints 3, 2: each once, in ascending order"),
+        (lambda: c.Snapshot(-1, 0, ((3, READING),)), "Snapshot: tick of -1: allowed are 0 to 4294967295"),
+        (lambda: c.Stopped(1, (1, 2, 3)), "Stopped: 3 postures, expected 6"),
+        (lambda: c.Stopped(1, (1, 2, 3, 4, 5, 1000)), "posture of joint 6 of 1000: allowed are 0 to 999"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_sent_cannot_be_made(make: object, says: str) -> None:
+    with pytest.raises(ProtocolError, match=says):
+        make()  # type: ignore[operator]
+
+
+def test_a_value_that_is_no_integer_is_refused_in_one_line() -> None:
+    with pytest.raises(ProtocolError, match="Advance: required argument is not an integer"):
+        c.to_frame(0, c.Advance(1.5))  # type: ignore[arg-type]

@@ -1,0 +1,88 @@
+"""vectors.json: it is what its generator makes, and a second implementation finds every vector true."""
+
+import json
+from typing import Any
+
+import pytest
+
+from firmware_protocol import commands as c
+from firmware_protocol.errors import ProtocolError
+from firmware_protocol.framing import Frame, FrameDecoder, crc16, encode_frame, stuff, unstuff
+from firmware_protocol.units import counts_to_posture, posture_to_counts
+from tests.protocol import second_implementation as second
+from tests.protocol.make_vectors import FILE, as_json, rendered
+
+VECTORS: dict[str, Any] = json.loads(FILE.read_text("utf-8"))
+
+
+def test_the_file_is_what_its_generator_makes() -> None:
+    assert FILE.read_text("utf-8") == rendered(), "run: python -m tests.protocol.make_vectors"
+
+
+def test_there_is_a_vector_for_every_message() -> None:
+    kinds = {*c.REQUESTS.values(), *c.REPLIES.values()}
+    assert {vector["message"] for vector in VECTORS["frames"]} == {kind.__name__ for kind in kinds}
+
+
+@pytest.mark.parametrize("vector", VECTORS["crc"], ids=lambda v: v["data"][:20])
+def test_crc(vector: dict[str, str]) -> None:
+    data = bytes.fromhex(vector["data"])
+    assert f"{crc16(data):04x}" == f"{second.crc_bit_by_bit(data):04x}" == vector["crc"]
+
+
+@pytest.mark.parametrize("vector", VECTORS["cobs"], ids=lambda v: v["body"][:20])
+def test_stuffing(vector: dict[str, str]) -> None:
+    body, stuffed = bytes.fromhex(vector["body"]), bytes.fromhex(vector["stuffed"])
+    assert stuff(body) == second.stuff_byte_by_byte(body) == stuffed
+    assert unstuff(stuffed) == second.unstuff_byte_by_byte(stuffed) == body
+
+
+@pytest.mark.parametrize("encoded", VECTORS["cobs_broken"])
+def test_broken_stuffing(encoded: str) -> None:
+    with pytest.raises(ProtocolError):
+        unstuff(bytes.fromhex(encoded))
+
+
+@pytest.mark.parametrize("vector", VECTORS["frames"], ids=lambda v: f"{v['message']} {v['sequence']}")
+def test_frames(vector: dict[str, Any]) -> None:
+    line = bytes.fromhex(vector["frame"])
+    (frame,) = FrameDecoder().feed(line)
+    message = c.parse_request(frame) if frame.opcode < 0x80 else c.parse_reply(frame)
+    assert (type(message).__name__, frame.sequence, as_json(message)) == (
+        vector["message"],
+        vector["sequence"],
+        vector["fields"],
+    )
+    assert encode_frame(c.to_frame(frame.sequence, message)) == line
+    assert second.read_frame(line[1:-1]) == (frame.sequence, frame.opcode, frame.payload)
+    assert second.frame_of(frame.sequence, frame.opcode, frame.payload) == line
+
+
+@pytest.mark.parametrize("vector", VECTORS["damaged"], ids=lambda v: v["why"])
+def test_damaged_lines_hold_no_frame(vector: dict[str, str]) -> None:
+    line = bytes.fromhex(vector["line"])
+    assert FrameDecoder().feed(line) == []
+    assert not any(second.read_frame(piece) for piece in line.split(b"\0")[:-1] if piece)
+
+
+@pytest.mark.parametrize("vector", VECTORS["refused"], ids=lambda v: f"{v['opcode']:02x} {v['why']}")
+def test_refused_payloads(vector: dict[str, Any]) -> None:
+    parse = c.parse_request if vector["direction"] == "request" else c.parse_reply
+    with pytest.raises(ProtocolError) as caught:
+        parse(Frame(0, vector["opcode"], bytes.fromhex(vector["payload"])))
+    assert c.refusal_of(caught.value).name == vector["reason"]
+
+
+@pytest.mark.parametrize("vector", VECTORS["arrivals"], ids=lambda v: v["rule"])
+def test_arrivals(vector: dict[str, Any]) -> None:
+    order = c.ArrivalOrder()
+    for sequence, opcode, verdict in vector["steps"]:
+        request = c.Advance(1000) if opcode == c.Advance.OPCODE else c.REQUESTS[opcode]()
+        assert order.judge(sequence, request).name == verdict
+
+
+def test_rounding() -> None:
+    for posture, counts in VECTORS["posture_to_counts"]:
+        assert posture_to_counts(posture) == counts == (2 * posture * 4096 + 1000) // 2000
+    for counts, posture in VECTORS["counts_to_posture"]:
+        assert counts_to_posture(counts) == posture == min((2 * counts * 1000 + 4096) // 8192, 999)
