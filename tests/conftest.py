@@ -5,11 +5,15 @@ from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from tests.left_running import Running, mark_this_process
 
 ROOT = Path(__file__).parent.parent
 SKIPS_ARE_ERRORS = os.environ.get("CI", "").lower() in ("1", "true")
+# The same examples in every run, and no test that fails because the machine was busy.
+settings.register_profile("repeatable", deadline=None, derandomize=True)
+settings.load_profile("repeatable")
 MAY_ALWAYS_SKIP = ("hardware", "lab_data")
 """Marks of tests that need what nobody can install: a real arm, and traces that are kept outside the repository."""
 
