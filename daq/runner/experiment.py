@@ -22,6 +22,7 @@ from daq.runner.arm_control import ArmControl
 from daq.runner.follower import Ending, Follower
 from daq.safety import Event, Violation, check_move_to_start, check_plan
 from daq.traces.naming import new_trace_id, trace_path
+from daq.traces.room import require_room
 from daq.traces.writer import TraceWriter
 from daq.trajectories import Plan, plan, plan_move, start_angles
 from firmware_protocol.commands import StatusFlag
@@ -130,9 +131,9 @@ def run_experiment(
 ) -> RunResult:
     """Runs `spec` and returns when its trace is closed.
 
-    Nothing has moved and nothing is recorded when this raises SafetyError (a limit, a frozen board, a missing
-    consent) or SpecError. `ended` gives a reason once somebody wants the end; `interrupted` tells whether that was the
-    loss of whoever started the run.
+    Nothing has moved and nothing is recorded when this raises SafetyError (a limit, a frozen board, no consent),
+    TraceError (no room for a trace) or SpecError. `ended` gives a reason once somebody wants the end; `interrupted`
+    tells whether that was the loss of whoever started the run.
     """
     _require_fit(controller, consent)
     joints = _recorded(controller, spec)
@@ -147,6 +148,8 @@ def run_experiment(
     motion = plan(spec, machine, target)
     _require_allowed("move to start", check_move_to_start(move, machine, limits))
     _require_allowed("experiment", check_plan(motion, machine, limits))
+
+    require_room(folder, len(motion), len(joints))
 
     control.handle(Event.ARM)
     control.handle(Event.START)

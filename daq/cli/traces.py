@@ -1,0 +1,216 @@
+"""`daq traces`: what has been recorded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from daq.cli.context import Invocation, JsonOption, console, invocation, print_json
+from daq.contracts.errors import TraceError
+
+if TYPE_CHECKING:
+    from daq.contracts.trace import Trace
+
+app = typer.Typer(add_completion=False, help="List, show, plot, convert and verify traces.", no_args_is_help=True)
+
+TraceArgument = Annotated[
+    str, typer.Argument(help="A file, the beginning of a trace's number or name, or `last`.", show_default=True)
+]
+FolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (default: the configured one).")]
+
+EXIT_NOT_TRUSTWORTHY = 5
+
+
+def _folder(call: Invocation, folder: Path | None) -> Path:
+    return folder or call.trace_folder
+
+
+def _path(context: typer.Context, wanted: str, folder: Path | None) -> Path:
+    from daq.traces.catalogue import find_trace
+
+    return find_trace(_folder(invocation(context), folder), wanted)
+
+
+@app.command("ls")
+def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOption = False) -> None:
+    """List traces, the oldest first."""
+    from daq.traces.catalogue import list_traces
+
+    place = _folder(invocation(context), folder)
+    summaries = list_traces(place) if place.is_dir() else ()
+    if json:
+        print_json([summary.model_dump(mode="json") for summary in summaries])
+        return
+    if not summaries:
+        print(f"no traces in {place}")
+        return
+    from rich.table import Table
+
+    table = Table(
+        "number", "recorded (UTC)", "what", "joints", "samples", "s", "outcome", box=None, header_style="bold"
+    )
+    for one in summaries:
+        moment = one.created.strftime("%Y-%m-%d %H:%M:%S") if one.created else "?"
+        ended = one.outcome or one.state
+        table.add_row(
+            one.trace_id or one.path.name,
+            moment,
+            f"{one.name or one.kind or one.source or one.problem}",
+            ",".join(map(str, one.joints)),
+            "?" if one.samples is None else str(one.samples),
+            "?" if one.duration is None else f"{one.duration:.2f}",
+            f"[green]{ended}[/green]" if ended == "complete" else f"[bold red]{ended}[/bold red]",
+        )
+    from rich.console import Console
+
+    Console(highlight=False).print(table)
+
+
+@app.command()
+def show(
+    context: typer.Context, trace: TraceArgument = "last", folder: FolderOption = None, json: JsonOption = False
+) -> None:
+    """Show what a trace says about itself, and its figures by joint."""
+    from daq.traces.reader import read_trace
+    from daq.traces.summary import joint_figures
+
+    path = _path(context, trace, folder)
+    found = read_trace(path)
+    figures = joint_figures(found)
+    if json:
+        data = found.record.model_dump(mode="json", exclude={"machine", "memory_map"})
+        print_json({"path": path, "record": data, "samples": len(found), "missing": found.missing,
+                    "joints": [vars(figure) for figure in figures]})  # fmt: skip
+        return
+    record = found.record
+    what = record.spec.trajectory.kind if record.spec else "import"
+    print(f"{record.trace_id}: {what} on {record.robot} ({record.source}), {record.outcome or 'unfinished'}")
+    print(f"recorded {record.created:%Y-%m-%d %H:%M:%S %Z} with {record.software}")
+    print(f"{len(found)} samples on joints {', '.join(map(str, found.joints))}, {found.missing} missing")
+    if record.operator or record.notes:
+        print(f"operator {record.operator or '?'}: {record.notes}")
+    print_figures(found)
+    for event in found.events:
+        print(f"  {event.time:8.2f} s  {event.kind.replace('_', ' ')}: {event.message}")
+    print(f"file: {path}")
+
+
+def print_figures(trace: Trace) -> None:
+    """The figures of every joint that moved, as a table on standard output."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from daq.traces.summary import joint_figures
+
+    table = Table(box=None, header_style="bold")
+    for title in (
+        "joint",
+        "from",
+        "to",
+        "overshoot",
+        "rise time",
+        "largest error",
+        "error at the end",
+        "largest drive",
+    ):
+        table.add_column(title, justify="right")
+    for one in joint_figures(trace):
+        if not one.moved:
+            continue
+        rise = "–" if one.rise_time is None else f"{one.rise_time:.2f} s"
+        drive = "–" if one.largest_drive is None else f"{one.largest_drive:.1f} {trace.record.drive_unit or ''}"
+        cells = (one.start, one.end, one.overshoot)
+        table.add_row(str(one.joint), *(_angle(value, one.unit) for value in cells), rise,
+                      _angle(one.largest_error, one.unit), _angle(one.final_error, one.unit), drive)  # fmt: skip
+    Console(highlight=False).print(table)
+
+
+def _angle(value: float | None, unit: str) -> str:
+    return "–" if value is None else f"{value:.2f}{unit}"
+
+
+@app.command()
+def plot(
+    context: typer.Context,
+    trace: TraceArgument = "last",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="A .png, .svg, .pdf or .html file.")] = None,
+    folder: FolderOption = None,
+) -> None:
+    """Draw a trace: set point and position, error and drive of every joint."""
+    from daq.traces.plot import plot_trace
+    from daq.traces.reader import read_trace
+
+    path = _path(context, trace, folder)
+    print(plot_trace(read_trace(path), output or path.with_suffix(".png")))
+
+
+@app.command("export")
+def export(
+    context: typer.Context,
+    trace: TraceArgument = "last",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="A .csv file; a .toml is put beside it.")
+    ] = None,
+    folder: FolderOption = None,
+) -> None:
+    """Write a trace as plain CSV, with a TOML file for what columns cannot say."""
+    from daq.traces.csv_table import export_csv
+    from daq.traces.reader import read_trace
+
+    path = _path(context, trace, folder)
+    print(export_csv(read_trace(path), output or path.with_suffix(".csv")))
+
+
+@app.command("import")
+def import_(
+    context: typer.Context,
+    file: Annotated[Path, typer.Argument(help="A .csv file: time, then set_point_N, position_N, drive_N, velocity_N.")],
+    folder: FolderOption = None,
+) -> None:
+    """Take in a trace of another rig or tool."""
+    from daq.traces.csv_table import import_csv
+    from daq.traces.naming import trace_path
+    from daq.traces.store import write_trace
+
+    place = _folder(invocation(context), folder)
+    found = import_csv(file)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise TraceError(f"{place}: cannot be made: {error.strerror}") from error
+    print(write_trace(found, trace_path(place, found.record)))
+
+
+@app.command("verify")
+def check(
+    context: typer.Context, trace: TraceArgument = "last", folder: FolderOption = None, json: JsonOption = False
+) -> None:
+    """Check a trace from its checksums to its signals; ends with 5 when it is not to be trusted."""
+    from daq.traces.verify import verify
+
+    found = verify(_path(context, trace, folder))
+    if json:
+        print_json(found.model_dump(mode="json") | {"trustworthy": found.trustworthy})
+    else:
+        for finding in found.findings:
+            print(f"{finding.level}: {finding.message}")
+        print("trustworthy" if found.trustworthy else "NOT to be trusted")
+    if not found.trustworthy:
+        raise typer.Exit(EXIT_NOT_TRUSTWORTHY)
+
+
+@app.command()
+def salvage(context: typer.Context, folder: FolderOption = None, json: JsonOption = False) -> None:
+    """Finish the traces that a crash left without an end; they are marked as interrupted."""
+    from daq.traces.salvage import salvage_folder
+
+    results = salvage_folder(_folder(invocation(context), folder))
+    if json:
+        print_json([vars(result) for result in results])
+        return
+    for result in results:
+        print(f"{result.path}: salvaged from {result.part.name}" if result.path else f"{result.part}: {result.problem}")
+    if not results:
+        console().print("nothing to salvage")

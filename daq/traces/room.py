@@ -1,0 +1,33 @@
+"""Is there a place for a trace, before anything moves?"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+from daq.contracts.errors import TraceError
+from daq.traces import disk
+
+BYTES_A_SAMPLE = 400
+"""Of one joint in one control period, generously (docs/traces.md gives the measured figure)."""
+RESERVE = 20_000_000
+"""Bytes that stay free: the disk is others' too."""
+
+
+def require_room(folder: Path, samples: int, joints: int) -> None:
+    """Makes the folder, writes and syncs a first file there, and compares what is free with what the trace may need.
+
+    Raises TraceError with one line.
+    """
+    needed = samples * joints * BYTES_A_SAMPLE + RESERVE
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as stream:
+            stream.write(b"room for a trace?")
+            disk.sync(stream)
+        free = shutil.disk_usage(folder).free
+    except OSError as error:
+        raise TraceError(f"{folder}: traces cannot be written there: {disk.reason(error)}") from error
+    if free < needed:
+        raise TraceError(f"{folder}: {free / 1e6:.0f} MB are free, this trace may need {needed / 1e6:.0f} MB")

@@ -1,0 +1,74 @@
+"""A trace in a few figures a joint: how far, how fast, how much over, how exact."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from daq.contracts.trace import Floats, Trace
+
+RISE_FROM, RISE_TO = 0.1, 0.9
+"""Rise time is counted between these shares of the way, as is usual in control."""
+
+
+@dataclass(frozen=True)
+class JointFigures:
+    """Angles in degrees (`unit` °), lengths in mm on a prismatic joint; times in s, drive in the trace's unit.
+
+    `overshoot` is how far beyond the last set point the joint went, in the direction of the motion; `rise_time` that
+    of the position between 10 and 90 % of the way; None where there is no set point, or no way.
+    """
+
+    joint: int
+    unit: str
+    moved: bool
+    start: float
+    end: float
+    overshoot: float | None
+    rise_time: float | None
+    largest_error: float | None
+    final_error: float | None
+    largest_drive: float | None
+
+
+def joint_figures(trace: Trace) -> list[JointFigures]:
+    """Figures of every joint of a trace; none for one without samples."""
+    return [_figures(trace, joint, trace.column(joint)) for joint in trace.joints] if len(trace) else []
+
+
+def _figures(trace: Trace, joint: int, column: int) -> JointFigures:
+    machine = trace.record.machine
+    prismatic = machine is not None and machine.joint(joint).kind == "prismatic"
+    scale = 1e3 if prismatic else math.degrees(1.0)
+    position = trace.position[:, column] * scale
+    set_point = None if trace.set_point is None else trace.set_point[:, column] * scale
+    error = None if set_point is None else set_point - position
+    drive = None if trace.drive is None else trace.drive[:, column]
+    moved = bool(np.ptp(position if set_point is None else set_point) > 0)
+    way = 0.0 if set_point is None else float(set_point[-1] - set_point[0])
+    return JointFigures(
+        joint=joint,
+        unit="mm" if prismatic else "°",
+        moved=moved,
+        start=float(position[0]),
+        end=float(position[-1]),
+        overshoot=None if set_point is None or way == 0 else _overshoot(position, float(set_point[-1]), way),
+        rise_time=None if way == 0 else _rise_time(trace.time, position, way),
+        largest_error=None if error is None else float(np.abs(error).max()),
+        final_error=None if error is None else float(error[-1]),
+        largest_drive=None if drive is None else float(np.abs(drive).max()),
+    )
+
+
+def _overshoot(position: Floats, target: float, way: float) -> float:
+    return max(0.0, float(((position - target) * math.copysign(1.0, way)).max()))
+
+
+def _rise_time(time: Floats, position: Floats, way: float) -> float | None:
+    share = (position - position[0]) / way
+    reached = [np.flatnonzero(share >= level) for level in (RISE_FROM, RISE_TO)]
+    if not all(len(found) for found in reached):
+        return None
+    return float(time[reached[1][0]] - time[reached[0][0]])
