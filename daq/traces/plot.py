@@ -1,0 +1,274 @@
+"""A trace as a picture one would print: position and set point, error, drive, and as one HTML page.
+
+matplotlib and Jinja2 are imported when a plot is made, so that nothing else waits for them.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from daq.contracts.errors import TraceError
+from daq.contracts.trace import EventKind, Floats, Trace, TraceEvent
+from daq.traces import disk
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SUFFIXES = (".png", ".svg", ".pdf", ".html")
+
+INK = "#222222"
+QUIET = "#8a8a8a"
+SET_POINT = "#555555"
+JOINT_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#A07800", "#4B4B9B")
+"""One a joint: Okabe and Ito's colours, told apart also by the colour-blind; the yellow darkened to show on paper."""
+ALARM = "#B00020"
+GAP = "#f3d9a4"
+JOINTS_ABREAST = 3
+"""Joints beside each other; more begin another band, so that the figure still fits a page."""
+
+_ALARMS: frozenset[EventKind] = frozenset({"limit", "restart", "link_lost", "stop", "fault"})
+_UNMARKED: frozenset[EventKind] = frozenset({"start", "end", "note", "gains", "retry", "missing", "missed_set_point"})
+"""Kinds without a line of their own: there may be hundreds, or they say what the axes say."""
+_WORDS = {"ramp_start": "ramp starts", "ramp_end": "ramp ends", "link_lost": "link lost"}
+
+_STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": QUIET,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.grid": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "svg.hashsalt": "ma2000-daq",
+}
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One row of panels: what it shows and in which unit."""
+
+    title: str
+    unit: str
+    measured: Floats
+    wanted: Floats | None = None
+
+
+def plot_trace(trace: Trace, path: Path) -> Path:
+    """Draw a trace into a PNG, SVG, PDF or self-contained HTML file, by the suffix of `path`. Returns `path`.
+
+    Raises TraceError for another suffix, a trace without samples, or a file that cannot be written.
+    """
+    path = Path(path)
+    if path.suffix not in SUFFIXES:
+        raise TraceError(f"{path}: plots are made as {', '.join(SUFFIXES)}")
+    if len(trace) == 0:
+        raise TraceError(f"trace {trace.record.trace_id}: has no samples to plot")
+    data = html_page(trace) if path.suffix == ".html" else picture(trace, path.suffix.removeprefix("."))
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise TraceError(f"{path}: cannot be written: {disk.reason(error)}") from error
+    return path
+
+
+def picture(trace: Trace, kind: str) -> bytes:
+    """The figure as `png`, `svg` or `pdf`."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(_STYLE):
+        stream = io.BytesIO()
+        metadata = {"Date": None} if kind == "svg" else None
+        figure_of(trace).savefig(stream, format=kind, dpi=200, facecolor="white", metadata=metadata)
+    return stream.getvalue()
+
+
+def html_page(trace: Trace) -> bytes:
+    """One HTML file that needs nothing else: the figure, what the trace says about itself, and its events."""
+    from jinja2 import Environment, PackageLoader
+
+    svg = picture(trace, "svg").decode()
+    page = Environment(loader=PackageLoader("daq.traces"), autoescape=True).get_template("trace.html.j2")
+    return page.render(
+        title=_title(trace), svg=svg[svg.index("<svg") :], facts=_facts(trace), events=trace.events
+    ).encode()
+
+
+def figure_of(trace: Trace) -> Figure:
+    """The figure: a row a signal, a column a joint, marks where something happened."""
+    from matplotlib.figure import Figure
+
+    rows = _rows(trace)
+    columns = min(len(trace.joints), JOINTS_ABREAST)
+    bands = math.ceil(len(trace.joints) / columns)
+    figure = Figure(figsize=(max(6.3, 3.1 * columns + 0.6), bands * (1.9 * len(rows) + 0.6) + 0.8))
+    figure.set_layout_engine("constrained", w_pad=0.06, h_pad=0.05, hspace=0.03)
+    axes = figure.subplots(len(rows) * bands, columns, sharex=True, squeeze=False)
+    for column, joint in enumerate(trace.joints):
+        band, place = divmod(column, columns)
+        panels = axes[band * len(rows) : (band + 1) * len(rows), place]
+        _head(panels[0], trace, joint, column)
+        for panel, row in zip(panels, rows, strict=True):
+            _draw(panel, trace, row, column)
+            if place == 0:
+                panel.set_ylabel(f"{row.title} / {row.unit}")
+        panels[-1].set_xlabel("time / s")
+        panels[-1].tick_params(labelbottom=True)
+    for empty in axes[-len(rows) :, len(trace.joints) - (bands - 1) * columns :].flat:
+        empty.set_visible(False)
+    _legend(axes[0][0], trace)
+    figure.align_ylabels()
+    figure.suptitle(_title(trace), x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
+    figure.supxlabel(_foot(trace), x=0.01, ha="left", fontsize=7.5, color=QUIET)
+    return figure
+
+
+def _rows(trace: Trace) -> list[_Row]:
+    metres = _prismatic(trace)
+    scale, unit = (1000.0, "mm") if metres else (math.degrees(1.0), "°")
+    wanted = None if trace.set_point is None else trace.set_point * scale
+    rows = [_Row("position", unit, trace.position * scale, wanted)]
+    if trace.error is not None:
+        rows.append(_Row("error", unit, trace.error * scale))
+    if trace.drive is not None:
+        rows.append(_Row("drive", trace.record.drive_unit or "V", trace.drive))
+    if trace.velocity is not None:
+        rows.append(_Row("velocity", f"{unit}/s", trace.velocity * scale))
+    return rows
+
+
+def _prismatic(trace: Trace) -> bool:
+    """Whether all joints of the trace slide; where both kinds are mixed, the unit is left to the machine."""
+    machine = trace.record.machine
+    if machine is None or max(trace.joints) > len(machine.joints):
+        return False
+    return all(machine.joint(joint).kind == "prismatic" for joint in trace.joints)
+
+
+def _draw(axes: Axes, trace: Trace, row: _Row, column: int) -> None:
+    for before, after in _gaps(trace):
+        axes.axvspan(before, after, color=GAP, lw=0, zorder=0)
+    for event in trace.events:
+        if event.kind not in _UNMARKED and event.joint in (None, trace.joints[column]):
+            alarm = event.kind in _ALARMS
+            axes.axvline(event.time, color=ALARM if alarm else QUIET, lw=0.8, ls="-" if alarm else ":", zorder=1)
+    if row.wanted is None:
+        axes.axhline(0.0, color=QUIET, lw=0.7, zorder=1)
+    else:
+        time, wanted = _broken_at_gaps(trace, row.wanted[:, column])
+        axes.plot(time, wanted, color=SET_POINT, lw=1.0, ls=(0, (4, 2)), drawstyle="steps-post", label="set point")
+    time, measured = _broken_at_gaps(trace, row.measured[:, column])
+    colour = JOINT_COLOURS[(trace.joints[column] - 1) % len(JOINT_COLOURS)]
+    axes.plot(time, measured, color=colour, lw=1.3, label=row.title, solid_joinstyle="round")
+    axes.margins(x=0.01)
+    axes.set_ylim(*_limits(row, column))
+    axes.tick_params(length=2.5)
+
+
+def _limits(row: _Row, column: int) -> tuple[float, float]:
+    """The same span for every joint, so that they compare by eye; positions each about their own middle."""
+    both = [row.measured] if row.wanted is None else [row.measured, row.wanted]
+    low, high = np.min([s.min(axis=0) for s in both], axis=0), np.max([s.max(axis=0) for s in both], axis=0)
+    if row.title != "position":
+        low, high = np.full_like(low, min(low.min(), 0.0)), np.full_like(high, max(high.max(), 0.0))
+    half = max(float((high - low).max()) * 0.56, 1e-6)
+    middle = float(low[column] + high[column]) / 2
+    return middle - half, middle + half
+
+
+def _legend(axes: Axes, trace: Trace) -> None:
+    from matplotlib.patches import Patch
+
+    handles, _ = axes.get_legend_handles_labels()
+    if _gaps(trace):
+        handles.append(Patch(color=GAP, label="samples missing"))
+    axes.legend(handles=handles, loc="best", frameon=False, handlelength=2.2, fontsize=8)
+
+
+def _head(axes: Axes, trace: Trace, joint: int, column: int) -> None:
+    machine = trace.record.machine
+    name = machine.joint(joint).name if machine and joint <= len(machine.joints) else ""
+    gains = trace.record.gains.get(joint) if trace.record.gains else None
+    title = f"joint {joint}" + (f", {name}" if name else "")
+    colour = JOINT_COLOURS[(joint - 1) % len(JOINT_COLOURS)]
+    axes.set_title(title, loc="left", fontsize=9.5, fontweight="bold", color=colour, pad=14)
+    if gains is not None:
+        axes.set_title("P {} · I {} · D {}".format(*gains), loc="right", fontsize=8, color=QUIET, pad=14)
+    for event in _labelled(trace, column):
+        axes.annotate(
+            _WORDS.get(event.kind, event.kind), (event.time, 1.0), xycoords=("data", "axes fraction"),
+            xytext=(0, 2), textcoords="offset points", ha="center", va="bottom", fontsize=6.5,
+            color=ALARM if event.kind in _ALARMS else QUIET, annotation_clip=False,
+        )  # fmt: skip
+
+
+def _labelled(trace: Trace, column: int) -> list[TraceEvent]:
+    """Marked events whose words do not run into the ones before; alarms come first."""
+    apart = (trace.time[-1] - trace.time[0]) * 0.19
+    marked = [e for e in trace.events if e.kind not in _UNMARKED and e.joint in (None, trace.joints[column])]
+    labelled: list[TraceEvent] = []
+    for event in sorted(marked, key=lambda event: event.kind not in _ALARMS):
+        if all(abs(event.time - other.time) >= apart for other in labelled):
+            labelled.append(event)
+    return labelled
+
+
+def _gaps(trace: Trace) -> list[tuple[float, float]]:
+    if trace.tick is None:
+        return []
+    rows = np.flatnonzero(np.diff(trace.tick) > 1)
+    return [(float(trace.time[row]), float(trace.time[row + 1])) for row in rows]
+
+
+def _broken_at_gaps(trace: Trace, signal: Floats) -> tuple[Floats, Floats]:
+    """Time and signal with a NaN in every gap, where a line would claim what nobody measured."""
+    if trace.tick is None:
+        return trace.time, signal
+    after = np.flatnonzero(np.diff(trace.tick) > 1) + 1
+    return np.insert(trace.time, after, trace.time[after - 1]), np.insert(signal, after, math.nan)
+
+
+def _title(trace: Trace) -> str:
+    record = trace.record
+    what = (record.spec.name or record.spec.trajectory.kind) if record.spec else "trace"
+    source = {"mock": "mock controller", "real": "real arm", "imported": "imported"}[record.source]
+    title = f"{what}, {record.robot}, {source}"
+    return title if record.outcome in ("complete", None) else f"{title}: {record.outcome}"
+
+
+def _foot(trace: Trace) -> str:
+    record = trace.record
+    created = record.created.strftime("%Y-%m-%d %H:%M:%S UTC")
+    return f"{created}   trace {record.trace_id}   {len(trace)} samples, {trace.missing} missing   {record.software}"
+
+
+def _facts(trace: Trace) -> list[tuple[str, str]]:
+    record = trace.record
+    facts = [
+        ("trace", record.trace_id),
+        ("recorded", record.created.strftime("%Y-%m-%d %H:%M:%S UTC")),
+        ("robot", record.robot),
+        ("source", record.source),
+        ("operator", record.operator or "not given"),
+        ("joints", ", ".join(str(joint) for joint in trace.joints)),
+        ("duration", f"{trace.time[-1] - trace.time[0]:.2f} s"),
+        ("samples", f"{len(trace)}, {trace.missing} missing"),
+        ("outcome", record.outcome or "not known"),
+        ("software", record.software),
+        ("notes", record.notes),
+    ]
+    facts += [(name.replace("_", " "), f"{value:g}") for name, value in record.counters.items()]
+    return [(name, value) for name, value in facts if value]
