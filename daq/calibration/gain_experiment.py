@@ -1,0 +1,43 @@
+"""The motion that shows the gain: small steps at several postures."""
+
+from __future__ import annotations
+
+import math
+
+from daq.contracts.experiment import Cubic, ExperimentSpec, Pause, Segment, Sequence, Simple, Step
+
+POSTURES = (0.0, 15.0, -15.0)
+"""Postures about the start, in degrees, visited in this order: choices."""
+STEPS = (1.0, 2.0, 3.0)
+"""Steps at each posture, up and down, in degrees: choices. On a major axis 3° are 46 ADC counts, below the 63.5 at
+which P = 2 saturates the DAC."""
+DWELL = 0.5
+"""Time (s) after each step."""
+TRAVEL = 1.5
+"""Time (s) from posture to posture."""
+
+
+def gain_experiment(joints: tuple[int, ...] = (1, 2, 3), start: dict[int, float] | None = None) -> ExperimentSpec:
+    """The experiment to record for `gains_from_trace`: it ends where it began. `start` in rad, as in any experiment.
+
+    I and D must be 0 while it runs; P stays as it is.
+    """
+    moves: list[Simple] = []
+    at = 0.0
+    for posture in POSTURES:
+        moves += _travel(posture - at)
+        for size in STEPS:
+            for step in (size, -size):
+                moves += [Step(amplitude=math.radians(step)), Pause(duration=DWELL)]
+        at = posture
+    moves += _travel(-at)
+    segments = tuple(Segment(move=move) for move in moves)
+    return ExperimentSpec(
+        trajectory=Sequence(segments=segments), joints=joints, start=start or {}, hold=0.5, name="calibrate-gain"
+    )
+
+
+def _travel(degrees: float) -> list[Simple]:
+    if degrees == 0:
+        return []
+    return [Cubic(amplitude=math.radians(degrees), duration=TRAVEL), Pause(duration=DWELL)]
