@@ -65,9 +65,14 @@ class DoubleReader:
         self._clock = clock
         self._period_s = period_s
         self._delivered: dict[int, int] = {}
+        self.disturbed = False
+        """Whether the last period's readings met the controller's change of the memory."""
 
     def read(self, joints: Sequence[int]) -> tuple[tuple[int, JointReading], ...] | None:
-        """A reading of one period; None when no two readings in a row agreed within one. Raises LinkError."""
+        """A reading of one period; None when no two readings in a row agreed within one.
+
+        None too when every byte is zero: so reads the memory of a board that has lost its supply. Raises LinkError.
+        """
         wanted = [address for name in READ_REGISTERS for address in self._addresses(name, joints)]
         requests = [ReadBlock(span.start, span.count) for span in spans(wanted)]
         readings: list[dict[int, int]] = []
@@ -79,10 +84,12 @@ class DoubleReader:
             readings.append(self._read_once(requests))
             end = self._clock.now()
             if len(readings) > 1 and readings[-1] == readings[-2] and end - before < self._period_s:
-                return self._accept(readings, joints)
+                self.disturbed = len(readings) > 2
+                return self._accept(readings, joints) if any(readings[-1].values()) else None
             if end - begin >= self._period_s:
                 break
             before = start
+        self.disturbed = True
         self._link.tally.count("torn", sum(a != b for a, b in pairwise(readings)))
         return None
 

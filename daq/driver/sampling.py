@@ -26,6 +26,8 @@ from firmware_protocol.commands import (
     mask_of,
 )
 
+PHASE_STEP = 0.25
+"""Periods by which the readings move away from the controller's own moment after they have met it."""
 MOST_MISSING = 10
 """Periods in a row without a consistent reading after which the memory counts as unreadable."""
 
@@ -72,7 +74,6 @@ class Deliveries:
     def check_restart(self, status: int) -> None:
         """Raises ControllerRestartedError when the status says that the board has been reset."""
         if status & StatusFlag.RESTARTED:
-            self.link.tally.count("restarts")
             self.watch.forget()
             raise ControllerRestartedError(
                 "the controller has restarted (a dip of its supply?): its set points and gains are those of power-up; "
@@ -152,13 +153,15 @@ class MemorySampling:
     """Without SAMPLE: the memory is read twice in every period of the host's own clock.
 
     Tick 1 is the period of the first reading. Host and board count periods with clocks of their own: over hours one
-    of them gets ahead, and a period is then read twice or left out without anyone knowing.
+    of them gets ahead, and a period is then read twice or left out without anyone knowing. Where the readings meet
+    the controller's change of the memory, they move a quarter of a period later and stay there.
     """
 
     def __init__(self, deliveries: Deliveries, reader: DoubleReader) -> None:
         self._deliveries = deliveries
         self._reader = reader
         self._start: float | None = None
+        self._phase_s = 0.0
 
     def write(self, postures: Mapping[int, int]) -> SetPointsTaken:
         """Set points; by the host's estimate they are taken one period after they have been confirmed."""
@@ -168,17 +171,28 @@ class MemorySampling:
 
     def next(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
         """Sends the set points, waits for the next period of the host's clock, and reads."""
-        if postures:
-            self.write(postures)
+        status = self.write(postures).status if postures else None
         deliveries = self._deliveries
         for tick in self._ticks_to_come(after):
             scheduled = self._time_of(tick)
             deliveries.clock.sleep_until(scheduled)
             joints_read = self._reader.read(joints)
+            if self._reader.disturbed:
+                self._phase_s += PHASE_STEP * deliveries.period_s
             if joints_read is not None:
                 times = (deliveries.clock.now(), scheduled)
-                return deliveries.deliver(tick, after, times, joints_read, StatusFlag(0), "double-read")
-        raise NoSampleError(f"no consistent reading of the shared memory in {MOST_MISSING} periods")
+                flags = StatusFlag(self._status() if status is None else status)
+                return deliveries.deliver(tick, after, times, joints_read, flags, "double-read")
+        self._status()
+        raise NoSampleError(
+            f"no consistent reading of the shared memory in {MOST_MISSING} periods: is the line too slow?"
+        )
+
+    def _status(self) -> int:
+        """The board's flags. Raises ControllerRestartedError."""
+        status = self._deliveries.link.request(ReadStatus(), Status).status
+        self._deliveries.check_restart(status)
+        return status
 
     def _ticks_to_come(self, after: int | None) -> range:
         current = self._current_tick()
@@ -189,8 +203,8 @@ class MemorySampling:
         now = self._deliveries.clock.now()
         if self._start is None:
             self._start = now
-        return int((now - self._start) / self._deliveries.period_s)
+        return int((now - self._start - self._phase_s) / self._deliveries.period_s)
 
     def _time_of(self, tick: int) -> float:
         assert self._start is not None
-        return self._start + tick * self._deliveries.period_s
+        return self._start + self._phase_s + tick * self._deliveries.period_s

@@ -70,8 +70,11 @@ def parse_port_url(text: str) -> PortUrl:
     if "://" not in text:
         hint = f"; for a device write serial://{text}" if text.startswith("/") else ""
         raise TransportError(f"port {text!r}: must begin with serial://, tcp:// or mock://{hint}")
-    parts = urlsplit(text)
-    options = parse_qsl(parts.query, keep_blank_values=True)
+    try:
+        parts = urlsplit(text)
+        options = parse_qsl(parts.query, keep_blank_values=True)
+    except ValueError as error:
+        raise TransportError(f"port {text!r}: no URL: {error}") from error
     if parts.scheme == "serial":
         return _serial(text, parts.netloc + parts.path, _single(text, options, _SERIAL_OPTIONS))
     if parts.scheme == "tcp":

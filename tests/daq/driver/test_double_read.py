@@ -1,0 +1,151 @@
+"""Readings through the documented addresses: whole or not at all, whatever moment the controller chooses."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from daq.driver.double_read import DoubleReader, Span, spans
+from daq.link import Link
+from firmware_protocol.memory_map import MemoryMap, default_memory_map
+from tests.daq.driver.memory_board import PERIOD_S, MemoryBoard
+from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint
+
+
+class ChannelClock:
+    """The scripted channel's clock as the driver wants it."""
+
+    def __init__(self, channel: ScriptedChannel) -> None:
+        self._channel = channel
+
+    def now(self) -> float:
+        return self._channel.time
+
+    def sleep_until(self, time_s: float) -> None:
+        self._channel.time = max(self._channel.time, time_s)
+
+
+def reader_of(board: MemoryBoard) -> tuple[DoubleReader, Link, ScriptedChannel]:
+    channel = ScriptedChannel(board.answer)
+    board.now = channel.now
+    link = Link(ScriptedEndpoint([channel]), now=channel.now)
+    return DoubleReader(link, board.memory_map, ChannelClock(channel), PERIOD_S), link, channel
+
+
+def counting(period: int) -> list[tuple[int, int, int]]:
+    """Positions that differ in both bytes from one period to the next, as do errors and powers."""
+    value = period * 0x101 % 0x1000
+    return [(value, period % 128 - 64, period % 128)] * 6
+
+
+def test_the_documented_positions_are_one_request_of_eleven_bytes() -> None:
+    register = default_memory_map()["position"]
+    assert register.high is not None
+    assert spans([*register.low[:3], *register.high[:3]]) == (Span(0xFC20, 11),)
+
+
+def test_positions_errors_and_powers_of_all_joints_fit_in_one_request() -> None:
+    memory_map = default_memory_map()
+    wanted = [address for name in ("position", "error", "power") for address in memory_map[name].addresses]
+    assert spans(wanted) == (Span(0xFC20, 38),)
+
+
+@given(st.sets(st.integers(0, 0xFFFF), min_size=1, max_size=40))
+def test_spans_cover_every_address_in_order_without_reading_past_it(addresses: set[int]) -> None:
+    found = spans(sorted(addresses))
+    covered = [address for span in found for address in range(span.start, span.start + span.count)]
+    assert addresses <= set(covered)
+    assert covered == sorted(set(covered))
+    assert all(span.count <= 48 and {span.start, span.start + span.count - 1} <= addresses for span in found)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    phase=st.floats(0.0, PERIOD_S),
+    store=st.floats(0.0, 60e-6),
+    byte=st.floats(1e-6, 40e-6),
+    delay=st.floats(0.0, 0.004),
+)
+def test_no_reading_mixes_two_periods(phase: float, store: float, byte: float, delay: float) -> None:
+    board = MemoryBoard(counting, phase, store, byte, delay)
+    reader, _, channel = reader_of(board)
+    delivered = 0
+    for period in range(2, 30):
+        channel.time = max(channel.time, period * PERIOD_S)
+        begin = channel.time
+        joints = reader.read((1, 2, 3, 4, 5, 6))
+        if joints is None:
+            continue
+        delivered += 1
+        whole = [counting(k) for k in range(int((begin - phase) // PERIOD_S) - 1, int(channel.time // PERIOD_S) + 1)]
+        read = [(reading.position, reading.error, reading.power) for _, reading in joints]
+        assert read in whole
+    assert delivered > 20 or delay > 0.003, "two readings hardly fit in a period"
+
+
+def test_a_torn_reading_is_caught_counted_and_read_again() -> None:
+    # The reading begins at 40 ms + 1 ms and takes 0.76 ms; the memory changes in its middle.
+    board = MemoryBoard(counting, phase_s=0.0014)
+    reader, link, channel = reader_of(board)
+    channel.time = 2 * PERIOD_S
+    joints = reader.read((1, 2, 3, 4, 5, 6))
+    assert joints is not None
+    assert [(reading.position, reading.error, reading.power) for _, reading in joints] == counting(2)
+    assert link.counters.torn == 1
+    assert reader.disturbed
+
+
+def test_a_mixture_that_repeats_after_a_period_is_not_taken() -> None:
+    # Noise between 0FF and 100: two slow readings, each hit by a change, show 1FF or 000 alike.
+    board = MemoryBoard(lambda k: [(0x0FF if k % 2 else 0x100, 0, 0)] * 6, byte_s=550e-6)
+    reader, link, channel = reader_of(board)
+    for period in range(2, 200):
+        channel.time = max(channel.time, period * PERIOD_S + 0.0007 * period % PERIOD_S)
+        joints = reader.read((1,))
+        if joints is not None:
+            assert joints[0][1].position in (0x0FF, 0x100)
+
+
+def test_a_line_too_slow_for_two_readings_in_a_period_delivers_nothing() -> None:
+    reader, _, channel = reader_of(MemoryBoard(lambda _: [(2048, 0, 0)] * 6, delay_s=0.012))
+    channel.time = 2 * PERIOD_S
+    assert reader.read((1, 2, 3)) is None
+
+
+def test_the_memory_of_a_board_without_supply_is_no_reading() -> None:
+    reader, _, channel = reader_of(MemoryBoard(lambda _: [(0, 0, 0)] * 6))
+    channel.time = 2 * PERIOD_S
+    assert reader.read((1, 2, 3)) is None
+
+
+def elsewhere() -> MemoryMap:
+    """A laboratory's own map: every register moved, bytes scattered."""
+    data = default_memory_map().model_dump()
+    data["base"], data["size"] = 0x2000, 0x1000
+    for number, register in enumerate(data["registers"].values()):
+        for column in ("low", "high"):
+            if register[column] is not None:
+                shift = 0x100 * number + (0x80 if column == "high" else 0)
+                register[column] = [0x2000 + shift + 7 * i for i in range(len(register[column]))]
+    return MemoryMap.model_validate(data)
+
+
+def test_another_memory_map_is_followed() -> None:
+    board = MemoryBoard(counting, memory_map=elsewhere(), delay_s=0.0005)
+    reader, _, channel = reader_of(board)
+    channel.time = 3.2 * PERIOD_S
+    joints = reader.read((1, 4))
+    assert joints is not None
+    assert [(joint, reading.position, reading.error, reading.power) for joint, reading in joints] == [
+        (joint, *counting(3)[0]) for joint in (1, 4)
+    ]
+
+
+def test_the_set_point_of_a_reading_is_the_one_the_controller_used() -> None:
+    reader, _, channel = reader_of(MemoryBoard(lambda _: [(2040, 8, 16)] * 6))
+    channel.time = 2.5 * PERIOD_S
+    joints = reader.read((1,))
+    assert joints is not None
+    assert joints[0][1].set_point == 500
+    assert joints[0][1].error == pytest.approx(8)

@@ -1,0 +1,34 @@
+"""The host time of a tick, from arrivals that are late by the line and the scheduler."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from daq.driver.tick_time import WINDOW_TICKS, TickTime
+
+
+@given(st.lists(st.floats(0.0, 0.05), min_size=1, max_size=100))
+def test_no_sample_is_estimated_to_have_arrived_before_its_tick(delays: list[float]) -> None:
+    estimator = TickTime(0.02)
+    quickest = float("inf")
+    for tick, delay in enumerate(delays, 1):
+        quickest = min(quickest, delay)
+        arrival = 100.0 + 0.02 * tick + delay
+        estimate = estimator.arrived(tick, arrival)
+        assert estimate <= arrival + 1e-12
+        assert estimate == pytest.approx(100.0 + 0.02 * tick + quickest)
+
+
+def test_a_clock_that_drifts_is_followed_within_the_window() -> None:
+    estimator = TickTime(0.02)
+    slow = 0.02 * (1 + 100e-6)
+    errors = [estimator.arrived(tick, slow * tick) - slow * tick for tick in range(1, 20_000)]
+    assert min(errors) == pytest.approx(-0.02 * 100e-6 * WINDOW_TICKS, rel=0.01)
+
+
+def test_after_a_gap_longer_than_the_window_the_estimate_starts_anew() -> None:
+    estimator = TickTime(0.02)
+    estimator.arrived(1, 0.02)
+    assert estimator.arrived(10_000, 300.0) == 300.0

@@ -1,0 +1,100 @@
+"""A stop from one thread while another waits for a sample: written at once, confirmed by itself."""
+
+from __future__ import annotations
+
+import threading
+from queue import Empty, SimpleQueue
+
+from daq.link import Link
+from firmware_protocol.commands import Request, Sample, Snapshot, Stop, Stopped, parse_request
+from firmware_protocol.framing import FrameDecoder
+from firmware_protocol.joints import JointReading
+from tests.daq.link.scripted import frame_of
+
+STOPPED = Stopped(9, (500, 501, 502, 503, 504, 505))
+SNAPSHOT = Snapshot(10, 1, ((1, JointReading(500, 2048, 0, 0)),))
+
+
+class SampleWaitsForStop:
+    """Answers a sample only when a stop has been answered before."""
+
+    description = "bench"
+    lock_step = False
+    url = "bench://"
+    bytes_per_second = 11520.0
+    control = None
+
+    def __init__(self) -> None:
+        self.sample_waits = threading.Event()
+        self.order: list[type[Request]] = []
+        self._decoder = FrameDecoder()
+        self._sample: int | None = None
+        self._replies: SimpleQueue[bytes] = SimpleQueue()
+
+    def connect(self) -> SampleWaitsForStop:
+        return self
+
+    def write(self, data: bytes) -> None:
+        for frame in self._decoder.feed(data):
+            request = parse_request(frame)
+            self.order.append(type(request))
+            if isinstance(request, Sample):
+                self._sample = frame.sequence
+                self.sample_waits.set()
+            elif isinstance(request, Stop):
+                self._replies.put(frame_of(frame.sequence, STOPPED))
+
+    def answer_sample(self) -> None:
+        assert self._sample is not None
+        self._replies.put(frame_of(self._sample, SNAPSHOT))
+
+    def read(self, timeout_s: float) -> bytes:
+        try:
+            return self._replies.get(timeout=timeout_s)
+        except Empty:
+            return b""
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+def test_a_stop_overtakes_a_waiting_sample_and_the_sample_still_arrives() -> None:
+    bench = SampleWaitsForStop()
+    link = Link(bench)
+    link.set_period(30.0)  # the sample's own patience does not come into it
+    samples: list[Snapshot] = []
+    sampler = threading.Thread(target=lambda: samples.append(link.request(Sample(9, 1), Snapshot)))
+    sampler.start()
+    assert bench.sample_waits.wait(5)
+    assert link.stop() == STOPPED
+    assert not samples
+    bench.answer_sample()
+    sampler.join(5)
+    assert samples == [SNAPSHOT]
+    assert bench.order == [Sample, Stop, Stop]
+
+
+def test_many_threads_share_one_link_and_each_gets_its_own_reply() -> None:
+    class Echo(SampleWaitsForStop):
+        def write(self, data: bytes) -> None:
+            for frame in self._decoder.feed(data):
+                request = parse_request(frame)
+                assert isinstance(request, Sample)
+                self._replies.put(frame_of(frame.sequence, Snapshot(request.after + 1, 0, SNAPSHOT.joints)))
+
+    link = Link(Echo())
+    wrong: list[int] = []
+
+    def ask(first: int) -> None:
+        for after in range(first, first + 200):
+            if link.request(Sample(after, 1), Snapshot).tick != after + 1:
+                wrong.append(after)
+
+    threads = [threading.Thread(target=ask, args=(1000 * number,)) for number in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(20)
+    assert not wrong
+    assert link.counters.requests == 1200
+    assert link.counters.retries == 0

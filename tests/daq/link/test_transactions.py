@@ -1,0 +1,209 @@
+"""What a link makes of lost, late, repeated, foreign and refused replies."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from daq.link import Link, LinkLostError, LinkState, LinkTimeoutError, RequestRefusedError
+from daq.link.timing import CLEAN_TRANSACTIONS, RETRIES
+from firmware_protocol.commands import (
+    Block,
+    ReadBlock,
+    ReadStatus,
+    Refusal,
+    Refused,
+    Reply,
+    Request,
+    Sample,
+    SetPointsTaken,
+    Snapshot,
+    Status,
+    WriteSetPoints,
+)
+from firmware_protocol.joints import JointReading
+from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint, frame_of, scripted_link
+
+STATUS = Status(7, 0, 1, 0)
+TAKEN = SetPointsTaken(7, 0)
+SNAPSHOT = Snapshot(8, 0, ((1, JointReading(500, 2048, 0, 0)),))
+
+
+def right_reply(request: Request) -> Reply:
+    match request:
+        case ReadBlock():
+            return Block(request.address.to_bytes(2, "little") * (request.count // 2))
+        case WriteSetPoints():
+            return TAKEN
+        case Sample():
+            return SNAPSHOT
+        case _:
+            return STATUS
+
+
+def test_a_request_gets_its_reply_and_a_lost_reply_is_asked_for_under_the_same_number() -> None:
+    seen: list[int] = []
+
+    def loses_the_first(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        seen.append(sequence)
+        return [(0.001, frame_of(sequence, STATUS))] if len(seen) > 1 else []
+
+    link, _ = scripted_link(loses_the_first)
+    assert link.request(ReadStatus(), Status) == STATUS
+    assert seen == [0, 0]
+    assert (link.counters.requests, link.counters.retries, link.counters.timeouts) == (1, 1, 1)
+    assert link.state is LinkState.DEGRADED
+    for _ in range(CLEAN_TRANSACTIONS):
+        link.request(ReadStatus(), Status)
+    assert link.state is LinkState.CONNECTED
+    assert seen[2:] == list(range(1, CLEAN_TRANSACTIONS + 1))
+
+
+def test_the_budget_of_one_transaction_ends_in_one_clear_line() -> None:
+    link, channel = scripted_link(lambda _sequence, _request: [])
+    with pytest.raises(LinkTimeoutError, match=rf"script: no reply to ReadStatus, asked {RETRIES + 1} times") as caught:
+        link.request(ReadStatus(), Status)
+    assert caught.value.sent
+    assert len(channel.asked) == RETRIES + 1
+    assert len({sequence for sequence, _ in channel.asked}) == 1
+    assert link.state is LinkState.LOST
+
+
+def test_requests_written_together_cost_one_write_and_only_the_lost_one_is_repeated() -> None:
+    lost = iter([True])
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        if isinstance(request, WriteSetPoints) and next(lost, False):
+            return []
+        return [(0.002, frame_of(sequence, right_reply(request)))]
+
+    link, channel = scripted_link(answer)
+    replies = link.exchange(WriteSetPoints(((1, 500),)), Sample(7, 1))
+    assert replies == (TAKEN, SNAPSHOT)
+    assert len(channel.writes) == 2
+    assert [type(request).__name__ for _, request in channel.asked] == ["WriteSetPoints", "Sample", "WriteSetPoints"]
+
+
+def test_a_reply_that_nobody_waits_for_is_dropped_and_counted() -> None:
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        foreign = frame_of(sequence + 500, STATUS)
+        wrong_kind = frame_of(sequence, TAKEN)
+        right = frame_of(sequence, STATUS)
+        return [(0.001, foreign), (0.001, wrong_kind), (0.001, right + right)]
+
+    link, _ = scripted_link(answer)
+    assert link.request(ReadStatus(), Status) == STATUS
+    assert (link.counters.stale, link.counters.duplicates) == (2, 1)
+
+
+def test_a_refusal_says_which_request_and_why_and_is_not_repeated() -> None:
+    def refuses(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        return [(0.0, frame_of(sequence, Refused(request.OPCODE, Refusal.FROZEN)))]
+
+    link, channel = scripted_link(refuses)
+    with pytest.raises(RequestRefusedError, match="refused WriteSetPoints: it has been stopped"):
+        link.request(WriteSetPoints(((1, 500),)), SetPointsTaken)
+    assert len(channel.asked) == 1
+    assert link.counters.refused == 1
+
+
+def test_damage_is_counted_and_costs_one_repetition() -> None:
+    damaged = iter([True])
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        frame = bytearray(frame_of(sequence, STATUS))
+        if next(damaged, False):
+            frame[5] ^= 0x10
+        return [(0.0, bytes(frame))]
+
+    link, _ = scripted_link(answer)
+    assert link.request(ReadStatus(), Status) == STATUS
+    assert (link.counters.damaged, link.counters.retries) == (1, 1)
+
+
+def test_round_trips_are_measured_where_it_is_known_which_copy_was_answered() -> None:
+    delays = iter([0.004, 0.004, 0.500])  # the third comes after repetitions: not measured
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        return [(next(delays, 0.004), frame_of(sequence, STATUS))]
+
+    link, _ = scripted_link(answer)
+    for _ in range(3):
+        link.request(ReadStatus(), Status)
+    trips = link.counters.round_trips
+    assert trips.count == 2
+    assert trips.mean_s == pytest.approx(0.004)
+    assert trips.p99_s == pytest.approx(0.004, rel=0.1)
+    assert trips.max_s == pytest.approx(0.004)
+
+
+def test_after_the_channel_has_ended_nothing_is_asked_until_reconnected() -> None:
+    first = ScriptedChannel(lambda _sequence, _request: [])
+    second = ScriptedChannel(lambda sequence, _: [(0.0, frame_of(sequence, STATUS))])
+    endpoint = ScriptedEndpoint([first, second])
+    link = Link(endpoint, now=first.now)
+    first.broken = "cable pulled"
+    for _ in range(2):
+        with pytest.raises(LinkLostError, match="cable pulled"):
+            link.request(ReadStatus(), Status)
+    assert link.state is LinkState.LOST
+    assert not first.asked
+    link.reconnect()
+    assert not second.asked, "a new channel is opened and nothing is sent over it"
+    assert link.request(ReadStatus(), Status) == STATUS
+    assert second.asked[0][0] == 1, "numbers go on: an old reply is never taken for a new one"
+    assert link.counters.reconnections == 1
+
+
+class _Waits:
+    """Ends the attempts after the delays it was asked for; never sleeps."""
+
+    def __init__(self, attempts: int) -> None:
+        self.delays: list[float] = []
+        self._attempts = attempts
+
+    def wait(self, timeout: float) -> bool:
+        self.delays.append(timeout)
+        return len(self.delays) > self._attempts
+
+
+def test_reconnection_waits_twice_as_long_each_time_up_to_a_limit() -> None:
+    channel = ScriptedChannel(lambda _sequence, _request: [])
+    link = Link(ScriptedEndpoint([channel]), now=channel.now)
+    waits = _Waits(9)
+    with pytest.raises(LinkLostError, match="not connected again: nobody there"):
+        link.reconnect(waits)
+    assert waits.delays == [0.0, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5.0, 5.0, 5.0]
+
+
+@given(
+    fates=st.lists(st.sampled_from(["answer", "lose", "twice", "late", "damage", "foreign"]), max_size=60),
+    addresses=st.lists(st.integers(0, 0xFFF0), min_size=1, max_size=12),
+)
+def test_whatever_happens_to_replies_each_request_gets_its_own_or_none(fates: list[str], addresses: list[int]) -> None:
+    script = iter(fates)
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        reply = frame_of(sequence, right_reply(request))
+        match next(script, "answer"):
+            case "lose":
+                return []
+            case "twice":
+                return [(0.001, reply), (0.002, reply)]
+            case "late":
+                return [(0.120, reply)]
+            case "damage":
+                return [(0.001, bytes((*reply[:4], reply[4] ^ 1, *reply[5:])))]
+            case "foreign":
+                return [(0.001, frame_of((sequence + 1) % 0x10000, Block(b"\xee\xee"))), (0.001, reply)]
+            case _:
+                return [(0.001, reply)]
+
+    link, _ = scripted_link(answer)
+    for address in addresses:
+        try:
+            block = link.request(ReadBlock(address, 4), Block)
+        except LinkTimeoutError:
+            continue
+        assert block.data == address.to_bytes(2, "little") * 2

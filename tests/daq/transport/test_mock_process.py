@@ -1,0 +1,60 @@
+"""mock:// starts a controller of its own, and ends it, however its owner ends."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+from contextlib import closing
+
+import pytest
+
+from daq.transport import TransportError, open_endpoint
+
+OWNER = """
+import json, sys
+from daq.transport import parse_port_url
+from daq.transport.mock_process import start_mock
+mock = start_mock(parse_port_url("mock://?lock_step=1"))
+print(mock._process.pid, flush=True)
+sys.stdin.read()
+"""
+
+
+def test_the_mock_ends_with_an_owner_that_is_killed() -> None:
+    owner = subprocess.Popen([sys.executable, "-c", OWNER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert owner.stdin is not None
+    assert owner.stdout is not None
+    handle = os.pidfd_open(int(owner.stdout.readline()))
+    try:
+        owner.send_signal(signal.SIGKILL)
+        owner.wait(10)
+        assert select.select([handle], [], [], 10)[0], "the mock outlived its owner"
+    finally:
+        os.close(handle)
+        owner.stdin.close()
+        owner.stdout.close()
+
+
+def test_a_mock_that_cannot_start_says_why_in_one_line() -> None:
+    with pytest.raises(TransportError, match="the mock controller did not start: .*nonsense") as caught:
+        open_endpoint("mock://?fault=nonsense")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_mock_can_be_left_and_come_back_to_and_is_missed_when_it_has_ended() -> None:
+    with closing(open_endpoint("mock://?lock_step=1")) as endpoint:
+        assert endpoint.control is not None
+        endpoint.connect().close()
+        endpoint.connect().close()
+        endpoint.close()
+        with pytest.raises(TransportError, match="the mock controller has ended"):
+            endpoint.connect()
+
+
+def test_an_endpoint_may_be_closed_twice() -> None:
+    endpoint = open_endpoint("mock://?pty=1")
+    endpoint.close()
+    endpoint.close()
