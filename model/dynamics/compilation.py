@@ -22,6 +22,8 @@ CACHE_DAYS = 30
 """Caches of older sources that have not been touched for this long are removed."""
 
 _SOURCES = Path(__file__).resolve().parents[1]
+_numba_settings: Any = numba.config
+_PARENT = Path(_numba_settings.CACHE_DIR or platformdirs.user_cache_path("ma2000-daq") / "compiled")
 
 
 def source_hash(folder: Path = _SOURCES) -> str:
@@ -35,16 +37,15 @@ def source_hash(folder: Path = _SOURCES) -> str:
 
 def cache_folder() -> Path:
     """Folder of the compiled code of these very sources; NUMBA_CACHE_DIR, where set, moves its parent."""
-    parent = numba.config.CACHE_DIR or platformdirs.user_cache_path("ma2000-daq") / "compiled"
-    return Path(parent) / source_hash()
+    return _PARENT / source_hash()
 
 
 def _use_cache_folder() -> None:
     folder = cache_folder()
     if not folder.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        _remove_old(folder.parent, time.time() - CACHE_DAYS * 86_400)
-    numba.config.CACHE_DIR = str(folder)
+        _remove_old(_PARENT, time.time() - CACHE_DAYS * 86_400)
+    _numba_settings.CACHE_DIR = str(folder)
 
 
 def _remove_old(parent: Path, before: float) -> None:

@@ -18,7 +18,7 @@ from numba.extending import overload
 from model.dynamics.compilation import inlined
 
 # numba asks that an overload and its implementations agree in their annotations, hence Any throughout.
-_OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}}
+_OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}}
 
 DUAL_STEP = 1e-20
 """Imaginary part that stands for a unit derivative; its square is far below the rounding of any quantity."""
@@ -49,8 +49,7 @@ def _sin_cos_real(x: float) -> tuple[float, float]:
         + zz * ((-1 / 39916800 + z * (1 / 6227020800)) + zz * (-1 / 1307674368000 + z * (1 / 355687428096000)))
     )
     even = (1 / 24 + z * (-1 / 720)) + zz * (
-        (1 / 40320 + z * (-1 / 3628800))
-        + zz * ((1 / 479001600 + z * (-1 / 87178291200)) + zz * (1 / 20922789888000))
+        (1 / 40320 + z * (-1 / 3628800)) + zz * ((1 / 479001600 + z * (-1 / 87178291200)) + zz * (1 / 20922789888000))
     )
     s = r + r * z * odd
     half = 0.5 * z
@@ -61,7 +60,7 @@ def _sin_cos_real(x: float) -> tuple[float, float]:
     return -sine if quadrant & 2 else sine, -cosine if (quadrant + 1) & 2 else cosine
 
 
-def sin_cos(x: complex) -> tuple[Any, Any]:
+def sin_cos(x: float | complex) -> tuple[Any, Any]:
     """Sine and cosine of an angle in rad, |x| ≤ `LARGEST_ANGLE`."""
     if isinstance(x, complex):
         s, c = math.sin(x.real), math.cos(x.real)
@@ -69,7 +68,7 @@ def sin_cos(x: complex) -> tuple[Any, Any]:
     return math.sin(x), math.cos(x)
 
 
-def reciprocal(x: complex) -> Any:
+def reciprocal(x: float | complex) -> Any:
     """1 / x."""
     if isinstance(x, complex):
         r = 1.0 / x.real

@@ -147,8 +147,7 @@ def _check_geometry(chain: Chain) -> None:
     if not has_closed_form(chain):
         described = ", ".join(f"{j.kind.value} α={j.alpha:.6g} a={j.a:.6g}" for j in chain.joints)
         raise ChainError(
-            "the closed form needs three revolute joints with α1 = π/2, α2 = 0, a1 = 0; "
-            f"this chain has {described}"
+            f"the closed form needs three revolute joints with α1 = π/2, α2 = 0, a1 = 0; this chain has {described}"
         )
 
 

@@ -220,7 +220,9 @@ def _composites(chain: ChainArrays, table: Array) -> Array:
     """
     n = table.shape[0]
     bodies = np.zeros((n + 1, 10), dtype=table.dtype)
-    bodies[1:] = chain.inertial
+    for i in range(n):
+        for k in range(10):  # assigning a slice would take numba seconds to compile
+            bodies[i + 1, k] = chain.inertial[i, k]
     for i in range(n - 1, -1, -1):
         _add_to_previous(table, bodies, i)
     return bodies

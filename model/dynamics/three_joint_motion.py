@@ -28,7 +28,5 @@ def accelerations(
     For a tilted base subtract `three_joint.horizontal_gravity_torques` from the torques first. The waist's angle is
     not an argument: on a level base nothing depends on it.
     """
-    d11, d12, d13, d22, d23, d33, b1, b2, b3 = mass_matrix_and_bias(
-        theta_2, theta_3, rate_1, rate_2, rate_3, p
-    )
+    d11, d12, d13, d22, d23, d33, b1, b2, b3 = mass_matrix_and_bias(theta_2, theta_3, rate_1, rate_2, rate_3, p)
     return solve_3(d11, d12, d13, d22, d23, d33, torque_1 - b1, torque_2 - b2, torque_3 - b3)

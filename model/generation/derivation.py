@@ -66,15 +66,14 @@ def in_effective_parameters(full: Dynamics) -> Dynamics:
         ValueError: if the lumping is wrong.
     """
     p = {symbol.name.upper(): symbol for symbol in EFFECTIVE}
-    own = dict.fromkeys((s for link in LINKS for s in link), sp.Integer(0))
-    m1, s1x, s1y, s1z, *_, i1yy, i1yz, i1zz = LINKS[0]
-    _, s2x, s2y, _, _, i2xy, i2xz, i2yy, i2yz, i2zz = LINKS[1]
-    _, s3x, s3y, _, _, i3xy, i3xz, i3yy, i3yz, i3zz = LINKS[2]
-    own |= {s1x: p["S1_X"], s1z: p["S1_Z"], i1yy: p["WAIST"]}
-    own |= {s2x: p["S2_X"], s2y: p["S2_Y"], i2xy: p["I2_XY"], i2xz: p["I2_XZ"]}
-    own |= {i2yy: p["I2_YY_XX"], i2yz: p["I2_YZ"], i2zz: p["I2_ZZ"]}
-    own |= {s3x: p["S3_X"], s3y: p["S3_Y"], i3xy: p["I3_XY"], i3xz: p["I3_XZ"]}
-    own |= {i3yy: p["I3_YY_XX"], i3yz: p["I3_YZ"], i3zz: p["I3_ZZ"]}
+    kept = {
+        "s1x": "S1_X", "s1z": "S1_Z", "i1yy": "WAIST",
+        "s2x": "S2_X", "s2y": "S2_Y", "i2xy": "I2_XY", "i2xz": "I2_XZ",
+        "i2yy": "I2_YY_XX", "i2yz": "I2_YZ", "i2zz": "I2_ZZ",
+        "s3x": "S3_X", "s3y": "S3_Y", "i3xy": "I3_XY", "i3xz": "I3_XZ",
+        "i3yy": "I3_YY_XX", "i3yz": "I3_YZ", "i3zz": "I3_ZZ",
+    }  # fmt: skip
+    own = {s: p[kept[s.name]] if s.name in kept else sp.Integer(0) for link in LINKS for s in link}
     own |= {ROTORS[0]: sp.Integer(0), ROTORS[1]: sp.Integer(0), ROTORS[2]: p["ROTOR_3"]}
     own |= {OFFSET_2: sp.Integer(0), LENGTH_2: p["LENGTH_2"]}
     own |= {g: p[g.name.upper()] for g in GRAVITY}

@@ -45,11 +45,11 @@ class _ProductsForPowers:
         return f"{int(expression)}.0"
 
 
-class _PythonPrinter(_ProductsForPowers, PythonCodePrinter):
+class _PythonPrinter(_ProductsForPowers, PythonCodePrinter):  # type: ignore[misc]
     pass
 
 
-class _CPrinter(_ProductsForPowers, C99CodePrinter):
+class _CPrinter(_ProductsForPowers, C99CodePrinter):  # type: ignore[misc]
     pass
 
 
@@ -59,6 +59,8 @@ _PYTHON_HEADER = '''"""Closed-form dynamics of the waist-shoulder-elbow arm. Gen
 angles in rad, rates in rad/s, results in N·m and kg·m². `p` is the vector of effective inertial parameters laid out
 in `model.dynamics.effective_inertia`. Real or dual numbers; nothing is allocated.
 """
+
+# ruff: noqa: PLR0915  (straight-line code is as long as it is)
 
 from __future__ import annotations
 

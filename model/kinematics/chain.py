@@ -185,9 +185,7 @@ def _check_joint(number: int, joint: Joint) -> None:
         if not np.isfinite(getattr(joint, name)):
             raise ChainError(f"joint {number}: {name} is {getattr(joint, name)}; a finite number is needed")
     if not (np.isfinite(joint.rotor_inertia) and joint.rotor_inertia >= 0):
-        raise ChainError(
-            f"joint {number}: rotor inertia is {joint.rotor_inertia}; zero or a positive number is needed"
-        )
+        raise ChainError(f"joint {number}: rotor inertia is {joint.rotor_inertia}; zero or a positive number is needed")
 
 
 def _check_link(number: int, link: Link) -> None:

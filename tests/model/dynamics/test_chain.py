@@ -70,7 +70,9 @@ def test_the_load_acts_as_one_more_point_of_the_last_link() -> None:
     points.inertial[-1, 0] += chain.load
     points.inertial[-1, 1:4] += chain.load * lever
     x, y, z = lever
-    points.inertial[-1, 4:] += chain.load * np.array([y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y])
+    points.inertial[-1, 4:] += chain.load * np.array(
+        [y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y]
+    )
     np.testing.assert_allclose(points.inertial, chain.arrays().inertial, atol=1e-15)
 
 

@@ -35,7 +35,7 @@ def general_arm(seed: int) -> Chain:
 
 
 @numba.njit
-def evaluate(q: FloatArray, v: FloatArray, torque: FloatArray, p: FloatArray):  # type: ignore[no-untyped-def]  # noqa: ANN201
+def evaluate(q: FloatArray, v: FloatArray, torque: FloatArray, p: FloatArray):  # type: ignore[no-untyped-def]
     level = three_joint.mass_matrix_and_bias(q[1], q[2], v[0], v[1], v[2], p)
     inertia = three_joint.mass_matrix(q[1], q[2], p)
     velocity = three_joint.velocity_torques(q[1], q[2], v[0], v[1], v[2], p)
@@ -101,7 +101,9 @@ def test_sensitivities_to_physical_parameters_are_exact() -> None:
             continue
         stepped = rods.astype(complex)
         stepped[parameter] += 1j * DUAL_STEP
-        motion = evaluate(q.astype(complex), v.astype(complex), torque.astype(complex), effective_from_rods(stepped))[-1]
+        motion = evaluate(q.astype(complex), v.astype(complex), torque.astype(complex), effective_from_rods(stepped))[
+            -1
+        ]
         exact = np.imag(motion) / DUAL_STEP
         wide = central_difference(rods, parameter, q, v, torque)
         np.testing.assert_allclose(exact, wide, rtol=1e-6, atol=1e-6)

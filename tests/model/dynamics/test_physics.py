@@ -14,7 +14,9 @@ from tests.model.dynamics.chains import OFFSET_ARM, TABLE_7_9, dual, random_chai
 CHAINS = [*(random_chain(11, n) for n in range(1, 7)), TABLE_7_9.chain(), OFFSET_ARM.chain()]
 
 
-def free_motion(arrays: ChainArrays, q: FloatArray, v: FloatArray, step: float, steps: int) -> tuple[FloatArray, FloatArray]:
+def free_motion(
+    arrays: ChainArrays, q: FloatArray, v: FloatArray, step: float, steps: int
+) -> tuple[FloatArray, FloatArray]:
     """Fourth-order Runge-Kutta with no torque at any joint."""
     none = np.zeros_like(q)
 
@@ -50,9 +52,7 @@ def test_velocity_torques_come_from_the_change_of_the_inertia(chain: Chain) -> N
     q, v, _ = random_state(2, n)
     slope = slopes_of_inertia(chain, q)  # slope[k] = ∂D/∂q_k
     change = np.einsum("kij,k->ij", slope, v)
-    christoffel = 0.5 * (
-        change + np.einsum("jik,k->ij", slope, v) - np.einsum("ijk,k->ij", slope, v)
-    )
+    christoffel = 0.5 * (change + np.einsum("jik,k->ij", slope, v) - np.einsum("ijk,k->ij", slope, v))
     own = recursive.velocity_torques(chain.arrays(), q, v)
     np.testing.assert_allclose(christoffel @ v, own, atol=1e-11)
     skew = change - 2 * christoffel

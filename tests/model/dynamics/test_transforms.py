@@ -37,12 +37,8 @@ def test_derivative_by_the_complex_step(theta: float, d: float, a: float, alpha:
     h = 1e-30
     by_angle = transform(theta + 1j * h, d, a, alpha).imag / h
     by_length = transform(theta, d + 1j * h, a, alpha).imag / h
-    np.testing.assert_allclose(
-        transform_derivative(JointKind.REVOLUTE, theta, d, a, alpha), by_angle, atol=1e-14
-    )
-    np.testing.assert_allclose(
-        transform_derivative(JointKind.PRISMATIC, theta, d, a, alpha), by_length, atol=1e-14
-    )
+    np.testing.assert_allclose(transform_derivative(JointKind.REVOLUTE, theta, d, a, alpha), by_angle, atol=1e-14)
+    np.testing.assert_allclose(transform_derivative(JointKind.PRISMATIC, theta, d, a, alpha), by_length, atol=1e-14)
 
 
 def test_derivative_of_a_transform_ends_in_zero_not_one() -> None:
