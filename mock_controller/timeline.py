@@ -42,8 +42,9 @@ class Timeline:
             if stop_us > time_us:
                 break
             self.board.run_until(stop_us)
-            self.faults.make_changes()
             if stop_us == prepare_us:
                 self._prepared_us = prepare_us
-                self.faults.each_period()
+                self.faults.before_period(prepare_us + _BEFORE_PERIOD_US)
+            else:
+                self.faults.make_changes(stop_us)
         self.board.run_until(time_us)

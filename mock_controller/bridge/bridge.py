@@ -127,12 +127,14 @@ class Bridge:
     @property
     def wake_us(self) -> int | None:
         """When a waiting request may be answered; None when none waits."""
+        if self._sample is None and self._advance is None:
+            return None
         times = []
         if self._sample is not None:
             times.append(min(self._board.next_event_us, max(self._sample.until_us, self.time_us)))
         if self._advance is not None:
             times.append(max(self._advance.until_us, self.time_us))
-        return min(times, default=None)
+        return min(times)
 
     def hang_up(self) -> None:
         """Nobody waits any more. What the host has said before it went still counts."""
@@ -218,7 +220,7 @@ class Bridge:
         postures = self._routines.freeze()
         if not already:
             self.stops.note(received_us, self.time_us, self._board.tick)
-        return Stopped(self._board.tick, postures)
+        return Stopped(self.stops.frozen_tick or 0, postures)
 
     def _release(self, _: Release) -> Reply:
         self._board.release()
@@ -235,9 +237,11 @@ class Bridge:
     def _begin_sample(self, sequence: int, request: Sample) -> list[Frame]:
         if not self._sees_period:
             return [self._refuse(sequence, Sample.OPCODE, Refusal.NOT_CAPABLE)]
-        newest = self._board.snapshots.newest()
-        # A host that asks for more than there is remembers the ticks of an earlier life of the board.
-        after = min(request.after, newest.tick if newest else 0)
+        after = request.after
+        if after > self._board.tick:
+            # AFTER_NEWEST, or a host that remembers the ticks of an earlier life of the board.
+            newest = self._board.snapshots.newest()
+            after = newest.tick if newest else 0
         patience_us = WAIT_LIMIT_PERIODS * self._board.parameters.timing.period
         self._sample = _WaitingSample(
             sequence, after, joints_of(request.mask), self._board.counters.boots, self.time_us + patience_us

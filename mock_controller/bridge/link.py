@@ -157,12 +157,13 @@ class Link:
 
     def run_until(self, time_us: int) -> None:
         """Lets everything happen that happens up to a time (µs); the bridge's own work may end a little later."""
+        later = time_us + 1
         while True:
-            arriving = self._arriving[0][0] if self._arriving else time_us + 1
-            leaving = self._leaving[0][0] if self._leaving else time_us + 1
+            arriving = self._arriving[0][0] if self._arriving else later
+            leaving = self._leaving[0][0] if self._leaving else later
             wake = self._bridge.wake_us
-            event = min(arriving, leaving, time_us + 1 if wake is None else wake)
-            if event > time_us:
+            event = min(arriving, leaving, later if wake is None else wake)
+            if event == later:
                 break
             self._bridge.run_until(event)
             if event == leaving:
@@ -170,7 +171,8 @@ class Link:
                 self._put_on_line(data, event)
             elif event == arriving:
                 self._arrive(heapq.heappop(self._arriving)[2])
-            self._send(self._bridge.overdue())
+            if wake is not None:
+                self._send(self._bridge.overdue())
         self._bridge.run_until(time_us)
 
     def _arrive(self, data: bytes) -> None:

@@ -4,41 +4,52 @@ from __future__ import annotations
 
 from firmware_protocol.framing import MAX_ENCODED
 
-_LONGEST = MAX_ENCODED + 2
-"""A piece longer than a frame with its delimiters is passed on in parts, so that nothing grows without bound."""
+LONGEST = MAX_ENCODED + 2
+"""Bytes of a frame with its delimiters. A longer piece is passed on in parts, so that nothing grows without bound."""
 
 
 class PieceSplitter:
-    """Turns bytes, however the operating system cut them, into pieces that end in a delimiter.
+    """Turns bytes into pieces, which do not depend on how the operating system cut the bytes.
 
-    A run of delimiters before a piece belongs to it. Only a part of an over-long piece has no delimiter at its end.
+    A piece ends in its delimiter and has one at its beginning too if one came; further delimiters are dropped. Of a
+    piece longer than LONGEST every part but the last has no delimiter at its end.
     """
 
     def __init__(self) -> None:
         self._tail = bytearray()
+        self._in_piece = False
+        """Whether parts of the present piece have been passed on."""
 
     def feed(self, data: bytes) -> list[bytes]:
         """The pieces that `data` completes, in order."""
         self._tail += data
-        pieces = []
-        start = 0
+        pieces: list[bytes] = []
         while True:
-            body = start
-            while body < len(self._tail) and self._tail[body] == 0:
-                body += 1
+            body = self._begin()
             end = self._tail.find(0, body)
-            if body == len(self._tail) or end < 0:
-                break
-            pieces.append(bytes(self._tail[start : end + 1]))
-            start = end + 1
-        del self._tail[:start]
-        if not self._tail.strip(b"\0"):
-            del self._tail[1:]
-        if len(self._tail) > _LONGEST:
-            pieces.append(bytes(self._tail))
-            self._tail.clear()
-        return pieces
+            size = len(self._tail) if end < 0 else end + 1
+            if size > LONGEST:
+                self._pass_on(LONGEST, pieces)
+                self._in_piece = True
+            elif end < 0:
+                return pieces
+            else:
+                self._pass_on(size, pieces)
+                self._in_piece = False
 
     def reset(self) -> None:
         """Forgets an unfinished piece (after a reconnection)."""
         self._tail.clear()
+        self._in_piece = False
+
+    def _begin(self) -> int:
+        """Where the body begins, after dropping all but one of the delimiters before it."""
+        if self._in_piece or not self._tail.startswith(b"\0"):
+            return 0
+        zeros = len(self._tail) - len(self._tail.lstrip(b"\0"))
+        del self._tail[: zeros - 1]
+        return 1
+
+    def _pass_on(self, size: int, pieces: list[bytes]) -> None:
+        pieces.append(bytes(self._tail[:size]))
+        del self._tail[:size]

@@ -7,7 +7,7 @@ import math
 import random
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, Protocol
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 Direction = Literal["to_controller", "to_host"]
 
@@ -26,8 +26,7 @@ def choice(meaning: str, default: str, allowed: Iterable[str]) -> Any:
     return field(default=default, metadata={"meaning": meaning, "allowed": tuple(allowed)})
 
 
-@dataclass(frozen=True)
-class Chunk:
+class Chunk(NamedTuple):
     """Bytes on their way, `delay_us` later than they would have come.
 
     Where `holds_line` is set, everything behind waits for them; else later bytes may overtake them.

@@ -51,7 +51,7 @@ class FaultSet:
         end = begin + (math.inf if fault.duration == math.inf else round(1e6 * fault.duration))
         entry = ActiveFault(label, fault, random.Random(seed), begin, end)
         self.active.append(entry)
-        self.make_changes()
+        self.make_changes(now)
         return entry
 
     def switch_off(self, name: str) -> list[str]:
@@ -84,9 +84,8 @@ class FaultSet:
         due = min(times, default=math.inf)
         return None if due == math.inf else int(due)
 
-    def make_changes(self) -> None:
-        """Lets faults set in, and end, that are due."""
-        now = self.parts.time_us
+    def make_changes(self, now: int) -> None:
+        """Lets faults set in, and end, that are due at a time (µs)."""
         for entry in list(self.active):
             if not entry.begun and entry.begin_us <= now:
                 entry.begun = True
@@ -95,8 +94,9 @@ class FaultSet:
             if entry.begun and entry.end_us <= now:
                 self._end(entry)
 
-    def each_period(self) -> None:
-        """To be called once before each control period."""
+    def before_period(self, begins_us: int) -> None:
+        """To be called just before each control period, with the moment (µs) at which it begins."""
+        self.make_changes(begins_us)
         for entry in self.active:
             if entry.begun and isinstance(entry.fault, PartFault):
                 entry.fault.each_period(self.parts, entry.dice, self._counter(entry))
@@ -105,8 +105,10 @@ class FaultSet:
 
     def on_the_wire(self, data: bytes, direction: Direction) -> list[Chunk]:
         """What becomes of one encoded frame now: every fault of the line in the order they were switched on."""
-        now = self.parts.time_us
         chunks = [Chunk(data)]
+        if not self.active:
+            return chunks
+        now = self.parts.time_us
         for entry in self.active:
             if not entry.covers(now):
                 continue

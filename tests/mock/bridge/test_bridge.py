@@ -1,0 +1,224 @@
+"""What each request does, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from firmware_protocol.commands import (
+    AFTER_NEWEST,
+    ALL_JOINTS,
+    Advance,
+    Advanced,
+    Block,
+    BlockWritten,
+    Capability,
+    ErrorsPositionsPowers,
+    Gains,
+    GainsSet,
+    GripperSet,
+    Hello,
+    HelloReply,
+    OutputsWritten,
+    Process,
+    ReadBlock,
+    ReadProcess,
+    ReadStatus,
+    Refusal,
+    Refused,
+    Release,
+    Released,
+    ReportErrorsPositionsPowers,
+    ReportGains,
+    Request,
+    Sample,
+    SetGains,
+    SetGripper,
+    SetPointsTaken,
+    Snapshot,
+    Status,
+    StatusFlag,
+    Stop,
+    Stopped,
+    WriteBlock,
+    WriteOutputs,
+    WriteSetPoints,
+)
+from firmware_protocol.framing import Frame, encode_frame
+from firmware_protocol.units import counts_to_posture
+from mock_controller.board.parameters import default_board_text
+from mock_controller.bridge.bridge import WAIT_LIMIT_PERIODS
+from tests.mock.host import LockStepHost, RealTimeHost
+
+
+@pytest.fixture
+def host() -> LockStepHost:
+    return LockStepHost()
+
+
+def refusal(reply: object) -> Refusal:
+    assert isinstance(reply, Refused)
+    return Refusal(reply.reason)
+
+
+def test_hello_tells_what_the_bridge_can_do(host: LockStepHost) -> None:
+    everything = Capability.SAMPLE | Capability.LOCK_STEP | Capability.SIMULATED
+    assert host.ask(Hello()) == HelloReply(1, everything, 20_000, 64, 1)
+    without = LockStepHost(sample=False).ask(Hello())
+    assert without == HelloReply(1, Capability.LOCK_STEP | Capability.SIMULATED, 20_000, 0, 1)
+
+
+def test_set_points_are_in_the_memory_and_taken_by_the_next_period(host: LockStepHost) -> None:
+    taken = host.ask(WriteSetPoints(((1, 520), (3, 480))))
+    assert isinstance(taken, SetPointsTaken)
+    assert host.board.memory.values("set_point")[0:3:2] == [520, 480]
+    snapshot = host.ask(Sample(taken.tick, ALL_JOINTS))
+    assert isinstance(snapshot, Snapshot)
+    readings = dict(snapshot.joints)
+    assert snapshot.tick == taken.tick + 1
+    assert (readings[1].set_point, readings[3].set_point) == (520, 480)
+    assert readings[2].set_point == host.board.memory.values("set_point")[1]
+
+
+def test_peek_and_poke(host: LockStepHost) -> None:
+    assert host.ask(WriteBlock(0xFC78, b"\x01\x02\x03")) == BlockWritten()
+    assert host.ask(ReadBlock(0xFC77, 5)) == Block(b"\x00\x01\x02\x03\x00")
+
+
+@pytest.mark.parametrize("request_", [ReadBlock(0xFBFF, 1), ReadBlock(0xFC7F, 2), WriteBlock(0xFC7F, b"ab")])
+def test_memory_ends_where_the_map_says(host: LockStepHost, request_: Request) -> None:
+    before = host.board.time_us
+    assert refusal(host.ask(request_)) is Refusal.BAD_ADDRESS
+    assert host.board.time_us == before
+
+
+def test_gains_are_written_and_reported(host: LockStepHost) -> None:
+    assert host.ask(SetGains(2, 5, 1, 3)) == GainsSet()
+    assert host.ask(ReportGains()) == Gains(((2, 0, 0), (5, 1, 3), *(((2, 0, 0),) * 4)))
+
+
+def test_report_of_errors_positions_and_powers_is_what_the_memory_holds(host: LockStepHost) -> None:
+    host.ask(WriteSetPoints(((2, 400),)))
+    host.ask(Advance(19_000))
+    report = host.ask(ReportErrorsPositionsPowers(0b10))
+    assert isinstance(report, ErrorsPositionsPowers)
+    ((joint, reading),) = report.joints
+    assert joint == 2
+    assert reading.set_point == 400
+    assert reading.position == host.board.memory.values("position")[1]
+    assert reading.power == host.board.memory.values("power")[1]
+
+
+def test_process_outputs_change_only_in_the_mask_and_inputs_are_read(host: LockStepHost) -> None:
+    host.board.set_process_inputs(0b1010_0000)
+    assert host.ask(WriteOutputs(0b0011, 0b0001)) == OutputsWritten()
+    assert host.ask(WriteOutputs(0b0110, 0b0100)) == OutputsWritten()
+    assert host.ask(SetGripper(1)) == GripperSet()
+    host.ask(Advance(20_000))
+    assert host.ask(ReadProcess()) == Process(0b1010_0000, 0b0101, 1)
+    assert host.board.gripper_closed
+
+
+def test_stop_freezes_the_measured_posture_and_refuses_set_points_until_release(host: LockStepHost) -> None:
+    host.ask(WriteSetPoints(((1, 600),)))
+    host.ask(Advance(310_000))
+    stopped = host.ask(Stop())
+    assert isinstance(stopped, Stopped)
+    newest = host.board.snapshots.newest()
+    assert newest is not None
+    assert list(stopped.postures) == [counts_to_posture(counts) for counts in newest.positions]
+    assert host.board.memory.values("set_point") == list(stopped.postures)
+    assert refusal(host.ask(WriteSetPoints(((1, 600),)))) is Refusal.FROZEN
+    assert refusal(host.ask(WriteBlock(0xFC00, b"\x00"))) is Refusal.FROZEN
+    assert host.ask(WriteBlock(0xFC78, b"\x00")) == BlockWritten()
+    snapshot = host.ask(Sample(stopped.tick, 1))
+    assert isinstance(snapshot, Snapshot)
+    assert snapshot.status & StatusFlag.FROZEN
+    assert host.ask(Stop()) == stopped
+    assert host.ask(Release()) == Released()
+    assert isinstance(host.ask(WriteSetPoints(((1, 600),))), SetPointsTaken)
+
+
+def test_a_sample_seen_is_not_seen_again_and_a_lost_reply_costs_nothing(host: LockStepHost) -> None:
+    host.ask(Advance(200_000))
+    first = host.ask(Sample(3, 1))
+    assert isinstance(first, Snapshot)
+    assert first.tick == 4
+    assert host.ask(Sample(3, 1)) == first
+    ticks = []
+    for _ in range(20):
+        reply = host.ask(Sample(ticks[-1] if ticks else 4, 1))
+        assert isinstance(reply, Snapshot)
+        ticks.append(reply.tick)
+    assert ticks == list(range(5, 25))
+
+
+def test_the_next_sample_may_be_asked_for_whatever_has_been_seen(host: LockStepHost) -> None:
+    host.ask(Advance(207_000))
+    tick = host.board.tick
+    reply = host.ask(Sample(AFTER_NEWEST, 1))
+    assert isinstance(reply, Snapshot)
+    assert reply.tick == tick + 1
+
+
+def test_after_a_brown_out_a_sample_comes_from_the_new_life(host: LockStepHost) -> None:
+    host.ask(Hello())
+    host.ask(Advance(500_000))
+    host.board.brown_out()
+    reply = host.ask(Sample(25, 1))
+    assert isinstance(reply, Snapshot)
+    assert reply.tick == 1
+    assert reply.status & StatusFlag.RESTARTED
+    status = host.ask(ReadStatus())
+    assert isinstance(status, Status)
+    assert status.boots == 2
+    host.ask(Hello())
+    assert not host.ask(ReadStatus()).status & StatusFlag.RESTARTED  # type: ignore[attr-defined]
+
+
+def test_a_sample_that_waits_in_vain_is_refused(tmp_path: Path) -> None:
+    slow = tmp_path / "board.toml"
+    slow.write_text(default_board_text().replace("reset = { value = 100000", "reset = { value = 2000000"), "utf-8")
+    host = LockStepHost(board=slow)
+    host.ask(Advance(100_000))
+    host.board.brown_out()
+    assert refusal(host.ask(Sample(5, 1))) is Refusal.NOTHING_NEW
+    assert host.board.time_us == 100_000 + WAIT_LIMIT_PERIODS * 20_000
+
+
+def test_what_the_bridge_cannot_do_is_refused() -> None:
+    blind = LockStepHost(sample=False)
+    assert refusal(blind.ask(Sample(0, 1))) is Refusal.NOT_CAPABLE
+    clocked = RealTimeHost()
+    clocked.send(1, Advance(1))
+    ((_, _, reply),) = clocked.wait(1000)
+    assert refusal(reply) is Refusal.NOT_CAPABLE
+
+
+@pytest.mark.parametrize(
+    ("opcode", "payload", "reason"),
+    [
+        (0x55, b"", Refusal.UNKNOWN_OPCODE),
+        (0x90, b"", Refusal.UNKNOWN_OPCODE),
+        (0x02, b"\x00\xfc", Refusal.BAD_LENGTH),
+        (0x04, b"\x01\xe8\x03", Refusal.BAD_VALUE),
+        (0x04, b"\x40\x00\x00", Refusal.BAD_VALUE),
+        (0x07, b"\x01\x15\x00\x00", Refusal.BAD_VALUE),
+        (0x10, b"\x00\x00\x00\x00\x00", Refusal.BAD_VALUE),
+    ],
+)
+def test_a_whole_frame_that_is_wrong_is_refused(
+    host: LockStepHost, opcode: int, payload: bytes, reason: Refusal
+) -> None:
+    before = bytes(host.board.memory.get(0xFC00 + offset) for offset in range(0x80))
+    output = host.turn(encode_frame(Frame(7, opcode, payload)))
+    assert host.dialect.feed(output) == [(7, Refused(opcode, reason))]
+    assert bytes(host.board.memory.get(0xFC00 + offset) for offset in range(0x80)) == before
+    assert host.device.bridge.refused == {reason.name: 1}
+
+
+def test_an_advance_lets_time_pass_once(host: LockStepHost) -> None:
+    assert host.ask(Advance(123_456), sequence=5) == Advanced(123_456, 7)
+    assert host.ask(Advance(123_456), sequence=5) == Advanced(123_456, 7)
+    assert host.ask(Advance(0), sequence=6) == Advanced(123_456, 7)
