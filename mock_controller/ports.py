@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pty
+import select
 import socket
 import tty
 from abc import ABC, abstractmethod
@@ -182,6 +183,8 @@ class TcpPort(Port):
         return None
 
     def _accept(self, listener: socket.socket) -> None:
+        if self._connection is not None and select.select([self._connection], [], [], 0)[0]:
+            return  # what is unread may be the end of the connection that is: the next one waits until it is read
         with contextlib.suppress(BlockingIOError, ConnectionError):
             connection, _ = listener.accept()
             if self._connection is not None:

@@ -96,15 +96,17 @@ def test_a_torn_reading_is_caught_counted_and_read_again() -> None:
     assert reader.disturbed
 
 
-def test_a_mixture_that_repeats_after_a_period_is_not_taken() -> None:
-    # Noise between 0FF and 100: two slow readings, each hit by a change, show 1FF or 000 alike.
-    board = MemoryBoard(lambda k: [(0x0FF if k % 2 else 0x100, 0, 0)] * 6, byte_s=550e-6)
-    reader, link, channel = reader_of(board)
-    for period in range(2, 200):
-        channel.time = max(channel.time, period * PERIOD_S + 0.0007 * period % PERIOD_S)
-        joints = reader.read((1,))
-        if joints is not None:
-            assert joints[0][1].position in (0x0FF, 0x100)
+def test_a_mixture_that_two_changes_leave_alike_is_not_taken() -> None:
+    # Two slow readings, 20.45 ms apart. The first meets a change behind joint 2, the second one behind joint 1, and
+    # both read 10, 10, 20, which no period holds.
+    def results(period: int) -> list[tuple[int, int, int]]:
+        positions = {1: (10, 10, 10), 2: (10, 20, 20), 3: (20, 10, 20)}[min(max(period, 1), 3)]
+        return [(position, 0, 0) for position in positions]
+
+    reader, link, channel = reader_of(MemoryBoard(results, phase_s=0.002025, byte_s=450e-6, delay_s=0.00135))
+    channel.time = 2 * PERIOD_S
+    assert reader.read((1, 2, 3)) is None
+    assert link.counters.torn == 0, "nothing tells the two readings apart but the time they took"
 
 
 def test_a_line_too_slow_for_two_readings_in_a_period_delivers_nothing() -> None:

@@ -58,7 +58,7 @@ def test_a_stop_is_two_frames_and_ends_with_two_marks() -> None:
 def test_silence_in_the_middle_of_a_turn_is_a_dead_process() -> None:
     link, channel = scripted_link(lambda _sequence, _request: [], lock_step=True)
     channel.marks = False
-    with pytest.raises(LinkLostError, match="silent for 10.0 s in the middle of a turn"):
+    with pytest.raises(LinkLostError, match=r"silent for 10\.0 s in the middle of a turn"):
         link.request(ReadStatus(), Status)
 
 

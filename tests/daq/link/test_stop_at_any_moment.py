@@ -86,9 +86,8 @@ def test_many_threads_share_one_link_and_each_gets_its_own_reply() -> None:
     wrong: list[int] = []
 
     def ask(first: int) -> None:
-        for after in range(first, first + 200):
-            if link.request(Sample(after, 1), Snapshot).tick != after + 1:
-                wrong.append(after)
+        ticks = range(first, first + 200)
+        wrong.extend(after for after in ticks if link.request(Sample(after, 1), Snapshot).tick != after + 1)
 
     threads = [threading.Thread(target=ask, args=(1000 * number,)) for number in range(6)]
     for thread in threads:

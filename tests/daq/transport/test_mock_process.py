@@ -39,7 +39,7 @@ def test_the_mock_ends_with_an_owner_that_is_killed() -> None:
 
 
 def test_a_mock_that_cannot_start_says_why_in_one_line() -> None:
-    with pytest.raises(TransportError, match="the mock controller did not start: .*nonsense") as caught:
+    with pytest.raises(TransportError, match=r"the mock controller did not start: .*nonsense") as caught:
         open_endpoint("mock://?fault=nonsense")
     assert "\n" not in str(caught.value)
 
