@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -160,7 +161,8 @@ class Control:
     def _disconnect(self, request: Answer) -> Answer:
         """Cuts the line: "seconds" of the clock until it is back (without: until reconnect)."""
         seconds = request.get("seconds")
-        if seconds is not None and (isinstance(seconds, bool) or not isinstance(seconds, int | float) or seconds < 0):
+        number = isinstance(seconds, int | float) and not isinstance(seconds, bool)
+        if seconds is not None and not (number and 0 <= seconds < math.inf):
             raise ControlError('"seconds": a number from 0 on, or nothing, is needed')
         self._process.disconnect(seconds)
         return {"seconds": seconds}

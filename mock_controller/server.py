@@ -36,10 +36,15 @@ class Server:
         self._back_at: float | None = None
         self._cut_wanted: float | None = None
         self._device = build_device(options, self._cut_soon)
-        self._port = _open_port(options)
         self._control: ControlPort | None = None
         if options.control != "none":
             self._control = ControlPort(options.control, Control(self._device, self).execute)
+        try:
+            self._port = _open_port(options)
+        except PortError:
+            if self._control is not None:
+                self._control.close()
+            raise
         link = self._device.link
         self._pace: LockStepPace | RealTimePace
         self._pace = LockStepPace(link) if options.lock_step else RealTimePace(link, self._device.board, _clock_us)

@@ -1,0 +1,118 @@
+"""The mock as a process of its own, and a host that reaches it through pyserial."""
+
+from __future__ import annotations
+
+import json
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import serial
+
+from firmware_protocol.commands import Reply, Request
+from firmware_protocol.dialect import FramedDialect
+
+ROOT = Path(__file__).parents[3]
+
+
+class RunningMock:
+    """`python -m mock_controller` with some arguments; ends with the `with` block."""
+
+    def __init__(self, *arguments: str) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "mock_controller", "--owned", *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            cwd=ROOT,
+        )
+        ready = self.next_line()
+        self.url: str = ready["url"]
+        self.control_url: str | None = ready["control"]
+
+    def next_line(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        line = json.loads(self._process.stdout.readline())
+        assert line["ready"] is True
+        return line  # type: ignore[no-any-return]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.end()
+
+    def end(self) -> int:
+        """Ends its standard input, as the death of its owner does; the exit code."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.close()
+        code = self._process.wait(10)
+        self._process.stdout.close()
+        return code
+
+    def interrupt(self) -> int:
+        """Sends SIGTERM; the exit code."""
+        self._process.terminate()
+        return self._process.wait(10)
+
+    def wait(self) -> int:
+        """Waits until it has ended by itself; the exit code."""
+        return self._process.wait(10)
+
+    def control(self, command: str, **more: object) -> dict[str, Any]:
+        """One command to the control port."""
+        assert self.control_url is not None
+        with _connect(self.control_url) as connection:
+            connection.sendall(json.dumps({"do": command, **more}).encode() + b"\n")
+            answer = connection.makefile("rb").readline()
+        assert answer, "no answer"
+        return json.loads(answer)  # type: ignore[no-any-return]
+
+
+def _connect(url: str) -> socket.socket:
+    if url.startswith("unix://"):
+        connection = socket.socket(socket.AF_UNIX)
+        connection.connect(url.removeprefix("unix://"))
+        return connection
+    host, _, port = url.removeprefix("tcp://").rpartition(":")
+    return socket.create_connection((host, int(port)), timeout=10)
+
+
+class SerialHost:
+    """A host on a pseudo-terminal or TCP, through pyserial."""
+
+    def __init__(self, url: str) -> None:
+        if url.startswith("tcp://"):
+            self.port = serial.serial_for_url(url.replace("tcp://", "socket://"), timeout=5)
+        else:
+            self.port = serial.Serial(url.removeprefix("serial://"), 115_200, timeout=5, exclusive=True)
+        self.dialect = FramedDialect()
+        self.sequence = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        below = getattr(self.port, "_socket", None)
+        self.port.close()
+        if below is not None:  # which pyserial leaves open when the other end has gone first
+            below.close()
+
+    def ask(self, request: Request) -> Reply:
+        """The reply to a request."""
+        self.sequence += 1
+        self.port.write(self.dialect.encode(self.sequence, request))
+        while True:
+            data = self.port.read(1)
+            assert data, "no reply in 5 s"
+            for sequence, reply in self.dialect.feed(data):
+                if sequence == self.sequence:
+                    return reply
+
+    def turn(self, sequence: int, request: Request) -> bytes:
+        """Everything the mock says in one turn of lock-step."""
+        self.port.write(self.dialect.encode(sequence, request))
+        return self.port.read_until(b"\0\0\0\0")

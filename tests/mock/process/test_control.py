@@ -1,0 +1,124 @@
+"""The control port's commands, without a port."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from firmware_protocol.commands import Advance, SetGains, Stop, WriteSetPoints
+from mock_controller.control import Control
+from tests.mock.host import LockStepHost
+
+
+class RecordedProcess:
+    """Remembers what was asked of the process."""
+
+    def __init__(self) -> None:
+        self.asked: list[object] = []
+
+    def disconnect(self, seconds: float | None) -> None:
+        self.asked.append(("disconnect", seconds))
+
+    def reconnect(self) -> None:
+        self.asked.append("reconnect")
+
+    def kill(self) -> None:
+        self.asked.append("kill")
+
+    def clock(self) -> dict[str, Any]:
+        return {"mode": "none"}
+
+    def lost_bytes(self) -> int:
+        return 0
+
+
+class Desk:
+    def __init__(self) -> None:
+        self.host = LockStepHost()
+        self.process = RecordedProcess()
+        self.control = Control(self.host.device, self.process)
+
+    def say(self, command: str, **more: object) -> dict[str, Any]:
+        line = self.control.execute(json.dumps({"do": command, **more}).encode())
+        assert line.endswith(b"\n")
+        answer = json.loads(line)
+        assert isinstance(answer, dict)
+        return answer
+
+
+@pytest.fixture
+def desk() -> Desk:
+    return Desk()
+
+
+def test_state_shows_what_is_in_the_board(desk: Desk) -> None:
+    desk.host.ask(SetGains(3, 7, 1, 2))
+    desk.host.ask(WriteSetPoints(((1, 520),)))
+    desk.host.ask(Advance(50_000))
+    desk.host.ask(Stop())
+    desk.host.ask(Advance(50_000))
+    state = desk.say("state")
+    assert state["ok"] is True
+    assert state["tick"] == 6
+    assert state["frozen"] is True
+    assert state["set_points"] == desk.host.board.memory.values("set_point")
+    assert state["gains"][2] == [7, 1, 2]
+    stop = state["stop"]
+    assert stop["count"] == 1
+    assert stop["frozen_us"] - stop["received_us"] == 120
+    assert (stop["first_used_us"], stop["first_used_tick"]) == (60_000, 4)
+    assert state["clock"] == {"mode": "none"}
+
+
+def test_faults_are_switched_listed_and_counted(desk: Desk) -> None:
+    on = desk.say("fault_on", fault="drop:rate=1,direction=to_host")
+    assert (on["ok"], on["label"], on["rate"]) == (True, "drop", 1.0)
+    assert desk.host.replies(Advance(0)) == []
+    assert [entry["label"] for entry in desk.say("fault_list")["faults"]] == ["drop"]
+    assert desk.say("fault_off", fault="drop") == {"ok": True, "ended": ["drop"]}
+    desk.host.ask(Advance(0))
+    counts = desk.say("counts")
+    assert counts["faults"] == {"drop": {"to_host": 1}}
+    assert counts["bridge"]["frames_received"] == counts["bridge"]["frames_sent"] == 2
+    assert counts["bridge"]["answered"] == {"Advance": 2}
+
+
+def test_supply_line_and_process_can_fail(desk: Desk) -> None:
+    assert desk.say("brown_out")["ok"]
+    assert not desk.host.board.powered
+    assert desk.say("disconnect", seconds=1.5)["ok"]
+    assert desk.say("disconnect")["ok"]
+    assert desk.say("reconnect")["ok"]
+    assert desk.say("kill")["ok"]
+    assert desk.process.asked == [("disconnect", 1.5), ("disconnect", None), "reconnect", "kill"]
+
+
+def test_process_inputs_can_be_set(desk: Desk) -> None:
+    assert desk.say("inputs", bits=5)["ok"]
+    desk.host.ask(Advance(20_000))
+    assert desk.host.board.memory.values("process_inputs") == [5]
+
+
+def test_help_and_modifications(desk: Desk) -> None:
+    assert "state" in desk.say("help")["commands"]
+    assert all(desk.say("help")["commands"].values())
+    assert desk.say("modifications") == {"ok": True, "modifications": []}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"", b"{", b"\xff\xfe", b"[]", b"7", b'{"do": 3}', b'{"do": "dance"}', b'{"do": "fault_on"}',
+        b'{"do": "fault_on", "fault": "flop"}', b'{"do": "fault_off", "fault": "flip"}',
+        b'{"do": "inputs", "bits": 256}', b'{"do": "inputs", "bits": true}',
+        b'{"do": "disconnect", "seconds": -1}', b"[" * 100_000,
+        b'{"do": "disconnect", "seconds": NaN}',
+    ],
+)  # fmt: skip
+def test_what_cannot_be_done_is_answered_by_one_line(desk: Desk, line: bytes) -> None:
+    answer = desk.control.execute(line)
+    assert answer.count(b"\n") == 1
+    assert json.loads(answer)["ok"] is False
+    assert desk.process.asked == []

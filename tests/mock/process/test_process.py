@@ -1,0 +1,142 @@
+"""The whole process, through a real pseudo-terminal and a real socket."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+import serial
+
+from firmware_protocol.commands import (
+    AFTER_NEWEST,
+    Hello,
+    HelloReply,
+    Refusal,
+    Refused,
+    Request,
+    Sample,
+    SetPointsTaken,
+    Snapshot,
+    Stop,
+    Stopped,
+    WriteSetPoints,
+)
+from tests.mock.process.running import RunningMock, SerialHost
+
+WHERE = pytest.mark.parametrize("where", [("--pty",), ("--tcp", "127.0.0.1:0")], ids=["pty", "tcp"])
+
+
+@WHERE
+def test_a_conversation_in_real_time(where: tuple[str, ...]) -> None:
+    with RunningMock(*where) as mock, SerialHost(mock.url) as host:
+        assert isinstance(host.ask(Hello()), HelloReply)
+        first = host.ask(Sample(AFTER_NEWEST, 7))
+        assert isinstance(first, Snapshot)
+        assert isinstance(host.ask(WriteSetPoints(((1, 510),))), SetPointsTaken)
+        second = host.ask(Sample(first.tick, 7))
+        assert isinstance(second, Snapshot)
+        assert second.tick == first.tick + 1
+        assert isinstance(host.ask(Stop()), Stopped)
+        assert host.ask(WriteSetPoints(((1, 510),))) == Refused(WriteSetPoints.OPCODE, Refusal.FROZEN)
+        state = mock.control("state")
+        assert state["frozen"] is True
+        assert state["stop"]["frozen_us"] - state["stop"]["received_us"] < 1_000
+        assert state["clock"]["mode"] == "real_time"
+        assert mock.control("counts")["bridge"]["frames_received"] == 6
+
+
+@WHERE
+def test_lock_step_repeats_to_the_bit_from_one_process_to_the_next(where: tuple[str, ...]) -> None:
+    faults = ("--fault", "flip:rate=0.1,seed=1", "--fault", "drop:rate=0.05", "--fault", "junk:rate=0.1")
+
+    def everything_said() -> list[bytes]:
+        requests: list[Request] = [Hello()]
+        for posture in range(500, 540):
+            requests += [WriteSetPoints(((1, posture), (2, 333))), Sample(AFTER_NEWEST, 63)]
+        with RunningMock(*where, "--lock-step", "--seed", "7", *faults) as mock, SerialHost(mock.url) as host:
+            return [host.turn(number, request) for number, request in enumerate(requests)]
+
+    assert everything_said() == everything_said()
+
+
+@WHERE
+def test_hosts_come_and_go(where: tuple[str, ...]) -> None:
+    with RunningMock(*where, "--lock-step") as mock:
+        for _ in range(3):
+            with SerialHost(mock.url) as host:
+                assert isinstance(host.ask(Hello()), HelloReply)
+                host.port.write(b"\0\x05half a frame" if where[0] == "--tcp" else b"")
+
+
+def test_a_second_host_is_turned_away_from_the_tcp_port() -> None:
+    with RunningMock("--tcp", "127.0.0.1:0", "--lock-step") as mock, SerialHost(mock.url) as host:
+        host.ask(Hello())
+        with SerialHost(mock.url) as second, pytest.raises(serial.SerialException):
+            second.port.read(1)
+        assert isinstance(host.ask(Hello()), HelloReply)
+
+
+def test_a_pseudo_terminal_takes_one_host_at_a_time() -> None:
+    with RunningMock("--pty") as mock, SerialHost(mock.url), pytest.raises(serial.SerialException):
+        SerialHost(mock.url)
+
+
+@WHERE
+def test_the_line_is_cut_and_comes_back(where: tuple[str, ...], tmp_path: Path) -> None:
+    link = ("--link", str(tmp_path / "arm")) if where[0] == "--pty" else ()
+    with RunningMock(*where, *link) as mock:
+        with SerialHost(mock.url) as host:
+            host.ask(Hello())
+            assert mock.control("disconnect")["ok"]
+            with pytest.raises((serial.SerialException, OSError, AssertionError)):
+                host.ask(Hello())
+        with pytest.raises(serial.SerialException):
+            SerialHost(mock.url)
+        assert mock.control("reconnect")["ok"]
+        assert mock.next_line()["url"] == mock.url
+        with SerialHost(mock.url) as host:
+            assert isinstance(host.ask(Hello()), HelloReply)
+
+
+def test_a_fault_cuts_the_line_for_a_while(tmp_path: Path) -> None:
+    with RunningMock("--pty", "--link", str(tmp_path / "arm"), "--fault", "disconnect:start=0.1,seconds=0.1") as mock:
+        assert mock.next_line()["url"] == mock.url
+        with SerialHost(mock.url) as host:
+            assert isinstance(host.ask(Hello()), HelloReply)
+        assert mock.control("counts")["faults"] == {"disconnect": {"board": 1}}
+
+
+def test_it_ends_with_its_owner_and_leaves_nothing(tmp_path: Path) -> None:
+    link, control = tmp_path / "arm", tmp_path / "control"
+    mock = RunningMock("--pty", "--link", str(link), "--control", f"unix:{control}")
+    assert link.is_symlink()
+    assert mock.control("state")["ok"]
+    assert mock.end() == 0
+    assert not link.is_symlink()
+    assert not control.exists()
+
+
+def test_sigterm_is_a_good_end() -> None:
+    with RunningMock("--pty") as mock:
+        assert mock.interrupt() == 0
+
+
+def test_kill_is_a_bad_end() -> None:
+    with RunningMock("--pty") as mock:
+        with pytest.raises(AssertionError):
+            mock.control("kill")
+        assert mock.wait() == -signal.SIGKILL
+
+
+def test_the_pseudo_terminal_is_raw_whoever_opens_it() -> None:
+    with RunningMock("--pty") as mock:
+        descriptor = os.open(mock.url.removeprefix("serial://"), os.O_RDWR | os.O_NOCTTY)
+        try:
+            os.write(descriptor, b"\0\x03\x0d\x0a\x03\x04\x11\x13\0")
+            state = mock.control("counts")
+            while state["bridge"]["damaged"] == 0:
+                state = mock.control("counts")
+        finally:
+            os.close(descriptor)
