@@ -166,9 +166,16 @@ class TraceWriter:
             self._write_until_closed()
         except OSError as error:
             self._fail(disk.reason(error))
+            self._refuse_what_waits()
         except BaseException as error:
             self._fail(f"{type(error).__name__}: {error}")
+            self._refuse_what_waits()
             raise
+
+    def _refuse_what_waits(self) -> None:
+        """Empty the queue, so that an acquisition that waits for room in it is told at its next call."""
+        while not self._queue.empty():
+            self._queue.get_nowait()
 
     def _write_until_closed(self) -> None:
         next_sync = time.monotonic() + self._sync_interval

@@ -1,0 +1,126 @@
+"""A full disk, a slow disk, a read-only folder: one clear error, and what came before is safe."""
+
+import resource
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq.contracts.errors import TraceError
+from daq.traces import cache, disk
+from daq.traces.naming import part_path
+from daq.traces.reader import read_trace
+from daq.traces.salvage import salvage
+from daq.traces.store import write_trace
+from daq.traces.writer import TraceWriter
+from tests.daq.traces.samples import JOINTS, record, row, write
+
+
+@contextmanager
+def largest_file(size: int) -> Iterator[None]:
+    """While it lasts no file of this process grows beyond `size` bytes: the system refuses, as with a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_a_full_disk_is_an_error_of_the_next_call_and_what_was_synced_is_safe(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    taken = 0
+
+    def record_for_ever() -> None:
+        nonlocal taken
+        for taken in range(100_000):
+            writer.sample(row(taken))
+
+    with largest_file(60_000):
+        writer = TraceWriter(path, record(), JOINTS, sync_interval=0.0, patience=60)
+        with pytest.raises(TraceError, match=r"a\.mcap: cannot be written: File too large; what came before is in "):
+            record_for_ever()
+        assert writer.failure is not None
+        with pytest.raises(TraceError, match="File too large"):
+            writer.close("complete")
+    assert not path.exists()
+    assert 0 < writer.synced_samples <= taken
+    salvaged = salvage(part_path(path))
+    assert salvaged.samples >= writer.synced_samples
+    np.testing.assert_array_equal(read_trace(path).tick, np.arange(salvaged.samples))
+
+
+def test_a_disk_that_is_full_from_the_start_leaves_no_file(tmp_path: Path) -> None:
+    with largest_file(100), pytest.raises(TraceError, match="cannot be written: File too large"):
+        TraceWriter(tmp_path / "a.mcap", record(), JOINTS)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_disk_that_is_full_when_a_trace_is_salvaged_or_imported_changes_nothing(tmp_path: Path) -> None:
+    part = tmp_path / "a.mcap.part"
+    data = write(tmp_path / "b.mcap", 500).read_bytes()
+    part.write_bytes(data)
+    trace = read_trace(tmp_path / "b.mcap")
+    with largest_file(10_000):
+        with pytest.raises(TraceError, match="cannot be salvaged: File too large; it is unchanged"):
+            salvage(part)
+        with pytest.raises(TraceError, match="cannot be written: File too large"):
+            write_trace(trace, tmp_path / "c.mcap")
+    assert part.read_bytes() == data
+    assert {entry.name for entry in tmp_path.iterdir()} == {"a.mcap.part", "b.mcap"}
+
+
+def test_a_disk_that_falls_behind_is_an_error_and_loses_nothing_that_was_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stalled, go_on = threading.Event(), threading.Event()
+    sync = disk.sync
+
+    def stall(stream: object) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            stalled.set()
+            assert go_on.wait(60)
+        sync(stream)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(disk, "sync", stall)
+    writer = TraceWriter(tmp_path / "a.mcap", record(), JOINTS, sync_interval=0.0, queue_length=20)
+    writer.sample(row(0))
+    assert stalled.wait(60)
+    for tick in range(1, 21):
+        writer.sample(row(tick))
+    with pytest.raises(TraceError, match="the disk is 20 samples and events behind"):
+        writer.sample(row(21))
+    go_on.set()
+    with pytest.raises(TraceError, match="20 samples and events behind"):
+        writer.close("complete")
+    assert salvage(part_path(tmp_path / "a.mcap")).samples == 21
+
+
+def test_a_patient_recording_waits_for_the_disk_instead(tmp_path: Path) -> None:
+    with TraceWriter(tmp_path / "a.mcap", record(), JOINTS, queue_length=1, patience=60) as writer:
+        for tick in range(300):
+            writer.sample(row(tick))
+        writer.close("complete")
+    assert len(read_trace(tmp_path / "a.mcap")) == 300
+
+
+def test_a_folder_that_does_not_exist_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(TraceError, match=r"absent/a\.mcap: cannot be made: No such file or directory"):
+        TraceWriter(tmp_path / "absent" / "a.mcap", record(), JOINTS)
+
+
+def refuse(*_args: object, **_options: object) -> None:
+    raise PermissionError(13, "Permission denied")
+
+
+def test_without_leave_to_write_there_is_no_cache_and_no_complaint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write(tmp_path / "a.mcap")
+    monkeypatch.setattr(cache, "WORTH_IT", 0)
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    assert len(read_trace(path)) == 100
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.mcap"]
