@@ -8,7 +8,7 @@ import numpy as np
 
 from daq.contracts.limits import JointLimits, Limits
 from daq.contracts.machine import Machine
-from daq.safety.joint_limits import joint_violations
+from daq.safety.joint_limits import joint_violations, rounding_slack
 from daq.safety.kinematics import link_ends
 from daq.safety.violation import Violation
 from daq.safety.workspace import workspace_violations
@@ -61,8 +61,9 @@ def _widened(limits: Limits, plan: Plan, machine: Machine) -> Limits:
     joints = []
     for joint, angle in enumerate(plan.angles[0].tolist(), start=1):
         own = limits.joint(joint)
-        low = None if own.low is None else min(own.low, angle)
-        high = None if own.high is None else max(own.high, angle)
+        slack = rounding_slack(machine, joint)  # else limits could be crept past, half a posture unit at a time
+        low = None if own.low is None else min(own.low, angle + slack)
+        high = None if own.high is None else max(own.high, angle - slack)
         joints.append(JointLimits(low=low, high=high, speed=own.speed))
     floor, reach = limits.floor_height, limits.reach
     return Limits(

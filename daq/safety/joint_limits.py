@@ -36,6 +36,12 @@ def largest_step(machine: Machine, limits: Limits, joint: int) -> float | None:
     return counts * machine.calibration(joint).range_rad / ADC_COUNTS
 
 
+def rounding_slack(machine: Machine, joint: int) -> float:
+    """Angle (rad) by which a limit may be passed: it may lie inside a posture unit, and the posture nearest to an
+    allowed angle is allowed."""
+    return abs(machine.calibration(joint).rad_per_posture_unit) / 2
+
+
 def _posture_violations(plan: Plan, joint: int) -> list[Violation]:
     postures = plan.postures[:, joint - 1]
     found = []
@@ -50,8 +56,7 @@ def _posture_violations(plan: Plan, joint: int) -> list[Violation]:
 def _range_violations(plan: Plan, machine: Machine, limits: Limits, joint: int) -> list[Violation]:
     own = limits.joint(joint)
     angles = plan.angles[:, joint - 1]
-    # A limit may lie inside a posture unit: the posture nearest to an allowed angle is allowed.
-    slack = abs(machine.calibration(joint).rad_per_posture_unit) / 2 + TOLERANCE
+    slack = rounding_slack(machine, joint) + TOLERANCE
     allowed = f"{_degrees(own.low)} to {_degrees(own.high)}"
     found = []
     for limit, sign, worst in ((own.low, -1, int(angles.argmin())), (own.high, 1, int(angles.argmax()))):

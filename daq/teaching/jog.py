@@ -1,0 +1,132 @@
+"""Drive-through: the joints move while a key is held, as with the teach pendant of the original (section 6.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from daq.contracts.errors import SpecError
+from daq.contracts.limits import Limits
+from daq.contracts.machine import Machine
+from daq.contracts.sample import SampleRow
+from daq.contracts.trace import Floats
+from daq.safety import RunningGuards, check_move_to_start
+from daq.teaching.arm import TeachableArm
+from daq.trajectories import control_period, make_plan
+
+JOG_SPEED = 0.35
+"""Highest speed of jogging in rad/s (20 °/s): an assumption. A joint's own limit may be lower."""
+DEAD_MAN = 0.3
+"""Time (s) for which a command moves the arm: an assumption. Whoever holds the key repeats it more often."""
+
+
+@dataclass(frozen=True)
+class JogCommand:
+    """Joints to be driven, with their velocities (rad/s), and when that was said (s, the clock of the samples)."""
+
+    velocities: Mapping[int, float]
+    time: float
+
+
+@dataclass(frozen=True)
+class JogStep:
+    """Set points for the next period (joint → posture units), the angles (rad) that they stand for, and why joints
+    that should move do not."""
+
+    postures: Mapping[int, int] = field(default_factory=dict)
+    angles: Mapping[int, float] = field(default_factory=dict)
+    refused: tuple[str, ...] = ()
+
+
+class Jogger:
+    """Works out one set point a period. Pure but for the angles it has accepted.
+
+    Needs all joints of the machine in every sample, since floor and reach depend on all. Raises SpecError without
+    them, and for commands that are faster than allowed.
+    """
+
+    def __init__(self, machine: Machine, limits: Limits, joints: tuple[int, ...]) -> None:
+        if len(joints) != len(machine.joints):
+            raise SpecError(f"jog: samples have joints {list(joints)}, all of 1 to {len(machine.joints)} are needed")
+        self._machine = machine
+        self._limits = limits
+        self._joints = joints
+        self._period = control_period(machine)
+        self._driven: dict[int, float] = {}
+
+    def top_speed(self, joint: int) -> float:
+        """Highest speed (rad/s) at which `joint` may be jogged."""
+        own = self._limits.joint(joint).speed
+        return JOG_SPEED if own is None else min(JOG_SPEED, own)
+
+    def step(self, row: SampleRow, command: JogCommand | None) -> JogStep:
+        """What to send after `row`. Nothing moves without a command, or when it is older than DEAD_MAN."""
+        if command is None or row.host_time - command.time > DEAD_MAN:
+            return JogStep()
+        self._check(command)
+        here = self._angles(row)
+        there = here.copy()
+        moving = tuple(joint for joint, velocity in command.velocities.items() if velocity)
+        for joint in moving:
+            there[joint - 1] += command.velocities[joint] * self._period
+        plan = make_plan(self._machine, moving, np.stack([here, there]))
+        violations = check_move_to_start(plan, self._machine, self._limits)
+        if violations:
+            return JogStep(refused=tuple(str(violation) for violation in violations))
+        return JogStep(
+            {joint: int(plan.postures[1, joint - 1]) for joint in moving},
+            {joint: float(there[joint - 1]) for joint in moving},
+        )
+
+    def accept(self, step: JogStep) -> None:
+        """The step has been sent: the next one goes on from there."""
+        self._driven.update(step.angles)
+
+    def _check(self, command: JogCommand) -> None:
+        for joint, velocity in command.velocities.items():
+            if joint not in self._joints:
+                raise SpecError(f"jog: joint {joint}: allowed are {list(self._joints)}")
+            top = self.top_speed(joint)
+            if not abs(velocity) <= top:
+                raise SpecError(f"jog: joint {joint}: velocity of {velocity} rad/s: allowed are up to ±{top:g} rad/s")
+
+    def _angles(self, row: SampleRow) -> Floats:
+        """Where the set points of all joints are: what was sent last, else what the controller holds."""
+        held = zip(self._joints, row.set_point, strict=True)
+        return np.array([self._driven.get(joint, angle) for joint, angle in held])
+
+
+def jog(
+    arm: TeachableArm,
+    machine: Machine,
+    limits: Limits,
+    commands: Callable[[], JogCommand | None],
+    ended: Callable[[], bool],
+    tell: Callable[[str], None],
+) -> str | None:
+    """Lets `commands` drive the arm until `ended`. `commands` gives the newest command, `tell` takes lines for the
+    operator.
+
+    Returns None when it was ended, else why the arm was stopped: a guard tripped, or somebody stopped it elsewhere.
+    """
+    jogger = Jogger(machine, limits, arm.joints)
+    guards = RunningGuards(machine, limits, arm.joints, moving=arm.joints)
+    told: tuple[str, ...] = ()
+    while not ended():
+        row = arm.next_sample()
+        step = jogger.step(row, commands())
+        verdict = guards.check(row, step.postures)
+        if verdict.trips or verdict.stop:
+            if verdict.trips:
+                arm.stop()
+            return "; ".join(verdict.trips) or verdict.stop
+        if step.refused != told:
+            told = step.refused
+            for line in told:
+                tell(line)
+        if step.postures and not verdict.hold:
+            arm.set_points(step.postures)
+            jogger.accept(step)
+    return None

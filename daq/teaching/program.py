@@ -1,0 +1,131 @@
+"""A taught program: steps, paths, waits and process signals, one after the other, in a plain file."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import Angle, Duration, JointNumber
+from daq.teaching.recording import FASTEST_RATE, RecordedPath
+from daq.trajectories import MOVE_SPEED
+
+Speed = Annotated[FiniteFloat, Field(gt=0, le=3)]
+Line = Annotated[int, Field(ge=0, le=7)]
+Angles = Annotated[dict[JointNumber, Angle], Field(min_length=1)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Absolute(_Part):
+    """Joints to these angles (rad), all arriving together; `speed` (rad/s) is the fastest joint's (SAMOVE's RATE)."""
+
+    kind: Literal["absolute"] = "absolute"
+    angles: Angles
+    speed: Speed = MOVE_SPEED
+
+
+class Relative(_Part):
+    """Joints by these angles (rad) from where the instruction before left them, all arriving together."""
+
+    kind: Literal["relative"] = "relative"
+    angles: Angles
+    speed: Speed = MOVE_SPEED
+
+
+class PlayPath(_Part):
+    """A recorded path, `rate` times as fast as it was led, after a slow move to its start (CONTPATH)."""
+
+    kind: Literal["path"] = "path"
+    path: RecordedPath
+    rate: Annotated[FiniteFloat, Field(gt=0, le=FASTEST_RATE)] = 1.0
+
+
+class Wait(_Part):
+    """`duration` s without motion."""
+
+    kind: Literal["wait"] = "wait"
+    duration: Duration
+
+
+class SetOutput(_Part):
+    """Process output `line` (0–7) on or off."""
+
+    kind: Literal["output"] = "output"
+    line: Line
+    on: bool
+
+
+class AwaitInput(_Part):
+    """Waits until process input `line` (0–7) is on or off; the program ends in an error after `longest` s."""
+
+    kind: Literal["input"] = "input"
+    line: Line
+    on: bool
+    longest: Duration = 60.0
+
+
+class Gripper(_Part):
+    """Closes or opens the gripper."""
+
+    kind: Literal["gripper"] = "gripper"
+    closed: bool
+
+
+Instruction = Annotated[
+    Absolute | Relative | PlayPath | Wait | SetOutput | AwaitInput | Gripper, Field(discriminator="kind")
+]  # fmt: skip
+
+
+class Program(_Part):
+    """Instructions for one machine."""
+
+    version: Literal[1] = 1
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
+    machine: str = "ma2000"
+    notes: str = ""
+    instructions: Annotated[tuple[Instruction, ...], Field(min_length=1, max_length=10000)]
+
+
+def parse_program(text: str, origin: str = "program") -> Program:
+    """A program from JSON, or from TOML when `origin` ends in `.toml`. Raises SpecError with one line."""
+    try:
+        if origin.endswith(".toml"):
+            return Program.model_validate(tomllib.loads(text))
+        return Program.model_validate_json(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SpecError(f"{origin}: not TOML: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part + 1 if isinstance(part, int) else part) for part in first["loc"]) or "program"
+        raise SpecError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}") from error
+
+
+def program_text(program: Program) -> str:
+    """The program as JSON; `parse_program` gives it back to the bit."""
+    return program.model_dump_json(indent=2) + "\n"
+
+
+def load_program(path: Path) -> Program:
+    """The program of a file. Raises SpecError with one line."""
+    try:
+        return parse_program(path.read_text("utf-8"), str(path))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SpecError(f"{path}: cannot be read: {error}") from error
+
+
+def save_program(program: Program, path: Path) -> None:
+    """Writes the program as JSON, whole or not at all. Raises SpecError with one line."""
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(program_text(program), "utf-8")
+        os.replace(part, path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise SpecError(f"{path}: cannot be written: {error}") from error

@@ -1,0 +1,78 @@
+"""A path recorded while the arm was led, and how it is played back."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import Angle, ExperimentSpec, JointNumber, Path
+
+FASTEST_RATE = 10.0
+"""Highest factor by which a path may be played faster than it was led: limits decide earlier."""
+
+
+class RecordedPath(BaseModel):
+    """Measured angles (rad), one row a control period, one column a joint; times (s) from the first row."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    joints: Annotated[tuple[JointNumber, ...], Field(min_length=1)]
+    times: Annotated[tuple[FiniteFloat, ...], Field(min_length=2)]
+    positions: Annotated[tuple[tuple[Angle, ...], ...], Field(min_length=2)]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if list(self.joints) != sorted(set(self.joints)):
+            raise ValueError(f"joints {list(self.joints)}: must be different and ascending")
+        if len(self.times) != len(self.positions):
+            raise ValueError(f"{len(self.times)} times for {len(self.positions)} rows of positions")
+        if self.times[0] != 0 or any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
+            raise ValueError("times must start at 0 and increase strictly")
+        if any(len(row) != len(self.joints) for row in self.positions):
+            raise ValueError(f"every row of positions needs {len(self.joints)} angles")
+        return self
+
+    @property
+    def duration(self) -> float:
+        """Length in s."""
+        return self.times[-1]
+
+    def thinned(self, within: float) -> RecordedPath:
+        """The same path with as few points as keep it within `within` rad of every recorded one (Douglas–Peucker in
+        time): what is left out are rests and straight lines."""
+        positions = np.array(self.positions)
+        times = np.array(self.times)
+        kept = {0, len(times) - 1}
+        open_ends = [(0, len(times) - 1)]
+        while open_ends:
+            first, last = open_ends.pop()
+            if last - first < 2:
+                continue
+            part = (times[first : last + 1] - times[first]) / (times[last] - times[first])
+            line = positions[first] + part[:, None] * (positions[last] - positions[first])
+            away = np.abs(positions[first : last + 1] - line).max(axis=1)
+            worst = int(away.argmax())
+            if away[worst] > within:
+                kept.add(first + worst)
+                open_ends += [(first, first + worst), (first + worst, last)]
+        rows = sorted(kept)
+        return RecordedPath(
+            joints=self.joints,
+            times=tuple(self.times[row] for row in rows),
+            positions=tuple(self.positions[row] for row in rows),
+        )
+
+
+def playback(path: RecordedPath, rate: float = 1.0, name: str | None = None) -> ExperimentSpec:
+    """The experiment that plays a path `rate` times as fast as it was led: a slow move to its start, then the path.
+
+    It is planned, checked, watched and recorded as any other; there is no limit of 60 s. Raises SpecError for a rate
+    that is not above 0 and at most FASTEST_RATE.
+    """
+    if not 0 < rate <= FASTEST_RATE:
+        raise SpecError(f"rate of {rate}: must be above 0 and at most {FASTEST_RATE:g}")
+    times = tuple(time / rate for time in path.times)
+    return ExperimentSpec(trajectory=Path(times=times, positions=path.positions), joints=path.joints, name=name)

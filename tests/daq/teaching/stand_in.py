@@ -1,0 +1,81 @@
+"""An arm without physics for the tests of teaching: each period it goes part of the way to its set points.
+
+A joint whose gains are 0 goes where a hand leads it.
+"""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from daq.contracts.errors import DaqError
+from daq.contracts.experiment import Gain
+from daq.contracts.machine import load_machine
+from daq.contracts.sample import SampleRow
+from firmware_protocol.commands import StatusFlag
+
+MA2000 = load_machine("ma2000")
+REST = np.array(MA2000.rest_posture)
+PERIOD = 0.02
+CALIBRATIONS = [MA2000.calibration(joint) for joint in range(1, 7)]
+
+
+class LinkBrokenError(DaqError):
+    """The cable was pulled."""
+
+
+class StandIn:
+    """All six joints; `hand` gives the angles to which limp joints are led at each tick."""
+
+    joints = (1, 2, 3, 4, 5, 6)
+
+    def __init__(self, hand: Callable[[int], Mapping[int, float]] = lambda _: {}) -> None:
+        self.tick = 0
+        self.position = REST.copy()
+        self.postures = [own.rad_to_posture(float(angle)) for own, angle in zip(CALIBRATIONS, REST, strict=True)]
+        self.hand = hand
+        self.gain: dict[int, Gain] = dict.fromkeys(self.joints, (2, 0, 0))
+        self.log: list[str] = []
+        self.frozen = False
+        self.broken_from: int | None = None
+        self.push: dict[int, float] = {}
+
+    def next_sample(self) -> SampleRow:
+        if self.broken_from is not None and self.tick >= self.broken_from:
+            raise LinkBrokenError("the link is lost")
+        self.tick += 1
+        targets = np.array([own.posture_to_rad(p) for own, p in zip(CALIBRATIONS, self.postures, strict=True)])
+        led = self.hand(self.tick)
+        for joint in self.joints:
+            if self.gain[joint] == (0, 0, 0):
+                self.position[joint - 1] = led.get(joint, self.position[joint - 1])
+            else:
+                self.position[joint - 1] += 0.5 * (targets[joint - 1] - self.position[joint - 1])
+            self.position[joint - 1] += self.push.get(joint, 0.0)
+        counts = [round(own.rad_to_counts(float(p))) for own, p in zip(CALIBRATIONS, self.position, strict=True)]
+        seen = np.array([own.counts_to_rad(c) for own, c in zip(CALIBRATIONS, counts, strict=True)])
+        status = StatusFlag.FROZEN if self.frozen else 0
+        return SampleRow(
+            self.tick, self.tick * PERIOD, self.tick * PERIOD, tuple(targets.tolist()), tuple(seen.tolist()),
+            tuple((targets - seen).tolist()), (0.0,) * 6, (0,) * 6, int(status),
+        )  # fmt: skip
+
+    def set_points(self, postures: Mapping[int, int]) -> None:
+        for joint, posture in postures.items():
+            assert 0 <= posture <= 999
+            self.postures[joint - 1] = posture
+        self.log.append("set points")
+
+    def stop(self) -> None:
+        self.frozen = True
+        self.log.append("stop")
+
+    def gains(self) -> Mapping[int, Gain]:
+        return dict(self.gain)
+
+    def set_gains(self, joint: int, p: int, i: int, d: int) -> None:
+        self.gain[joint] = (p, i, d)
+        self.log.append(f"gains {joint} {p}")
+
+    def run_for(self, periods: int) -> Callable[[], bool]:
+        """An `ended` that comes true after so many periods."""
+        return lambda: self.tick >= periods

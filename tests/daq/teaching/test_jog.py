@@ -1,0 +1,140 @@
+"""Drive-through: motion while a key is held, within every limit."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from daq.contracts.errors import SpecError
+from daq.teaching import DEAD_MAN, JOG_SPEED, JogCommand, Jogger, jog
+from tests.daq.teaching.stand_in import CALIBRATIONS, MA2000, PERIOD, REST, StandIn
+
+LIMITS = MA2000.limits
+
+
+def driven(arm: StandIn, velocities: dict[int, float], held_until: int, periods: int) -> tuple[str | None, list[str]]:
+    """Jogs with a key held down for the first `held_until` periods."""
+    told: list[str] = []
+
+    def commands() -> JogCommand:
+        return JogCommand(velocities, min(arm.tick, held_until) * PERIOD)
+
+    return jog(arm, MA2000, LIMITS, commands, arm.run_for(periods), told.append), told
+
+
+def test_a_joint_moves_at_the_speed_asked_for_while_the_key_is_held() -> None:
+    arm = StandIn()
+    reason, _ = driven(arm, {1: 0.2}, held_until=100, periods=100)
+    assert reason is None
+    assert arm.position[0] - REST[0] == pytest.approx(0.2 * 100 * PERIOD, abs=0.02)
+    assert arm.position[1:] == pytest.approx(REST[1:], abs=0.005)
+
+
+def test_several_joints_at_once() -> None:
+    arm = StandIn()
+    driven(arm, {1: 0.2, 3: -0.1}, held_until=100, periods=100)
+    assert arm.position[2] - REST[2] == pytest.approx(-0.1 * 100 * PERIOD, abs=0.02)
+
+
+def test_it_stops_when_the_key_is_no_longer_refreshed() -> None:
+    arm = StandIn()
+    driven(arm, {1: 0.2}, held_until=50, periods=200)
+    assert arm.position[0] - REST[0] <= 0.2 * (50 * PERIOD + DEAD_MAN) + 0.01
+    assert arm.position[0] - REST[0] >= 0.2 * 50 * PERIOD
+
+
+def test_nothing_is_sent_without_a_key() -> None:
+    arm = StandIn()
+    assert jog(arm, MA2000, LIMITS, lambda: None, arm.run_for(20), print) is None
+    assert arm.log == []
+
+
+def test_slow_jogging_adds_up_across_posture_units() -> None:
+    """At 0.02 rad/s a period is a twelfth of a posture unit: what is not yet a unit is not lost."""
+    arm = StandIn()
+    driven(arm, {1: 0.02}, held_until=500, periods=500)
+    assert arm.position[0] - REST[0] == pytest.approx(0.02 * 500 * PERIOD, abs=0.01)
+
+
+def test_it_goes_to_the_limit_and_no_further_and_says_so_once() -> None:
+    arm = StandIn()
+    reason, told = driven(arm, {4: JOG_SPEED}, held_until=500, periods=500)
+    assert reason is None
+    assert arm.position[3] == pytest.approx(1.56, abs=0.01)
+    assert len(told) == 1
+    assert told[0].startswith("joint 4: 89.")
+    assert "allowed are -89.38° to 89.38°" in told[0]
+
+
+def test_a_slow_jog_does_not_creep_past_the_limit() -> None:
+    """Limits give way to rounding by half a posture unit; not by half a unit again and again."""
+    arm = StandIn()
+    arm.position[3] = CALIBRATIONS[3].posture_to_rad(990)
+    arm.postures[3] = 990
+    driven(arm, {4: 0.02}, held_until=400, periods=400)
+    assert arm.postures[3] == round((1.56 - CALIBRATIONS[3].angle_at_zero_rad) / CALIBRATIONS[3].rad_per_posture_unit)
+
+
+def test_the_floor_ends_a_jog_too() -> None:
+    arm = StandIn()
+    _, told = driven(arm, {2: -JOG_SPEED}, held_until=400, periods=400)
+    assert "height of -30" in told[0]
+    assert arm.position[1] == pytest.approx(-math.asin(0.30 / (0.285755 + 0.16841)), abs=0.02)
+
+
+@given(st.dictionaries(st.integers(1, 6), st.floats(-JOG_SPEED, JOG_SPEED), min_size=1), st.integers(1, 400))
+def test_no_key_drives_the_arm_out_of_its_limits(velocities: dict[int, float], periods: int) -> None:
+    jogger = Jogger(MA2000, LIMITS, StandIn.joints)
+    arm = StandIn()
+    for _ in range(periods // 20):
+        row = arm.next_sample()
+        step = jogger.step(row, JogCommand(velocities, row.host_time))
+        arm.set_points(step.postures)
+        jogger.accept(step)
+    for joint, posture in enumerate(arm.postures, start=1):
+        own = LIMITS.joint(joint)
+        angle = CALIBRATIONS[joint - 1].posture_to_rad(posture)
+        assert own.low is not None
+        assert own.high is not None
+        assert own.low - 0.005 <= angle <= own.high + 0.005
+
+
+@pytest.mark.parametrize(
+    ("velocities", "line"),
+    [
+        ({1: 0.36}, "joint 1: velocity of 0.36 rad/s: allowed are up to ±0.35 rad/s"),
+        ({1: math.nan}, "joint 1: velocity of nan rad/s"),
+        ({7: 0.1}, "joint 7: allowed are"),
+    ],
+)
+def test_a_command_that_cannot_be_is_refused(velocities: dict[int, float], line: str) -> None:
+    arm = StandIn()
+    jogger = Jogger(MA2000, LIMITS, arm.joints)
+    with pytest.raises(SpecError, match=line.replace(".", r"\.")):
+        jogger.step(arm.next_sample(), JogCommand(velocities, PERIOD))
+
+
+def test_jogging_needs_to_see_all_joints() -> None:
+    with pytest.raises(SpecError, match="all of 1 to 6 are needed"):
+        Jogger(MA2000, LIMITS, (1, 2, 3))
+
+
+def test_set_points_never_run_further_ahead_than_the_following_error_limit() -> None:
+    arm = StandIn()
+    arm.push = {1: 0.0}
+    arm.gain[1] = (0, 0, 0)  # joint 1 does not follow
+    reason, _ = driven(arm, {1: JOG_SPEED}, held_until=300, periods=300)
+    ahead = CALIBRATIONS[0].posture_to_rad(arm.postures[0]) - arm.position[0]
+    assert ahead / CALIBRATIONS[0].rad_per_count <= 127
+    assert reason is not None
+    assert "joint 1: next set point is" in reason
+    assert arm.log[-1] == "stop"
+
+
+def test_a_stop_from_elsewhere_ends_it() -> None:
+    arm = StandIn()
+    arm.frozen = True
+    reason, _ = driven(arm, {1: 0.1}, held_until=10, periods=10)
+    assert reason == "stopped on the board at tick 1"
+    assert arm.log == []

@@ -1,0 +1,128 @@
+"""Lead by the nose: limp while led, recorded, and stiff again without a jerk."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from daq.teaching import RecordedPath, TeachingError, lead_by_nose
+from tests.daq.teaching.stand_in import CALIBRATIONS, MA2000, REST, StandIn
+
+LIMITS = MA2000.limits
+
+
+def waving(tick: int) -> Mapping[int, float]:
+    """A hand that waves joints 1 and 3 for 100 periods and then keeps still."""
+    phase = min(tick, 100) / 100 * math.pi
+    return {1: REST[0] + 0.3 * math.sin(phase), 3: REST[2] + 0.2 * (1 - math.cos(phase))}
+
+
+def led(arm: StandIn, joints: tuple[int, ...] = (1, 3), periods: int = 120) -> RecordedPath:
+    return lead_by_nose(arm, MA2000, LIMITS, joints, arm.run_for(periods))
+
+
+def test_the_path_is_where_the_hand_led_the_arm() -> None:
+    path = led(StandIn(waving))
+    assert path.joints == (1, 3)
+    ticks = np.rint(np.array(path.times) / 0.02).astype(int) + 2  # tick 1 was for the first set points
+    expected = [list(waving(int(tick)).values()) for tick in ticks]
+    assert np.array(path.positions) == pytest.approx(np.array(expected), abs=0.0006)
+
+
+def test_gains_are_zero_while_led_and_what_they_were_afterwards() -> None:
+    arm = StandIn(waving)
+    arm.gain[3] = (5, 1, 2)
+    led(arm)
+    limp = [entry for entry in arm.log if entry.startswith("gains")]
+    assert limp == ["gains 1 0", "gains 3 0", "gains 1 2", "gains 3 5"]
+    assert arm.gain[3] == (5, 1, 2)
+    assert arm.gain[2] == (2, 0, 0)
+
+
+def test_nothing_pulls_when_the_gains_come_back() -> None:
+    arm = StandIn(waving)
+    led(arm)
+    before = arm.position.copy()
+    for joint, own in enumerate(CALIBRATIONS, start=1):
+        error = (own.posture_to_rad(arm.postures[joint - 1]) - before[joint - 1]) / own.rad_per_count
+        assert abs(error) <= 8
+    for _ in range(10):
+        arm.next_sample()
+    assert arm.position == pytest.approx(before, abs=0.004)
+
+
+def test_gains_wait_until_the_hand_keeps_still() -> None:
+    def shaking(tick: int) -> Mapping[int, float]:
+        return {1: REST[0] + 0.2 * math.sin(tick) * (tick < 300)}
+
+    arm = StandIn(shaking)
+    led(arm, joints=(1,), periods=100)
+    assert arm.tick > 300
+    assert arm.gain[1] == (2, 0, 0)
+
+
+def test_an_arm_that_never_comes_to_rest_stays_limp_and_says_so() -> None:
+    arm = StandIn(lambda tick: {1: REST[0] + 0.2 * math.sin(tick)})
+    with pytest.raises(TeachingError, match=r"did not come to rest within 10 s; the gains of joints \[1\] are still 0"):
+        led(arm, joints=(1,), periods=100)
+    assert arm.gain[1] == (0, 0, 0)
+
+
+def test_ctrl_c_brings_the_gains_back_too() -> None:
+    arm = StandIn(waving)
+
+    def ended() -> bool:
+        if arm.tick >= 110:
+            raise KeyboardInterrupt
+        return False
+
+    with pytest.raises(KeyboardInterrupt):
+        lead_by_nose(arm, MA2000, LIMITS, (1, 3), ended)
+    assert arm.gain[1] == (2, 0, 0)
+
+
+def test_a_stop_from_elsewhere_ends_it_and_leaves_the_joints_limp() -> None:
+    """The board holds its set points where the stop was: stiff again, the arm would be pulled back there."""
+    arm = StandIn(waving)
+    original = arm.hand
+    arm.hand = lambda tick: setattr(arm, "frozen", tick >= 50) or original(tick)
+    with pytest.raises(TeachingError, match=r"stopped on the board at tick 50; the gains of joints \[1, 3\] are"):
+        led(arm)
+    assert arm.gain[1] == (0, 0, 0)
+
+
+def test_a_joint_that_is_not_led_must_not_move() -> None:
+    arm = StandIn(waving)
+    original = arm.hand
+
+    def pushed(tick: int) -> Mapping[int, float]:
+        arm.push = {2: 0.05 if tick > 50 else 0.0}
+        return original(tick)
+
+    arm.hand = pushed
+    with pytest.raises(TeachingError, match="joint 2: unexpected motion"):
+        led(arm)
+    assert arm.log[-1] == "stop"
+
+
+def test_a_lost_link_says_that_the_joints_may_be_limp() -> None:
+    arm = StandIn(waving)
+    arm.broken_from = 50
+    with pytest.raises(TeachingError, match=r"the link is lost; the gains of joints \[1, 3\] may be 0 now"):
+        led(arm)
+
+
+@pytest.mark.parametrize("joints", [(), (7,)])
+def test_joints_that_are_not_sampled_cannot_be_led(joints: tuple[int, ...]) -> None:
+    arm = StandIn()
+    with pytest.raises(TeachingError, match="those sampled are"):
+        led(arm, joints=joints)
+    assert arm.log == []
+
+
+def test_one_sample_is_no_path_and_leaves_the_gains_as_they_were() -> None:
+    arm = StandIn(waving)
+    with pytest.raises(TeachingError, match="1 samples are no path"):
+        led(arm, periods=2)
+    assert arm.gain[1] == (2, 0, 0)
