@@ -2,14 +2,16 @@
 
     python -m benchmarks.dynamics
 
-Each evaluation gives D, H + G and the accelerations of the three-joint arm (table 7.9). As in a simulation, every
-state depends on the accelerations before it, so what is measured is latency, not overlapping throughput. Needs gcc.
+Each evaluation gives D, H + G and the accelerations of the three-joint arm (table 7.9). "In a row": as in a
+simulation, every state depends on the accelerations before it. "Side by side": many independent states, as in
+a batch of runs, where a loop without calls is vectorised. Needs gcc.
 """
 
 from __future__ import annotations
 
 import argparse
 import ctypes
+import functools
 import subprocess
 import sys
 import tempfile
@@ -31,6 +33,10 @@ from tests.model.dynamics.chains import TABLE_7_9
 from tests.model.dynamics.oracles import MuJoCo, Pinocchio
 
 REPEATS = 7
+STATES = 256
+"""Independent states evaluated side by side."""
+C_NAME = "C -O3 -march=native, same expressions"
+_DOUBLES = ctypes.POINTER(ctypes.c_double)
 START = np.array([0.2, 0.7, -0.4, 0.5, -0.3, 0.8])
 """Joint angles and rates at which the loop starts, rad and rad/s."""
 FEEDBACK = 1e-9
@@ -53,6 +59,17 @@ double run(long n, const double *s, const double *p, double k) {
   }
   return x2 + x3 + v1;
 }
+void run_many(long n, long states, const double *restrict s, const double *p, double *restrict out) {
+  double m[9];
+  const double t[3] = {1.0, 2.0, 0.5};
+  for (long k = 0; k < n; k++)
+    for (long i = 0; i < states; i++) {
+      double a[3];
+      mass_matrix_and_bias(s[i], s[states+i], s[2*states+i], s[3*states+i], s[4*states+i], p, m);
+      solve(m, t, a);
+      out[i] = a[0]; out[states+i] = a[1]; out[2*states+i] = a[2];
+    }
+}
 """
 
 
@@ -68,6 +85,14 @@ def _closed_form(n: int, s: Any, p: Any, k: float) -> Any:
 
 
 @numba.njit(error_model="numpy", fastmath={"contract"})
+def _closed_form_many(n: int, s: Any, p: Any, out: Any) -> None:
+    for _ in range(n):
+        for i in range(s.shape[1]):
+            a1, a2, a3 = three_joint_motion.accelerations(s[0, i], s[1, i], s[2, i], s[3, i], s[4, i], 1.0, 2.0, 0.5, p)
+            out[0, i], out[1, i], out[2, i] = a1, a2, a3
+
+
+@numba.njit(error_model="numpy", fastmath={"contract"})
 def _recursive(n: int, s: Any, chain: Any, k: float) -> Any:
     q, velocity, torque = s[:3].copy(), s[3:].copy(), np.array([1.0, 2.0, 0.5])
     for _ in range(n):
@@ -79,20 +104,46 @@ def main() -> int:
     """Print the table; nothing is asserted, times belong to the machine."""
     argparse.ArgumentParser(prog="python -m benchmarks.dynamics", description=__doc__).parse_args()
     chain = TABLE_7_9.chain()
-    p = effective_parameters(chain)
-    rows = [("numba closed form", _time(lambda n: _closed_form(n, START, p, FEEDBACK), 1_000_000))]
-    c_run = _compile_c()
-    pointers = [a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in (START, p)]
-    rows.append(("C -O3 -march=native, same expressions", _time(lambda n: c_run(n, *pointers, FEEDBACK), 1_000_000)))
-    _assert_same(_closed_form(1000, START, p, 1e-3), c_run(1000, *pointers, 1e-3))
-    s, pc = START.astype(complex), p.astype(complex)
-    rows.append(("numba closed form, dual numbers", _time(lambda n: _closed_form(n, s, pc, FEEDBACK), 1_000_000)))
-    arrays = chain.arrays()
-    rows.append(("numba recursive, any chain", _time(lambda n: _recursive(n, START, arrays, FEEDBACK), 100_000)))
-    rows += _other_engines(chain)
+    rows = [*_in_a_row(chain), *_other_engines(chain), *_side_by_side(chain)]
+    reference = dict(rows)[C_NAME]
     for name, nanoseconds in rows:
-        sys.stdout.write(f"{name:58s} {nanoseconds:10.1f} ns   {nanoseconds / rows[1][1]:8.2f} × C\n")
+        sys.stdout.write(f"{name:58s} {nanoseconds:10.1f} ns   {nanoseconds / reference:8.2f} × C\n")
     return 0
+
+
+def _in_a_row(chain: Chain) -> list[tuple[str, float]]:
+    p, arrays = effective_parameters(chain), chain.arrays()
+    c_run = _compile_c().run
+    c_run.argtypes, c_run.restype = [ctypes.c_long, _DOUBLES, _DOUBLES, ctypes.c_double], ctypes.c_double
+    start, parameters = _pointer(START), _pointer(p)
+    _assert_same(_closed_form(1000, START, p, 1e-3), c_run(1000, start, parameters, 1e-3))
+    s, pc = START.astype(complex), p.astype(complex)
+    return [
+        ("numba closed form", _time(lambda n: _closed_form(n, START, p, FEEDBACK), 1_000_000)),
+        (C_NAME, _time(lambda n: c_run(n, start, parameters, FEEDBACK), 1_000_000)),
+        ("numba closed form, dual numbers", _time(lambda n: _closed_form(n, s, pc, FEEDBACK), 1_000_000)),
+        ("numba recursive, any chain", _time(lambda n: _recursive(n, START, arrays, FEEDBACK), 100_000)),
+    ]
+
+
+def _side_by_side(chain: Chain) -> list[tuple[str, float]]:
+    p = effective_parameters(chain)
+    states = np.random.default_rng(1).normal(size=(5, STATES))
+    ours, theirs = np.empty((3, STATES)), np.empty((3, STATES))
+    c_run = _compile_c().run_many
+    c_run.argtypes, c_run.restype = [ctypes.c_long, ctypes.c_long, _DOUBLES, _DOUBLES, _DOUBLES], None
+    arguments = STATES, _pointer(states), _pointer(p), _pointer(theirs)
+    _closed_form_many(1, states, p, ours)
+    c_run(1, *arguments)
+    _assert_same(float(ours.sum()), float(theirs.sum()))
+    return [
+        ("numba closed form, side by side", _time(lambda n: _closed_form_many(n, states, p, ours), 1000) / STATES),
+        ("C, side by side", _time(lambda n: c_run(n, *arguments), 1000) / STATES),
+    ]
+
+
+def _pointer(values: Any) -> Any:
+    return values.ctypes.data_as(_DOUBLES)
 
 
 def _time(run: Callable[[int], Any], n: int) -> float:
@@ -106,6 +157,7 @@ def _time(run: Callable[[int], Any], n: int) -> float:
     return best / n * 1e9
 
 
+@functools.cache
 def _compile_c() -> Any:
     folder = Path(tempfile.mkdtemp(prefix="ma2000-benchmark-"))
     source, library = folder / "run.c", folder / "run.so"
@@ -113,10 +165,7 @@ def _compile_c() -> Any:
     here = str(Path(__file__).parent)
     command = ["gcc", "-O3", "-march=native", "-shared", "-fPIC", "-I", here, str(source), "-o", str(library), "-lm"]
     subprocess.run(command, check=True)
-    run = ctypes.CDLL(str(library)).run
-    double_p = ctypes.POINTER(ctypes.c_double)
-    run.argtypes, run.restype = [ctypes.c_long, double_p, double_p, ctypes.c_double], ctypes.c_double
-    return run
+    return ctypes.CDLL(str(library))
 
 
 def _other_engines(chain: Chain) -> list[tuple[str, float]]:

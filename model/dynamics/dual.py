@@ -36,8 +36,9 @@ _HALF_PI_LOW = 2.0222662487959506e-21
 def _sin_cos_real(x: float) -> tuple[float, float]:
     """Sine and cosine together, by reduction to |r| ≤ π/4 and the Taylor series there.
 
-    Written out because the library's function is a call that costs half of the arm's whole dynamics: inlined, the
-    two series run beside the rest of the arithmetic. The terms left out are below 1e-18.
+    Written out because the library's function is a call, and a loop with a call in it cannot be vectorised:
+    independent evaluations of the arm's dynamics take 3 times less time with this one, dependent ones a tenth less
+    (`benchmarks/dynamics.py`). The terms left out are below 1e-17 of the result.
     """
     turns = np.floor(x * (2.0 / math.pi) + 0.5)
     r = ((x - turns * _HALF_PI_HIGH) - turns * _HALF_PI_MIDDLE) - turns * _HALF_PI_LOW
