@@ -55,11 +55,14 @@ class TurnExchange:
         for transaction in waiting:
             if transaction.written > connection.timing.retries_of(transaction.request):
                 raise LinkTimeoutError(no_reply(connection, transaction))
-        waited_s = min(connection.timing.reply_timeout_s(transaction.request, 0) for transaction in waiting)
-        wait = Advance(round(waited_s * 1e6))
-        passed = connection.repeat(waiting, ahead=[wait])
+        requests = [transaction.request for transaction in waiting]
+        waited_s = min(connection.timing.reply_timeout_s(request, 0) for request in requests)
+        # Before an Advance that is asked again there must be no newer one: it would be refused as stale.
+        advances = any(isinstance(request, Advance) for request in requests)
+        wait = [] if advances else [Advance(round(waited_s * 1e6))]
+        passed = connection.repeat(waiting, ahead=wait)
         try:
-            self._listen([wait, *(transaction.request for transaction in waiting)])
+            self._listen([*wait, *requests])
         finally:
             connection.forget(passed)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from daq.driver import EVERY_JOINT, Controller
@@ -46,9 +48,9 @@ def test_once_greeted_it_has_not_restarted(controller: Controller) -> None:
 def test_each_period_is_delivered_once_and_in_order(controller: Controller) -> None:
     snapshots = [controller.next_snapshot()]
     for _ in range(25):
-        snapshots.append(controller.next_snapshot(snapshots[-1].tick))  # noqa: PERF401  (each asks after the last)
+        snapshots.append(controller.next_snapshot(snapshots[-1].tick))
     ticks = [snapshot.tick for snapshot in snapshots]
-    assert all(later > earlier for earlier, later in zip(ticks, ticks[1:], strict=False))
+    assert all(later > earlier for earlier, later in pairwise(ticks))
     if Capability.SAMPLE in controller.identity.capabilities:
         assert ticks == list(range(ticks[0], ticks[0] + 26))
     gaps = ticks[-1] - ticks[0] - 25

@@ -75,3 +75,15 @@ def test_marks_are_counted_however_the_bytes_are_cut(turns: list[list[int]], cut
         marks.feed(stream[position : position + size])
         position, index = position + size, index + 1
     assert marks.seen == len(turns)
+
+
+def test_an_advance_that_was_lost_is_repeated_alone() -> None:
+    """A newer Advance before it would make it stale."""
+    lost = iter([True])
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        return [] if next(lost, False) else [(0.0, frame_of(sequence, Advanced(20_000, 1)))]
+
+    link, channel = scripted_link(answer, lock_step=True)
+    assert link.request(Advance(20_000), Advanced) == Advanced(20_000, 1)
+    assert channel.asked == [(0, Advance(20_000))] * 2
