@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import struct
 import tempfile
 import zipfile
 from pathlib import Path
@@ -41,7 +42,7 @@ def key_of(data: bytes) -> str:
 def load(path: Path, key: str) -> Trace | None:
     """The trace of a file whose key is `key`; None when there is no cache, or it is of something else or damaged."""
     try:
-        with np.load(cache_path(path), allow_pickle=False) as stored:
+        with cache_path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
             if str(stored["key"]) != key:
                 return None
             head = json.loads(str(stored["head"]))
@@ -51,7 +52,7 @@ def load(path: Path, key: str) -> Trace | None:
                 events=tuple(TraceEvent.model_validate(event) for event in head["events"]),
                 **{name: stored[name] for name in _SIGNALS if name in stored},
             )
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+    except (OSError, EOFError, ValueError, KeyError, TypeError, struct.error, zipfile.BadZipFile):
         return None
 
 

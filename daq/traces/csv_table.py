@@ -111,12 +111,13 @@ def _record(path: Path, beside: Beside) -> TraceRecord:
             machine = load_machine(beside.machine if named else str(path.parent / beside.machine))
         except DaqError as error:
             raise TraceError(f"{toml_path(path)}: machine: {error}") from error
+    own_name = machine.name if machine else path.stem
     return TraceRecord(
         trace_id=new_trace_id(),
         created=beside.created or datetime.now(UTC),
         software=software(),
         source=beside.source,
-        robot=beside.robot or (machine.name if machine else path.stem),
+        robot=own_name if beside.robot is None else beside.robot,
         machine=machine,
         operator=beside.operator,
         period=beside.period,

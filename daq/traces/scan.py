@@ -17,7 +17,7 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Metadata, Schema
 from mcap.stream_reader import StreamReader, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
@@ -135,6 +135,11 @@ def _take(found: Scan, opcode: int, body: memoryview, whole: memoryview) -> None
         expected = DataEnd.read(_stream(body)).data_section_crc
         if expected not in (0, zlib.crc32(whole[: found.good_bytes])):
             raise ValueError("the data section does not match its checksum")
+    elif opcode == Opcode.FOOTER:
+        footer = Footer.read(_stream(body))
+        begin, end = footer.summary_start or found.good_bytes, found.good_bytes + _HEAD.size + len(body) - _CRC.size
+        if footer.summary_crc not in (0, zlib.crc32(whole[begin:end])):
+            raise ValueError("the index does not match its checksum")
 
 
 def _take_definitions(found: Scan, chunk: bytes) -> None:

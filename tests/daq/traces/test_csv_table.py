@@ -1,0 +1,134 @@
+"""CSV out and in again, to the bit; and one line with row and column for what is wrong in a file."""
+
+import dataclasses
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from daq.contracts.errors import TraceError
+from daq.contracts.trace import Trace
+from daq.traces.csv_table import export_csv, import_csv
+from daq.traces.reader import read_trace
+from tests.daq.traces.samples import CREATED, record, write
+
+number = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.data())
+def test_a_trace_comes_back_from_csv_to_the_bit(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+    joints = tuple(sorted(data.draw(st.sets(st.integers(1, 6), min_size=1, max_size=3))))
+    time = np.array(sorted(data.draw(st.sets(number, min_size=1, max_size=10))))
+    table = st.lists(
+        st.lists(number, min_size=len(joints), max_size=len(joints)), min_size=len(time), max_size=len(time)
+    ).map(np.array)
+    signals = {name: data.draw(st.none() | table) for name in ("set_point", "drive", "velocity")}
+    text = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+    about = record(
+        robot=data.draw(text),
+        operator=data.draw(st.none() | text),
+        notes=data.draw(text),
+        source="real",
+        outcome="stopped",
+    )
+    trace = Trace(about, joints, time, data.draw(table), **signals)
+    back = import_csv(export_csv(trace, tmp_path_factory.mktemp("csv") / "rig.csv"))
+    for field in dataclasses.fields(Trace):
+        expected = getattr(trace, field.name)
+        if isinstance(expected, np.ndarray) or field.name in signals:
+            np.testing.assert_array_equal(getattr(back, field.name), expected)
+    assert back.joints == joints
+    for name in ("robot", "operator", "notes", "source", "outcome", "created", "machine", "drive_unit", "period"):
+        assert getattr(back.record, name) == getattr(about, name), name
+
+
+def test_the_same_trace_gives_the_same_bytes_and_plain_columns(tmp_path: Path) -> None:
+    trace = read_trace(write(tmp_path / "a.mcap", 3))
+    first, second = export_csv(trace, tmp_path / "b.csv"), export_csv(trace, tmp_path / "c.csv")
+    assert first.read_bytes() == second.read_bytes()
+    header, row, *_ = first.read_text().splitlines()
+    assert header.split(",")[:5] == ["time", "set_point_1", "position_1", "drive_1", "set_point_2"]
+    assert row.startswith("0.0,2.01")
+    assert tomllib.loads((tmp_path / "b.toml").read_text()) == {
+        "source": "mock", "machine": "ma2000", "robot": "ma2000", "joints": [1, 2, 3], "drive_unit": "V",
+        "period": 0.02, "created": CREATED, "outcome": "complete",
+    }  # fmt: skip
+
+
+def test_a_file_of_another_tool_needs_no_toml(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_bytes(b"\xef\xbb\xbftime, position_1 ,drive_1\r\n0,1,2\r\n0.5,1e-3, -4\r\n\r\n")
+    trace = import_csv(path)
+    assert (trace.joints, trace.record.source, trace.record.robot) == ((1,), "imported", "rig")
+    assert trace.record.outcome is None
+    np.testing.assert_array_equal(trace.position[:, 0], [1, 0.001])
+    assert trace.drive is not None
+    np.testing.assert_array_equal(trace.drive[:, 0], [2, -4])
+    assert trace.set_point is None
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", "row 1: no column names"),
+        ("time;position_1\n0;1\n", "row 1: columns must be separated by commas"),
+        ("position_1,time\n", "row 1: the first column must be 'time'"),
+        ("time,position_1,position_1\n", "row 1, column 3: 'position_1' comes twice"),
+        (
+            "time,setpoint_1,position_1\n",
+            "row 1, column 2: 'setpoint_1' is not known; allowed are time and set_point_N",
+        ),
+        ("time,position_7\n", "row 1, column 2: 'position_7' is not known"),
+        ("time,drive_1\n0,0\n", "row 1: column 'position_1' is missing"),
+        ("time,position_1,position_2,drive_1\n", "row 1: column 'drive_2' is missing; joint 1 has one"),
+        ("time,position_1\n0,1\n0.1,nan\n", "row 3, column 'position_1': 'nan' is not a finite number"),
+        ("time,position_1\n0,1\n0.1,inf\n", "row 3, column 'position_1': 'inf' is not a finite number"),
+        ("time,position_1\n0,1\n0.1,fast\n", "row 3, column 'position_1': 'fast' is not a finite number"),
+        ("time,position_1\n0,1_0\n", "row 2, column 'position_1': '1_0' is not a finite number"),
+        ("time,position_1\n0,\n", "row 2, column 'position_1': '' is not a finite number"),
+        ("time,position_1\n0,1\n0.1\n", "row 3: has 1 values for 2 columns"),
+        ("time,position_1\n0,1\n0.2,1\n0.1,1\n", "row 4, column 'time': 0.1 does not increase after 0.2"),
+        ("time,position_1\n0,1\n0,1\n", "row 3, column 'time': 0.0 does not increase after 0.0"),
+    ],
+)
+def test_one_line_names_the_row_and_the_column(tmp_path: Path, text: str, complaint: str) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text(text)
+    with pytest.raises(TraceError, match=r"^[^\n]*$") as caught:
+        import_csv(path)
+    assert str(caught.value).startswith(f"{path}: {complaint}")
+
+
+@pytest.mark.parametrize(
+    ("toml", "complaint"),
+    [
+        ("joints = [", "rig.toml: is not TOML"),
+        ("joint = [1]", "rig.toml: joint: Extra inputs are not permitted"),
+        ("joints = [0]", "rig.toml: joints.0: Input should be greater than or equal to 1"),
+        ("joints = [2]", "rig.csv: row 1: column 'position_2' is missing"),
+        ("machine = 'crane.toml'", "rig.toml: machine: machine '"),
+        ("drive_unit = 'kV'", "rig.toml: drive_unit: Input should be"),
+    ],
+)
+def test_one_line_names_what_is_wrong_beside_the_file(tmp_path: Path, toml: str, complaint: str) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text("time,position_1\n0,1\n")
+    path.with_suffix(".toml").write_text(toml)
+    with pytest.raises(TraceError, match=r"^[^\n]*$") as caught:
+        import_csv(path)
+    assert str(caught.value).startswith(f"{tmp_path}/{complaint}")
+
+
+def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
+    with pytest.raises(TraceError, match=r"absent\.csv: cannot be read: No such file"):
+        import_csv(tmp_path / "absent.csv")
+    (tmp_path / "a.csv").write_bytes(b"time,position_1\n0,\xff\n")
+    with pytest.raises(TraceError, match="is not text in UTF-8"):
+        import_csv(tmp_path / "a.csv")
+    trace = read_trace(write(tmp_path / "a.mcap", 3))
+    with pytest.raises(TraceError, match="cannot be written: No such file"):
+        export_csv(trace, tmp_path / "absent" / "a.csv")

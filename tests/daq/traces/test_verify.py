@@ -1,0 +1,96 @@
+"""What verify finds in traces that are right, and in traces with one thing wrong."""
+
+from pathlib import Path
+
+import pytest
+
+from daq.contracts.errors import TraceError
+from daq.contracts.trace import Outcome, TraceEvent
+from daq.traces.salvage import salvage
+from daq.traces.verify import verify
+from daq.traces.writer import TraceWriter
+from tests.daq.traces.samples import JOINTS, record, row, write
+
+
+def findings(path: Path) -> dict[tuple[str, str], str]:
+    """Messages by level and check, notes left out."""
+    return {(f.level, f.check): f.message for f in verify(path).findings if f.level != "note"}
+
+
+def recorded(
+    path: Path,
+    ticks: list[int],
+    outcome: Outcome = "complete",
+    counters: dict[str, float] | None = None,
+    event: TraceEvent | None = None,
+    **changes: object,
+) -> Path:
+    """A trace whose last row has `changes`."""
+    with TraceWriter(path, record(), JOINTS) as writer:
+        for tick in ticks:
+            writer.sample(row(tick, **(changes if tick == ticks[-1] else {})))
+        if event:
+            writer.event(event)
+        return writer.close(outcome, counters)
+
+
+def test_a_good_trace_has_no_findings_but_notes(tmp_path: Path) -> None:
+    verification = verify(write(tmp_path / "a.mcap"))
+    assert verification.trustworthy
+    assert [(f.level, f.check) for f in verification.findings] == [("note", "arrival")]
+
+
+@pytest.mark.parametrize(
+    ("made", "expected", "words"),
+    [
+        ({"ticks": [0, 1, 4, 5, 9]}, ("warning", "gaps"), "5 samples are missing in 2 gaps, the first after 0.020 s"),
+        (
+            {"ticks": [0, 1, 4], "counters": {"missing_samples": 1}},
+            ("error", "counters"),
+            "2 samples are missing, the link counted 1",
+        ),
+        ({"ticks": [0, 1, 2], "time": 0.045}, ("error", "time"), "time is 0.25 periods off the tick at sample 2"),
+        ({"ticks": [0, 1], "error": (0.01, 0.02, 0.05)}, ("error", "error"), "joint 3: error is not set point"),
+        ({"ticks": [0, 1], "outcome": "fault"}, ("warning", "outcome"), "the run ended as 'fault'"),
+        (
+            {"ticks": [0, 1], "event": TraceEvent(time=0.01, kind="link_lost", message="")},
+            ("error", "events"),
+            "claims to be complete, but has events link_lost",
+        ),
+        ({"ticks": []}, ("warning", "samples"), "has no samples"),
+    ],
+)
+def test_what_is_wrong_is_found(tmp_path: Path, made: dict[str, object], expected: tuple[str, str], words: str) -> None:
+    found = findings(recorded(tmp_path / "a.mcap", **made))  # type: ignore[arg-type]
+    assert found[expected].startswith(words)
+
+
+def test_an_error_of_one_rounding_is_no_finding_and_of_two_counts_is(tmp_path: Path) -> None:
+    count = 4.71238898038469 / 4096
+    good = row(1).error
+    near = (good[0] + 0.9 * count, *good[1:])
+    assert findings(recorded(tmp_path / "a.mcap", [0, 1], error=near)) == {}
+    far = (good[0] + 2 * count, *good[1:])
+    assert "worst 2.0 counts at 0.020 s" in findings(recorded(tmp_path / "b.mcap", [0, 1], error=far))["error", "error"]
+
+
+def test_damage_is_an_error_and_an_unfinished_trace_a_warning(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mcap")
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    (tmp_path / "b.mcap").write_bytes(data)
+    assert not verify(tmp_path / "b.mcap").trustworthy
+    assert "file" in dict.fromkeys(check for level, check in findings(tmp_path / "b.mcap") if level == "error")
+    part = path.rename(tmp_path / "a.mcap.part")
+    whole = part.read_bytes()
+    part.write_bytes(whole[: whole.index(b"daq.outcome")])
+    assert {("warning", "file"), ("warning", "outcome")} <= set(findings(part))
+    salvage(part)
+    assert set(findings(path)) == {("warning", "outcome")}
+
+
+def test_what_cannot_be_read_at_all(tmp_path: Path) -> None:
+    (tmp_path / "a.mcap").write_bytes(b"")
+    assert findings(tmp_path / "a.mcap")["error", "trace"].endswith("is empty")
+    with pytest.raises(TraceError, match="cannot be read"):
+        verify(tmp_path / "absent.mcap")
