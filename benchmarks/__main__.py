@@ -1,0 +1,65 @@
+"""Lists the benchmarks, or runs some of them.
+
+    python -m benchmarks                      the list
+    python -m benchmarks NAME [options]       one of them, with its own options
+    python -m benchmarks main-job [--quick]   every figure of the way from the command to the trace
+"""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+FOLDER = Path(__file__).parent
+
+MAIN_JOB: dict[str, tuple[str, ...]] = {
+    "startup": (),
+    "line_rate": (),
+    "stop_latency": (),
+    "lock_step": (),
+    "undetected_damage": (),
+    "trace_open": (),
+    "salvage": (),
+    "long_run": (),
+}
+"""What `main-job` runs, in this order, each with the options of a full run."""
+
+
+def benchmarks() -> dict[str, str]:
+    """Every benchmark (a module here that can be run) and its first line."""
+    found = {}
+    for path in sorted(FOLDER.glob("*.py")):
+        source = path.read_text("utf-8")
+        if path.stem != "__main__" and '__name__ == "__main__"' in source:
+            found[path.stem] = (ast.get_docstring(ast.parse(source)) or "").partition("\n")[0]
+    return found
+
+
+def run(name: str, options: list[str]) -> int:
+    """One benchmark in a process of its own, so that none inherits threads, priorities or caches; its exit code."""
+    return subprocess.run([sys.executable, "-m", f"benchmarks.{name}", *options], check=False).returncode
+
+
+def main(arguments: list[str]) -> int:
+    """The exit code: 0 when every target was met, 1 when one was missed, 2 for a name that is none."""
+    known = benchmarks()
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print((__doc__ or "").rstrip() + "\n")
+        for name, line in known.items():
+            print(f"  {name:<18} {line}")
+        return 0
+    name, *options = arguments
+    if name == "main-job":
+        quick = ["--quick"] if "--quick" in options else []
+        return max(run(each, [*given, *quick]) for each, given in MAIN_JOB.items() if each in known)
+    name = name.replace("-", "_")
+    if name not in known:
+        print(f"benchmark {name!r}: there is none; there are {', '.join(known)} and main-job", file=sys.stderr)
+        return 2
+    return run(name, options)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

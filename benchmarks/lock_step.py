@@ -1,0 +1,188 @@
+"""Ramp experiments in lock-step, through the whole path to the closed trace, on one core: how much faster than time.
+
+    python -m benchmarks lock_step
+    python -m benchmarks lock_step --profile     where host and mock spend theirs (cProfile slows both)
+
+Host and mock share one core. Beside it: the mock's board and plant alone, run in this process without any host.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import cProfile
+import json
+import os
+import pstats
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.figures import Figure, at_least, show
+from benchmarks.mock_control import MockControl
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.machine import load_machine
+from daq.contracts.sample import SampleRow
+from daq.contracts.trace import TraceEvent
+from daq.driver import Controller
+from daq.runner import Consent, run_experiment
+from daq.runner.arm_control import ArmControl
+from mock_controller.device import build_device
+from mock_controller.options import Options
+
+TARGET = 20.0
+"""Times real time."""
+PERIOD_S = 0.02
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What some control periods took: wall time and processor time (s) of both processes."""
+
+    periods: int
+    wall_s: float
+    host_s: float
+    mock_s: float
+
+    @property
+    def times_real_time(self) -> float:
+        """Controller's time over wall time."""
+        return self.periods * PERIOD_S / self.wall_s
+
+    @property
+    def cpu_times_real_time(self) -> float:
+        """Controller's time over both processes' processor time: what a core without other work gives."""
+        return self.periods * PERIOD_S / (self.host_s + self.mock_s)
+
+
+class Silent:
+    """Nobody listens."""
+
+    def progress(self, fraction: float, text: str) -> None:
+        """How far the run is."""
+
+    def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
+        """A recorded control period."""
+
+    def happened(self, event: TraceEvent) -> None:
+        """An event."""
+
+
+@contextlib.contextmanager
+def started_mock(profile: Path | None) -> Iterator[tuple[str, int, str]]:
+    """A mock in lock-step: its port URL, process number and control URL. It inherits this process's cores."""
+    profiler = [] if profile is None else ["-m", "cProfile", "-o", str(profile)]
+    command = [sys.executable, *profiler, "-m", "mock_controller", "--tcp", "127.0.0.1:0", "--lock-step", "--owned"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        ready = json.loads(process.stdout.readline())
+        try:
+            yield f"{ready['url']}?lock_step=1", process.pid, ready["control"]
+        finally:
+            process.stdin.close()
+
+
+def processor_time(process: int) -> float:
+    """CPU time (s) that a process has used so far."""
+    return time.clock_gettime((~process << 3) | 2)  # Linux: the scheduler's clock of another process
+
+
+def ramps(controller: Controller, repeats: int, folder: Path) -> None:
+    """Complete default ramps, one after the other, each with a trace of its own."""
+    machine = load_machine("ma2000")
+    for _ in range(repeats):
+        result = run_experiment(
+            controller,
+            ArmControl(controller),
+            ExperimentSpec(),
+            machine,
+            machine.limits,
+            folder,
+            Silent(),
+            consent=Consent(),
+            ended=lambda: None,
+            interrupted=lambda: False,
+        )
+        if result.outcome != "complete":
+            raise RuntimeError(f"a ramp ended {result.outcome}: {result.reason}")
+
+
+def measure(repeats: int, profiles: tuple[Path, Path] | None = None) -> Cost:
+    """Runs ramps against a mock of its own. `profiles`: where host and mock leave what cProfile saw."""
+    host_profile, mock_profile = profiles or (None, None)
+    with (
+        started_mock(mock_profile) as (url, process, control_url),
+        Controller.connect(url) as controller,
+        MockControl(control_url) as control,
+        tempfile.TemporaryDirectory() as folder,
+    ):
+        ramps(controller, 1, Path(folder))
+        begun_us = control.ask("state")["time_us"]
+        mock_s, host_s, wall_s = processor_time(process), time.process_time(), time.perf_counter()
+        if host_profile is None:
+            ramps(controller, repeats, Path(folder))
+        else:
+            with cProfile.Profile() as profile:
+                ramps(controller, repeats, Path(folder))
+            profile.dump_stats(host_profile)
+        wall_s = time.perf_counter() - wall_s
+        host_s, mock_s = time.process_time() - host_s, processor_time(process) - mock_s
+        passed_us = control.ask("state")["time_us"] - begun_us
+    return Cost(round(passed_us * 1e-6 / PERIOD_S), wall_s, host_s, mock_s)
+
+
+def board_alone(periods: int) -> float:
+    """Processor time (s) of so many periods of the mock's board and plant, with nobody asking."""
+    board = build_device(Options(tcp="127.0.0.1:0", lock_step=True), lambda _: None).board
+    board.run_until(1_000_000)
+    begun = time.process_time()
+    board.run_until(1_000_000 + round(periods * PERIOD_S * 1e6))
+    return time.process_time() - begun
+
+
+def print_profiles(repeats: int, lines: int) -> None:
+    """Where the time goes, by function's own time."""
+    with tempfile.TemporaryDirectory() as folder:
+        paths = (Path(folder) / "host", Path(folder) / "mock")
+        cost = measure(repeats, paths)
+        for name, path in zip(("host", "mock"), paths, strict=True):
+            print(f"\n==== {name}, {cost.periods} periods")
+            pstats.Stats(str(path)).sort_stats("tottime").print_stats(lines)
+
+
+def main() -> int:
+    """The exit code: 1 when the target was missed."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks lock_step", description=__doc__)
+    parser.add_argument("--ramps", type=int, default=20, help="experiments in one run")
+    parser.add_argument("--runs", type=int, default=3, help="runs, of which the quickest counts")
+    parser.add_argument("--quick", action="store_true", help="one run of five")
+    parser.add_argument("--profile", action="store_true")
+    given = parser.parse_args()
+    ramps_a_run, runs = (5, 1) if given.quick else (given.ramps, given.runs)
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    if given.profile:
+        print_profiles(ramps_a_run, 40)
+        return 0
+    costs = [measure(ramps_a_run) for _ in range(runs)]
+    best = min(costs, key=lambda cost: cost.wall_s / cost.periods)
+    cheapest = min(costs, key=lambda cost: (cost.host_s + cost.mock_s) / cost.periods)
+    alone_s = min(board_alone(best.periods) for _ in range(runs))
+    rival = f"board and plant alone: {best.periods * PERIOD_S / alone_s:.1f} ×"
+    figures = [
+        at_least("by the clock", best.times_real_time, TARGET, "× real time", rival),
+        Figure("by processor time", f"{cheapest.cpu_times_real_time:.3g} × real time"),
+        Figure("host a period", f"{1e3 * cheapest.host_s / cheapest.periods:.3f} ms"),
+        Figure("mock a period", f"{1e3 * cheapest.mock_s / cheapest.periods:.3f} ms",
+               beside=f"board and plant alone: {1e3 * alone_s / best.periods:.3f} ms"),
+    ]  # fmt: skip
+    title = f"Lock-step on one core, best of {runs} runs of {ramps_a_run} ramps ({best.periods * PERIOD_S:.0f} s)"
+    return show(title, "python -m benchmarks lock_step", figures)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
