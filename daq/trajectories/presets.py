@@ -83,11 +83,11 @@ def _small_steps() -> list[Segment]:
 
 def _fast_and_saturating() -> list[Segment]:
     segments = []
-    for size, rest in ((3.0, 0.58), (-3.0, 0.58), (7.5, 0.78), (-7.5, 0.78)):
-        segments += [_segment(Step(amplitude=math.radians(size))), _segment(Pause(duration=rest))]
+    for size in (3.0, -3.0, 7.5, -7.5, -7.5, 7.5):
+        segments += [_segment(Step(amplitude=math.radians(size))), _segment(Pause(duration=0.58))]
     # Joint 2 is the slow one: about 43 °/s is all that its drive can do.
     segments += _there_and_back((15.0, 9.0, 15.0), 0.22, 0.78)
-    segments += _there_and_back((30.0, 18.0, 30.0), 0.42, 0.98)
+    segments += _there_and_back((30.0, 18.0, 30.0), 0.42, 0.58)
     return segments + _there_and_back((30.0,), 0.70, 0.0, 2)
 
 

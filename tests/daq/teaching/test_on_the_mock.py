@@ -1,0 +1,57 @@
+"""Teaching through a real driver, on the mock in lock-step."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from daq.contracts.sample import SampleRow
+from daq.driver import Controller
+from daq.teaching import JogCommand, jog, lead_by_nose
+from daq.teaching.controller_arm import ControllerArm
+from tests.daq.teaching.stand_in import MA2000
+
+
+@pytest.fixture(scope="module")
+def controller() -> Iterator[Controller]:
+    with Controller.connect("mock://?lock_step=1") as controller:
+        yield controller
+
+
+class WatchedArm(ControllerArm):
+    """Keeps what it has delivered."""
+
+    def __init__(self, controller: Controller) -> None:
+        super().__init__(controller, MA2000)
+        self.seen: list[SampleRow] = []
+
+    def next_sample(self) -> SampleRow:
+        self.seen.append(super().next_sample())
+        return self.seen[-1]
+
+
+@pytest.fixture
+def arm(controller: Controller) -> WatchedArm:
+    return WatchedArm(controller)
+
+
+def test_a_jog_drives_the_arm_and_stops_when_the_key_is_let_go(arm: WatchedArm) -> None:
+    first = arm.next_sample()
+
+    def commands() -> JogCommand:
+        return JogCommand({1: 0.2}, min(arm.seen[-1].host_time, first.host_time + 1.0))
+
+    reason = jog(arm, MA2000, MA2000.limits, commands, lambda: len(arm.seen) >= 150, print)
+    assert reason is None
+    assert arm.seen[-1].position[0] - first.position[0] == pytest.approx(0.2 * 1.3, abs=0.03)
+    assert arm.seen[-1].position[0] == pytest.approx(arm.seen[-10].position[0], abs=0.005)
+
+
+def test_a_limp_joint_is_recorded_and_held_again_where_it_is(arm: WatchedArm, controller: Controller) -> None:
+    before = controller.gains()
+    asked = iter(range(60))
+    path = lead_by_nose(arm, MA2000, MA2000.limits, (3,), lambda: next(asked) >= 50)
+    assert len(path.times) == 50
+    assert controller.gains() == before
+    row = arm.next_sample()
+    assert row.position[2] == pytest.approx(path.positions[-1][0], abs=0.1)
+    assert abs(row.error[2] / MA2000.calibration(3).rad_per_count) <= 10
