@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
+import re
+from pathlib import Path
+
 import pytest
 
-from mock_controller.faults.fault import FaultError
+from mock_controller.faults.fault import FaultError, fields_of
 from mock_controller.faults.registry import FAULTS, describe, parse_fault, table
 
 NAMES = (
@@ -50,3 +54,14 @@ def test_what_cannot_be_is_refused_in_one_line(text: str, words: str) -> None:
         parse_fault(text)
     assert str(caught.value).startswith(words)
     assert "\n" not in str(caught.value)
+
+
+def test_the_guide_lists_every_fault_and_its_parameters() -> None:
+    guide = (Path(__file__).parents[3] / "docs" / "mock.md").read_text("utf-8")
+    listed = dict(re.findall(r"^\| `(\w+)` \|[^|]*\|([^|]*)\|[^|]*\|$", guide, re.MULTILINE))
+    assert tuple(listed) == NAMES
+    for name, kind in FAULTS.items():
+        own = set(inspect.get_annotations(kind)) - {"name"}
+        named = set(re.findall(r"`(\w+)`", listed[name]))
+        assert named <= set(fields_of(kind))
+        assert own - named <= {"duration"}

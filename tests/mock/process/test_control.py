@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -99,6 +101,12 @@ def test_process_inputs_can_be_set(desk: Desk) -> None:
     assert desk.say("inputs", bits=5)["ok"]
     desk.host.ask(Advance(20_000))
     assert desk.host.board.memory.values("process_inputs") == [5]
+
+
+def test_the_guide_lists_every_command(desk: Desk) -> None:
+    guide = (Path(__file__).parents[3] / "docs" / "mock.md").read_text("utf-8")
+    table = guide.partition("## The control port")[2].partition("\n## ")[0]
+    assert set(re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)) - {"do"} == set(desk.say("help")["commands"])
 
 
 def test_help_and_modifications(desk: Desk) -> None:
