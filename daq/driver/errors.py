@@ -8,14 +8,22 @@ from daq.contracts.errors import DaqError
 class ProtocolVersionError(DaqError):
     """Controller and host do not speak the same protocol."""
 
+    exit_code = 3
+
 
 class ControllerRestartedError(DaqError):
     """The board has been reset: set points and gains are those of power-up. Nothing goes on until `hello`."""
+
+    exit_code = 5
 
 
 class NoSampleError(DaqError):
     """No consistent reading for many periods."""
 
+    exit_code = 3
+
 
 class GainsNotTakenError(DaqError):
     """Gains read back differ from those written."""
+
+    exit_code = 5

@@ -9,6 +9,7 @@ from firmware_protocol.commands import Refusal
 class LinkError(DaqError):
     """The controller cannot be spoken to."""
 
+    exit_code = 3
     sent = False
     """Whether the request had been written when it failed, and may have been obeyed."""
 
@@ -23,6 +24,8 @@ class LinkLostError(LinkError):
 
 class RequestRefusedError(DaqError):
     """The controller answered that it will not. Nothing has changed there."""
+
+    exit_code = 3
 
     def __init__(self, request: str, reason: int) -> None:
         self.request = request

@@ -1,6 +1,7 @@
 """Bytes to and from a controller: over a serial port, a pseudo-terminal, TCP, or a mock that it starts itself."""
 
 from daq.transport.channel import ByteChannel, ChannelError
+from daq.transport.discovery import FoundPort, ports
 from daq.transport.endpoint import Endpoint, open_endpoint
 from daq.transport.reconnect import ReconnectDelay
 from daq.transport.url import MockPort, PortUrl, SerialPort, TcpPort, TransportError, parse_port_url
@@ -9,6 +10,7 @@ __all__ = [
     "ByteChannel",
     "ChannelError",
     "Endpoint",
+    "FoundPort",
     "MockPort",
     "PortUrl",
     "ReconnectDelay",
@@ -17,4 +19,5 @@ __all__ = [
     "TransportError",
     "open_endpoint",
     "parse_port_url",
+    "ports",
 ]

@@ -21,6 +21,8 @@ BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400, 46080
 class TransportError(DaqError):
     """A port that cannot be named, found, opened or owned."""
 
+    exit_code = 3
+
 
 @dataclass(frozen=True)
 class SerialPort:

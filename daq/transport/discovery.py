@@ -1,0 +1,32 @@
+"""Which ports there are: what `daq ports` lists."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from serial.tools import list_ports
+
+
+@dataclass(frozen=True)
+class FoundPort:
+    """A serial port of this machine. What hangs on it is not known until it is asked."""
+
+    url: str
+    description: str
+    maker: str | None
+    serial_number: str | None
+
+
+def ports() -> tuple[FoundPort, ...]:
+    """The serial ports of this machine, by device name. Opens none of them."""
+    found = sorted(list_ports.comports(), key=lambda port: port.device)
+    return tuple(
+        FoundPort(
+            f"serial://{port.device}", _told(port.description) or port.name, port.manufacturer, port.serial_number
+        )
+        for port in found
+    )
+
+
+def _told(text: str | None) -> str | None:
+    return None if text in (None, "", "n/a") else text

@@ -1,0 +1,102 @@
+"""What the driver says when a controller is not what it should be, and when a link fails under it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from daq.driver import Controller, GainsNotTakenError, NoSampleError, ProtocolVersionError
+from daq.link import LinkTimeoutError
+from daq.transport import TransportError
+from firmware_protocol.commands import (
+    Capability,
+    Gains,
+    GainsSet,
+    Hello,
+    HelloReply,
+    Reply,
+    ReportGains,
+    Request,
+    Sample,
+    SetGains,
+    Snapshot,
+    Status,
+)
+from firmware_protocol.joints import JointReading
+from tests.daq.link.scripted import frame_of, scripted_link
+
+HELLO = HelloReply(1, Capability.SAMPLE, 20_000, 8, 3)
+
+
+def controller_that(answers: Callable[[Request], Reply | None], hello: HelloReply = HELLO) -> Controller:
+    """A driver over a script; `answers` None is silence."""
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        reply = hello if isinstance(request, Hello) else answers(request)
+        return [] if reply is None else [(0.001, frame_of(sequence, reply))]
+
+    link, _ = scripted_link(answer)
+    return Controller(link)
+
+
+def test_another_protocol_is_refused_with_both_versions() -> None:
+    newer = HelloReply(2, Capability.SAMPLE, 20_000, 8, 1)
+    with pytest.raises(ProtocolVersionError, match="the controller speaks protocol 2, this software 1"):
+        controller_that(lambda _: None, newer)
+
+
+def test_a_controller_in_lock_step_must_be_named_so() -> None:
+    lock_step = HelloReply(1, Capability.LOCK_STEP, 20_000, 0, 1)
+    with pytest.raises(TransportError, match=r"runs in lock-step: add \?lock_step=1 to the URL"):
+        controller_that(lambda _: None, lock_step)
+
+
+def test_gains_that_read_back_otherwise_are_reported() -> None:
+    def answers(request: Request) -> Reply:
+        return GainsSet() if isinstance(request, SetGains) else Gains(((2, 0, 0),) * 6)
+
+    with pytest.raises(GainsNotTakenError, match=r"joint 3: gains \(4, 1, 0\) written, \(2, 0, 0\) read back"):
+        controller_that(answers).set_gains(3, 4, 1, 0)
+
+
+def test_gains_are_named_by_joint() -> None:
+    gains = tuple((joint, 0, 1) for joint in range(1, 7))
+    controller = controller_that(lambda request: Gains(gains) if isinstance(request, ReportGains) else None)
+    assert controller.gains()[4] == (4, 0, 1)
+
+
+def test_a_sample_older_than_asked_for_is_not_delivered() -> None:
+    old = Snapshot(7, 0, ((1, JointReading(500, 2048, 0, 0)),))
+    controller = controller_that(lambda request: old if isinstance(request, Sample) else Status(7, 0, 3, 0))
+    with pytest.raises(NoSampleError, match="sent tick 7, asked for one after 9"):
+        controller.next_snapshot(after=9)
+
+
+def test_a_stop_that_nobody_answers_is_told_and_not_raised() -> None:
+    confirmation = controller_that(lambda _: None).stop()
+    assert confirmation.sent
+    assert not confirmation.acknowledged
+    assert confirmation.frozen == {}
+    assert confirmation.problem is not None
+    assert "no reply to Stop" in confirmation.problem
+
+
+def test_a_stop_over_an_ended_channel_was_not_sent() -> None:
+    controller = controller_that(lambda _: None)
+    controller.close()
+    confirmation = controller.stop()
+    assert (confirmation.sent, confirmation.acknowledged) == (False, False)
+
+
+def test_a_silent_controller_is_a_time_out_whatever_was_asked() -> None:
+    with pytest.raises(LinkTimeoutError, match="no reply to Sample"):
+        controller_that(lambda request: None if isinstance(request, Sample) else Status(7, 0, 3, 0)).next_snapshot()
+
+
+def test_a_gap_in_the_ticks_is_counted_as_missing() -> None:
+    later = Snapshot(15, 0, ((1, JointReading(500, 2048, 0, 0)),))
+    controller = controller_that(lambda _: later)
+    snapshot = controller.next_snapshot(after=10)
+    assert snapshot.missing_before == 4
+    assert controller.counters.missing_samples == 4
