@@ -1,0 +1,183 @@
+"""From the wish to stop to the frozen set points, and to the first control period that uses them.
+
+    python -m benchmarks stop_latency
+
+A host process samples three joints of a mock at 115200 baud through a pseudo-terminal, sends set points in every
+period, and listens on the socket of `daq stop`, all with the code of a real run. Stops come at random moments, (a)
+from another thread of the host, (b) from another process through that socket, as `daq stop` does once Python has
+started; first on a clean line, then with one frame in a hundred damaged or lost, both ways. The moments are the mock's
+own record: board time, and the reading of the system's monotonic clock (which all processes share) at its zero.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import multiprocessing
+import os
+import random
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+
+from benchmarks.figures import Figure, at_most, quantile, show
+from benchmarks.mock_control import MockControl
+from daq.acquisition.guardian import EndCause, Guardian
+from daq.acquisition.stop_socket import FOLDER_VARIABLE, StopAnswer, request_stop, stop_listener
+from daq.driver import Controller
+from daq.link import RequestRefusedError
+
+URL = "mock://?pty=1&baud=115200"
+FAULTS = "&fault=flip:rate=0.005&fault=drop:rate=0.005"
+JOINTS = (1, 2, 3)
+FROZEN_TARGET_MS = 20.0
+USED_TARGET_MS = 45.0
+ROBOT = "benchmark"
+PERIOD_S = 0.02
+LONGEST_WAIT_S = 5.0
+
+
+@dataclass
+class Stops:
+    """Latencies (ms) of repeated stops from one place."""
+
+    frozen: list[float] = field(default_factory=list)
+    used: list[float] = field(default_factory=list)
+    unconfirmed: int = 0
+
+
+def _sample_until_stopped(controller: Controller) -> None:
+    """Samples and sends set points, as a run does, until the board refuses them."""
+    snapshot = controller.next_snapshot(joints=JOINTS)
+    here = snapshot.set_points
+    sway = 0
+    with contextlib.suppress(RequestRefusedError):
+        while True:
+            sway = (sway + 1) % 8
+            wanted = {joint: posture + sway // 4 for joint, posture in here.items()}
+            snapshot = controller.next_snapshot(snapshot.tick, JOINTS, wanted)
+
+
+def _host(url: str, parent: Connection) -> None:
+    """The host process. Told "run", it runs until it is stopped; told a number, it stops itself after so many s."""
+    with Controller.connect(url) as controller, stop_listener(ROBOT) as listener:
+
+        def freeze(_cause: EndCause) -> StopAnswer:
+            confirmation = controller.stop()
+            return StopAnswer(robot=ROBOT, delivered=confirmation.sent, confirmed=confirmation.acknowledged)
+
+        with Guardian(listener, None, freeze):
+            parent.send(controller.link.control)
+            while (told := parent.recv()) != "end":
+                controller.release()
+                asked: list[tuple[float, bool]] = []
+                stopper = threading.Thread(target=_stop_later, args=(controller, told, asked))
+                if told != "run":
+                    stopper.start()
+                parent.send("running")
+                _sample_until_stopped(controller)
+                if told != "run":
+                    stopper.join()
+                parent.send(asked)
+            parent.send(controller.counters.retries)
+
+
+def _stop_later(controller: Controller, after_s: float, asked: list[tuple[float, bool]]) -> None:
+    time.sleep(after_s)
+    at = time.monotonic()
+    asked.append((at, controller.stop().acknowledged))
+
+
+def _by_thread(host: Connection, after_s: float) -> tuple[float, bool]:
+    host.send(after_s)
+    host.recv()
+    ((at, confirmed),) = host.recv()
+    return at, confirmed
+
+
+def _by_socket(host: Connection, after_s: float) -> tuple[float, bool]:
+    host.send("run")
+    host.recv()
+    time.sleep(after_s)
+    at = time.monotonic()
+    attempts = request_stop(ROBOT)
+    host.recv()
+    return at, len(attempts) == 1 and attempts[0].answer is not None and attempts[0].answer.confirmed
+
+
+def _record_of_stop(control: MockControl, number: int) -> tuple[float, float]:
+    """When stop `number` was in the memory and when it was first used (s, monotonic clock)."""
+    give_up = time.monotonic() + LONGEST_WAIT_S
+    while time.monotonic() < give_up:
+        state = control.ask("state")
+        stop, zero_us = state["stop"], state["clock"]["monotonic_us_at_zero"]
+        if stop["count"] == number and stop["first_used_us"] is not None:
+            return (zero_us + stop["frozen_us"]) * 1e-6, (zero_us + stop["first_used_us"]) * 1e-6
+        time.sleep(0.01)
+    raise RuntimeError(f"stop {number} never had an effect: the mock recorded {stop}")
+
+
+def measure(url: str, repeats: int) -> tuple[dict[str, Stops], int, dict[str, int]]:
+    """Stops by thread and by socket; repetitions the host needed; lateness of the mock."""
+    dice = random.Random(1991)
+    results = {"by a thread": Stops(), "by `daq stop`'s socket": Stops()}
+    ways: list[Callable[[Connection, float], tuple[float, bool]]] = [_by_thread, _by_socket]
+    context = multiprocessing.get_context("spawn")
+    host, child = context.Pipe()
+    process = context.Process(target=_host, args=(url, child))
+    process.start()
+    with MockControl(host.recv()) as control:
+        number = 0
+        for stops, way in zip(results.values(), ways, strict=True):
+            for _ in range(repeats):
+                at, confirmed = way(host, dice.uniform(3 * PERIOD_S, 4 * PERIOD_S))
+                number += 1
+                frozen, used = _record_of_stop(control, number)
+                stops.frozen.append(1e3 * (frozen - at))
+                stops.used.append(1e3 * (used - at))
+                stops.unconfirmed += not confirmed
+        clock = control.ask("state")["clock"]
+    host.send("end")
+    retries = host.recv()
+    process.join()
+    return results, retries, clock
+
+
+def figures_of(line: str, results: dict[str, Stops], retries: int, clock: dict[str, int]) -> list[Figure]:
+    """The table's rows of one line."""
+    rows = []
+    for where, stops in results.items():
+        for what, times, target in (
+            ("frozen in memory", stops.frozen, FROZEN_TARGET_MS),
+            ("first used", stops.used, USED_TARGET_MS),
+        ):
+            beside = f"p50 {quantile(times, 0.5):.1f}, max {max(times):.1f} ms, {len(times)} stops"
+            rows.append(at_most(f"{line}, {where}: {what}, p99", quantile(times, 0.99), target, "ms", beside))
+    unconfirmed = sum(stops.unconfirmed for stops in results.values())
+    late = f"mock behind its clock by more than 2 ms in {clock['late_ticks']} periods"
+    rows.append(Figure(f"{line}: stops without confirmation", f"{unconfirmed}", "0", unconfirmed == 0,
+                       f"{retries} repetitions; {late}"))  # fmt: skip
+    return rows
+
+
+def main() -> int:
+    """The exit code: 1 when a target was missed."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks stop_latency", description=__doc__)
+    parser.add_argument("--repeats", type=int, default=300, help="stops of each kind")
+    parser.add_argument("--quick", action="store_true", help="30 stops of each kind")
+    given = parser.parse_args()
+    repeats = 30 if given.quick else given.repeats
+    figures = []
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ[FOLDER_VARIABLE] = folder
+        for line, url in (("clean", URL), ("1 % damaged", URL + FAULTS)):
+            figures += figures_of(line, *measure(url, repeats))
+    return show("Stop, at 115200 baud", "python -m benchmarks stop_latency", figures)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
