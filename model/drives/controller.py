@@ -1,0 +1,65 @@
+"""Sampled controllers of one joint, one period a call."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.dynamics.compilation import compiled
+from model.machine_model import layout as at
+from model.drives.piecewise import clamped, rounded_half_up
+
+POWER_MAX = 127.0
+"""Largest magnitude of the 8-bit DAC's signed input."""
+INTEGRAL_SHARE = 64.0
+"""Counts of summed error for one DAC count at I = 1: an assumption, the source does not give the scale."""
+
+# Memory of a controller between periods.
+SUM, LAST_ERROR, INNER_SUM, LAST_INNER_ERROR, LAST_READING = range(5)
+MEMORY = 5
+
+# Columns of the gains: the (outer) controller, then the inner one of a cascade, then DAC counts per ADC count.
+P, I, D, INNER_P, INNER_I, INNER_D, SCALE = range(7)  # noqa: E741
+GAINS = 7
+
+
+@compiled
+def board_pid(error: complex, gains: NDArray[Any], joint: NDArray[Any], quantise: bool, memory: NDArray[Any]) -> Any:
+    """Power (DAC counts, ±127) for an error in ADC counts, as the board's integer arithmetic forms it (section 6.2).
+
+    power = P e + ⌊S/64⌋ + D (e − e₋₁), and S grows by I e except further into a limit that is reached.
+    """
+    proportional = gains[SCALE] * (1.0 + joint[at.GAIN_ERROR])
+    share = memory[SUM] / INTEGRAL_SHARE
+    if quantise:
+        share = np.floor(share.real) + 0.0 * share
+    power = proportional * (gains[P] * error + share + gains[D] * (error - memory[LAST_ERROR]))
+    if quantise:
+        power = rounded_half_up(power)
+    growth = gains[I] * error
+    into_limit = (power.real >= POWER_MAX and growth.real > 0.0) or (power.real <= -POWER_MAX and growth.real < 0.0)
+    if not into_limit:
+        memory[SUM] += growth
+    memory[LAST_ERROR] = error
+    return clamped(power, POWER_MAX + 0.0 * power)
+
+
+@compiled
+def sampled_pid(error: complex, period: complex, gains: NDArray[Any], memory: NDArray[Any]) -> Any:
+    """P e + I ∫e dt + D de/dt in SI units, rectangles for the integral and a backward difference."""
+    memory[SUM] += error * period
+    slope = (error - memory[LAST_ERROR]) / period
+    memory[LAST_ERROR] = error
+    return gains[P] * error + gains[I] * memory[SUM] + gains[D] * slope
+
+
+@compiled
+def cascade(error: complex, speed: complex, period: complex, gains: NDArray[Any], memory: NDArray[Any]) -> Any:
+    """Outer PID on position gives a speed set point, inner PID on speed gives the drive; SI units."""
+    inner_error = sampled_pid(error, period, gains, memory) - speed
+    memory[INNER_SUM] += inner_error * period
+    slope = (inner_error - memory[LAST_INNER_ERROR]) / period
+    memory[LAST_INNER_ERROR] = inner_error
+    return gains[INNER_P] * inner_error + gains[INNER_I] * memory[INNER_SUM] + gains[INNER_D] * slope

@@ -1,0 +1,41 @@
+"""Functions with corners, for real and for dual numbers: comparisons look at the real part alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from model.dynamics.compilation import inlined
+
+
+@inlined
+def magnitude(x: Any) -> Any:
+    """|x|, with the derivative sign(x)."""
+    return x if x.real >= 0.0 else -x
+
+
+@inlined
+def clamped(x: Any, limit: Any) -> Any:
+    """x within ±limit (limit ≥ 0)."""
+    if x.real > limit.real:
+        return limit + 0.0 * x
+    if x.real < -limit.real:
+        return 0.0 * x - limit
+    return x + 0.0 * limit
+
+
+@inlined
+def outside(x: Any, half_width: Any) -> Any:
+    """What of x lies outside ±half_width: zero inside."""
+    if x.real > half_width.real:
+        return x - half_width
+    if x.real < -half_width.real:
+        return x + half_width
+    return 0.0 * (x + half_width)
+
+
+@inlined
+def rounded_half_up(x: Any) -> Any:
+    """floor(x + 1/2): the project's one rounding rule. Its derivative is taken as zero."""
+    return np.floor(x.real + 0.5) + 0.0 * x

@@ -1,0 +1,104 @@
+"""What an effect is, and the sizes of a joint from which it takes its bounds and expected deviations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from daq.contracts.effects import EffectName, effect_names
+
+
+@dataclass(frozen=True)
+class JointScale:
+    """Sizes that are natural for a joint, so that one effect suits every machine.
+
+    Args:
+        torque: largest torque (N·m, or N) of the drive at standstill.
+        volts: largest voltage at the motor.
+        speed: speed without load at that voltage, rad/s (m/s); 1 where the drive has no back-EMF.
+        resolution: one count of its sensor, rad (m); a 4096th of a turn where it has none.
+        range: of its sensor, rad (m); one turn where it has none.
+        back_emf: back-EMF constant, V·s/rad. viscous: motor-side damping from the machine file, N·m·s/rad.
+        inertia: seen by the transmission between rotor and link in series, kg·m² (kg).
+        period: control period, s. length, mass: of its link. supply: the supply's limit, V.
+    """
+
+    torque: float
+    volts: float
+    speed: float
+    resolution: float
+    range: float
+    viscous: float
+    inertia: float
+    period: float
+    length: float
+    mass: float
+    supply: float
+    gear: float
+
+
+Size = float | Callable[[JointScale], float]
+
+
+def sized(size: Size, scale: JointScale) -> float:
+    """A size that is a number, or follows from the joint."""
+    return size(scale) if callable(size) else size
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """One parameter of an effect.
+
+    Args:
+        name: last part of the parameter's full name.
+        column: where it lies (`model.machine_model.layout`), a joint's column or, for the whole machine, a shared slot.
+        unit: in SI.
+        null: value at which the effect is not there; None for a parameter that only shapes it.
+        start: value when the effect is added without one: the null value, or a typical shape.
+        low, high: bounds. deviation: expected size on a machine that has the effect.
+    """
+
+    name: str
+    column: int
+    unit: str
+    null: Size | None = 0.0
+    start: Size | None = None
+    low: Size = -math.inf
+    high: Size = math.inf
+    deviation: Size = 1.0
+
+    def starting_value(self, scale: JointScale) -> float:
+        """Value of the parameter in a model to which the effect has just been added."""
+        chosen = self.null if self.start is None else self.start
+        if chosen is None:
+            raise ValueError(f"effect parameter {self.name} has neither a null nor a starting value")
+        return sized(chosen, scale)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical effect of the library.
+
+    Args:
+        name: the field's term, one of `daq.contracts.effects.toml`.
+        physics: one line with the equation, in the symbols of the parameters.
+        source: equation of the thesis, or the literature.
+        parameters: what it adds to a model.
+        flag: bit that switches on the state it needs (0: it only adds a term).
+        whole_machine: it belongs to the machine, not to a joint.
+        group: first part of its parameters' names when it belongs to the whole machine.
+    """
+
+    name: str
+    physics: str
+    source: str
+    parameters: tuple[EffectParameter, ...]
+    flag: int = 0
+    whole_machine: bool = False
+    group: str = "base"
+
+    @property
+    def shared_name(self) -> EffectName:
+        """Its entry in the shared list: what it acts on, its family, one line for people."""
+        return effect_names()[self.name]

@@ -1,0 +1,62 @@
+"""Friction, all of it opposing motion. z is the deflection of the contact, sign of the motion once it slides."""
+
+from __future__ import annotations
+
+from model.effects.effect import Effect, EffectParameter
+from model.machine_model import layout as at
+
+FRICTION = (
+    Effect(
+        "viscous_friction",
+        physics="τ = −n² v_eff q̇, v_eff on the motor's side",
+        source="(7.30)",
+        parameters=(
+            EffectParameter(
+                "coefficient", at.VISCOUS, "N·m·s/rad", low=0.0,
+                deviation=lambda s: max(s.viscous / 3, 0.02 * s.torque / s.speed / s.gear**2),
+            ),
+        ),
+    ),
+    Effect(
+        "coulomb_friction",
+        physics="τ = −T_c z",
+        source="Coulomb 1785; contact as an elastic, perfectly plastic element (Prandtl 1928)",
+        parameters=(
+            EffectParameter("torque", at.COULOMB, "N·m", low=0.0, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
+        ),
+    ),
+    Effect(
+        "load_dependent_friction",
+        physics="τ = −μ̃ N(q) z with N the gravity force that presses on the joint; μ̃ is an arm",
+        source="(7.32) to (7.34) in magnitude; on other machines N is the weight beyond the joint across its axis",
+        parameters=(EffectParameter("arm", at.COULOMB_ARM, "m", low=0.0, high=1.0, deviation=0.043),),
+    ),
+    Effect(
+        "stribeck_friction",
+        physics="τ = −F_s exp(−|q̇|/V) z: friction F_s above its value at speed, falling over V",
+        source="(7.31)",
+        parameters=(
+            EffectParameter("torque", at.STRIBECK, "N·m", low=0.0, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
+            EffectParameter("speed", at.STRIBECK_SPEED, "rad/s", null=None, start=lambda s: 0.03 * s.speed, low=1e-3, high=lambda s: s.speed,
+                            deviation=lambda s: 0.02 * s.speed),
+        ),
+    ),
+    Effect(
+        "stiction",
+        physics="at rest the joint holds T_b above Coulomb friction; it breaks away at once and sticks again when it stops",
+        source="Karnopp 1985 (stick as a state of its own)",
+        parameters=(
+            EffectParameter("breakaway", at.BREAKAWAY, "N·m", low=0.0, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
+        ),
+        flag=at.HAS_STICTION,
+    ),
+    Effect(
+        "direction_dependent_friction",
+        physics="τ = −½ ΔT z²: friction ΔT higher forwards than backwards",
+        source="Armstrong-Hélouvry, Dupont, Canudas de Wit 1994, section 2.2",
+        parameters=(
+            EffectParameter("difference", at.DIRECTION, "N·m", low=lambda s: -s.torque, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
+        ),
+    ),
+)  # fmt: skip
+"""Effects of the friction family."""

@@ -1,0 +1,46 @@
+"""The potentiometer: its reading against the angle."""
+
+from __future__ import annotations
+
+from model.effects.effect import Effect, EffectParameter, JointScale
+from model.machine_model import layout as at
+
+
+def _bend(scale: JointScale) -> float:
+    return 0.0025 * scale.range
+
+
+def _bend_limit(scale: JointScale) -> float:
+    return 0.1 * scale.range
+
+
+def _least_bend(scale: JointScale) -> float:
+    return -0.1 * scale.range
+
+
+SENSOR = (
+    Effect(
+        "potentiometer_gain",
+        physics="reading = q + g (q − middle of the range)",
+        source="scale of a potentiometer",
+        parameters=(EffectParameter("relative", at.POTENTIOMETER_GAIN, "1", low=-0.5, high=0.5, deviation=0.03),),
+    ),
+    Effect(
+        "potentiometer_offset",
+        physics="reading = q + o",
+        source="zero of a potentiometer",
+        parameters=(
+            EffectParameter("offset", at.POTENTIOMETER_OFFSET, "rad", low=_least_bend, high=_bend_limit, deviation=lambda s: 10 * s.resolution),
+        ),
+    ),
+    Effect(
+        "potentiometer_nonlinearity",
+        physics="reading = q + Σ b_k sin(kπx), x = 0 to 1 over the range",
+        source="±0.25 % linearity of the plastic film (section 6.2), as the first terms of a sine series",
+        parameters=tuple(
+            EffectParameter(f"bend_{k}", column, "rad", low=_least_bend, high=_bend_limit, deviation=_bend)
+            for k, column in enumerate((at.BEND_1, at.BEND_2, at.BEND_3, at.BEND_4), start=1)
+        ),
+    ),
+)  # fmt: skip
+"""Effects of the sensor family."""

@@ -1,0 +1,64 @@
+"""Between motor and joint."""
+
+from __future__ import annotations
+
+from model.effects.effect import Effect, EffectParameter, JointScale
+from model.machine_model import layout as at
+
+CONTACT_RATE = 1500.0
+"""rad/s at which parts in contact swing against each other at most: what steps of 1 ms carry (RK4 to 2785)."""
+CONTACT_DAMPING = 0.1
+"""Share of critical damping of that swing: an assumption."""
+
+
+def _damping(scale: JointScale) -> float:
+    return 2 * CONTACT_DAMPING * CONTACT_RATE * scale.inertia
+
+
+def contact_compliance(scale: JointScale) -> float:
+    """Compliance of a contact that swings at `CONTACT_RATE`, rad/(N·m)."""
+    return 1.0 / (CONTACT_RATE**2 * scale.inertia)
+
+
+TRANSMISSION = (
+    Effect(
+        "torque_ripple",
+        physics="τ = a sin(N q) + b cos(N q)",
+        source="cogging of motor or gear, first harmonic",
+        parameters=(
+            EffectParameter("sine", at.RIPPLE_SINE, "N·m", low=lambda s: -s.torque, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
+            EffectParameter("cosine", at.RIPPLE_COSINE, "N·m", low=lambda s: -s.torque, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
+            EffectParameter("cycles", at.RIPPLE_CYCLES, "1", null=None, start=12.0, low=0.5, high=1000.0, deviation=6.0),
+        ),
+    ),
+    Effect(
+        "gear_loss",
+        physics="τ = −κ |n K_T i| z: a share κ of the motor's torque is lost",
+        source="load-dependent gear friction, as an efficiency 1 − κ",
+        parameters=(EffectParameter("loss", at.GEAR_LOSS, "1", low=0.0, high=0.95, deviation=0.1),),
+    ),
+    Effect(
+        "backlash",
+        physics="no torque while |q_m − q| < g/2, an elastic contact beyond; rotor and link move apart",
+        source="Nordin and Gutman 2002, dead-zone model",
+        parameters=(
+            EffectParameter("gap", at.GAP, "rad", low=0.0, high=lambda s: 0.1 * s.range, deviation=lambda s: 6 * s.resolution),
+            EffectParameter("damping", at.TRANSMISSION_DAMPING, "N·m·s/rad", null=None, start=_damping, low=0.0,
+                            high=lambda s: 10 * _damping(s), deviation=_damping),
+        ),
+        flag=at.HAS_FLEXIBILITY,
+    ),
+    Effect(
+        "joint_compliance",
+        physics="τ = (q_m − q)/c + d (q̇_m − q̇) between rotor and link",
+        source="Spong 1987, elastic joints",
+        parameters=(
+            EffectParameter("compliance", at.COMPLIANCE, "rad/(N·m)", low=0.0, high=lambda s: 0.1 * s.range / (s.torque / 20),
+                            deviation=lambda s: 6 * s.resolution / (0.05 * s.torque)),
+            EffectParameter("damping", at.TRANSMISSION_DAMPING, "N·m·s/rad", null=None, start=_damping, low=0.0,
+                            high=lambda s: 10 * _damping(s), deviation=_damping),
+        ),
+        flag=at.HAS_FLEXIBILITY,
+    ),
+)  # fmt: skip
+"""Effects of the transmission family."""

@@ -1,0 +1,105 @@
+"""Where every number of a model lies in the flat vector that compiled code reads.
+
+The vector is `SHARED` numbers of the whole machine, then `PER_JOINT` numbers a joint. Every effect of the library has
+its place; an effect that is not in a model lies at its null value there, where it does nothing.
+"""
+
+from __future__ import annotations
+
+(
+    LOAD,  # kg, a point at the end of the last modelled link
+    PAYLOAD,  # kg beside the load that the machine file knows
+    GRAVITY_X,  # m/s², base frame
+    GRAVITY_Y,
+    GRAVITY_Z,
+    TILT_X,  # rad, the base turned about its x axis
+    TILT_Y,
+    PERIOD,  # s, control period
+    DELAY,  # s from sampling to the change of the drive
+    PUBLISHED_INERTIA,  # 1: link 3 and load as one rod (7.28); 0: exact
+) = range(10)
+SHARED = 10
+
+(
+    A,  # m, D-H
+    ALPHA,  # rad
+    D,  # m
+    THETA,  # rad
+    MASS,  # kg
+    MASS_ADDED,  # kg
+    RADIUS,  # m, of a cylinder about its joint
+    CENTRE_X,  # m, of a general body, in the link's frame
+    CENTRE_Y,
+    CENTRE_Z,
+    INERTIA_XX,  # kg·m², about that centre
+    INERTIA_YY,
+    INERTIA_ZZ,
+    INERTIA_XY,
+    INERTIA_XZ,
+    INERTIA_YZ,
+    SHIFT,  # m, centre of mass displaced along the link
+    RESISTANCE,  # Ω
+    INDUCTANCE,  # H
+    TORQUE_CONSTANT,  # N·m/A
+    BACK_EMF,  # V·s/rad
+    BACK_EMF_ERROR,  # relative
+    ROTOR_INERTIA,  # kg·m², motor side
+    GEAR,  # motor turns a joint turn
+    VOLTS_PER_COUNT,  # V at the motor for a DAC count
+    SUPPLY,  # V
+    DEAD_ZONE,  # V at the motor
+    HEATING,  # relative rise of resistance per A²·s
+    COOLING_TIME,  # s
+    VISCOUS,  # N·m·s/rad, motor side
+    COULOMB,  # N·m at the joint
+    COULOMB_ARM,  # m
+    PRESLIDING,  # rad
+    STRIBECK,  # N·m
+    STRIBECK_SPEED,  # rad/s
+    BREAKAWAY,  # N·m above Coulomb friction
+    DIRECTION,  # N·m, forward less backward
+    GEAR_LOSS,  # share of the motor's torque
+    COMPLIANCE,  # rad/(N·m)
+    TRANSMISSION_DAMPING,  # N·m·s/rad
+    GAP,  # rad, the whole free play
+    CONTACT_COMPLIANCE,  # rad/(N·m), always in series in a transmission that has play or gives
+    RIPPLE_SINE,  # N·m
+    RIPPLE_COSINE,
+    RIPPLE_CYCLES,  # a joint turn
+    SPRING,  # N·m/rad
+    SPRING_REST,  # rad
+    DISTURBANCE_SINE,  # N·m
+    DISTURBANCE_COSINE,
+    DISTURBANCE_FREQUENCY,  # Hz
+    AT_ZERO,  # rad at count 0
+    RAD_PER_COUNT,  # signed; 0 where there is no sensor
+    RANGE,  # rad
+    POTENTIOMETER_GAIN,  # relative, about the middle of the range
+    POTENTIOMETER_OFFSET,  # rad
+    BEND_1,  # rad, sine of half a wave over the range, and its harmonics
+    BEND_2,
+    BEND_3,
+    BEND_4,
+    GAIN_ERROR,  # relative, of the controller
+    EXTRA_DELAY,  # s
+    LOST,  # share of set points
+) = range(62)
+PER_JOINT = 62
+
+# Bits of the whole number that says which state-changing effects a joint has.
+HAS_INDUCTANCE, HAS_FLEXIBILITY, HAS_STICTION, HAS_EXTRA_TORQUE = 1, 2, 4, 8
+
+# Settings of a run, in this order.
+(CONTROLLER, QUANTISE, PUBLISHED_LOADS) = range(3)
+SETTINGS = 3
+NO_CONTROLLER, BOARD_PID, SAMPLED_PID, CASCADE = 0, 1, 2, 3
+
+
+def size(joints: int) -> int:
+    """Length of the vector of a machine with `joints` modelled joints."""
+    return SHARED + joints * PER_JOINT
+
+
+def slot(joint: int, column: int) -> int:
+    """Index of a joint's (from 1) column in the vector."""
+    return SHARED + (joint - 1) * PER_JOINT + column

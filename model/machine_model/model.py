@@ -1,0 +1,250 @@
+"""A model: a machine, the effects in it, and the values of its parameters. Immutable; saved with its lineage."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Annotated, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import Machine
+from model.effects.library import effect
+from model.machine_model import layout as at
+from model.machine_model.effect_parameters import effect_parameters
+from model.machine_model.nominal import base_parameters, joint_scale, nominal_vector
+from model.machine_model.parameter import Parameter
+
+MODEL_FORMAT = 1
+"""Version of the model file; a reader refuses newer ones."""
+
+FRICTION_OF_MACHINE = {
+    "viscous_friction": ("viscous_motor_side", "viscous"),
+    "load_dependent_friction": ("coulomb_arm",),
+    "coulomb_friction": ("coulomb",),
+}
+"""Effects that a machine file gives values for, and its entries for them."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class EffectUse(_Part):
+    """An effect in a model: on which joints (none for the whole machine), with values of their own or shared ones."""
+
+    name: str
+    joints: tuple[int, ...] = ()
+    shared: bool = False
+
+
+class Lineage(_Part):
+    """Where a model comes from: identity of the model it was made from, traces and a summary of the fit."""
+
+    parent: str | None = None
+    traces: tuple[str, ...] = ()
+    fit: dict[str, Any] | None = None
+    note: str = ""
+
+
+class Model(_Part):
+    """A machine with effects and parameter values.
+
+    `values` holds the parameters that differ from the machine file and from the effects' starting values, by name.
+    `ties` maps a name to parameters that share one value, `{"motor.back_emf_constant": ("joint1.…", "joint3.…")}`.
+
+    Raises SpecError (through the methods that change it) for an unknown effect, joint or parameter.
+    """
+
+    format: Annotated[int, Field(ge=1)] = MODEL_FORMAT
+    machine: Machine
+    effects: tuple[EffectUse, ...] = ()
+    values: dict[str, FiniteFloat] = {}
+    ties: dict[str, tuple[str, ...]] = {}
+    published_inertia: bool = False
+    """Inertia of link 3 with its load as published (7.28) instead of exactly."""
+    lineage: Lineage = Lineage()
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        try:
+            for use in self.effects:
+                _check_use(self.machine, use)
+            if repeated := [u.name for i, u in enumerate(self.effects) for v in self.effects[:i] if _overlap(u, v)]:
+                raise SpecError(f"effect {repeated[0]}: in the model twice for the same joint")
+            if unknown := sorted(set(self.values) - set(self.by_name)):
+                raise SpecError(f"parameter {unknown[0]!r}: this model has {', '.join(self.by_name)}")
+        except SpecError as error:
+            raise ValueError(str(error)) from error
+        return self
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Every parameter of the model: the machine's own, then those of its effects, with the model's values."""
+        found = [*base_parameters(self.machine)]
+        for use in self.effects:
+            found.extend(effect_parameters(self.machine, use.name, use.joints, use.shared))
+        for name, members in self.ties.items():
+            found = _tied(found, name, members)
+        return tuple(
+            p if p.name not in self.values else Parameter(**{**vars(p), "value": self.values[p.name]}) for p in found
+        )
+
+    @cached_property
+    def by_name(self) -> dict[str, Parameter]:
+        """Parameters by name."""
+        return {p.name: p for p in self.parameters}
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter of that name. Raises SpecError with the names that come closest."""
+        if name not in self.by_name:
+            last = name.split(".")[-1]
+            near = [n for n in self.by_name if n.split(".")[0] == name.split(".")[0] or n.endswith(last)]
+            raise SpecError(f"parameter {name!r}: not in this model; it has {', '.join(near or self.by_name)}")
+        return self.by_name[name]
+
+    @cached_property
+    def joint_count(self) -> int:
+        """Number of joints that the model moves."""
+        return len(self.machine.modelled_joints)
+
+    @cached_property
+    def vector(self) -> NDArray[np.float64]:
+        """The flat vector (layout.size(n),) that compiled code reads. Read-only."""
+        vector = nominal_vector(self.machine)
+        for p in self.parameters:
+            vector[list(p.slots)] = p.value
+        vector[at.PUBLISHED_INERTIA] = float(self.published_inertia)
+        vector.setflags(write=False)
+        return vector
+
+    @cached_property
+    def flags(self) -> NDArray[np.int64]:
+        """(n,) bits of the state-changing effects of every joint (`layout.HAS_…`)."""
+        flags = np.zeros(self.joint_count, dtype=np.int64)
+        for use in self.effects:
+            for joint in use.joints:
+                flags[joint - 1] |= effect(use.name).flag
+        flags.setflags(write=False)
+        return flags
+
+    @cached_property
+    def identity(self) -> str:
+        """Twelve hexadecimal digits that stand for everything that decides the model's motion."""
+        text = self.model_dump_json(exclude={"lineage", "format"})
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+    def with_values(self, values: Mapping[str, float]) -> Model:
+        """The same model with other values. Raises SpecError for a name it has not, or a value outside its bounds."""
+        for name, value in values.items():
+            p = self.parameter(name)
+            if not p.low <= value <= p.high or not math.isfinite(value):
+                raise SpecError(f"{name} = {value} {p.unit}: allowed are {p.low} to {p.high}")
+        return self._changed(values={**self.values, **{n: float(v) for n, v in values.items()}})
+
+    def with_effect(
+        self, name: str, joints: tuple[int, ...] = (), values: Mapping[str, float] | None = None, shared: bool = False
+    ) -> Model:
+        """The model with an effect more. It starts where it does nothing, shapes at typical values.
+
+        `values` are by full name, or by the parameter's last part, then for every joint of the effect.
+        """
+        use = EffectUse(name=name, joints=joints, shared=shared)
+        _check_use(self.machine, use)
+        wider = self._changed(effects=(*self.effects, use))
+        chosen: dict[str, float] = {}
+        for key, value in (values or {}).items():
+            own = [p.name for p in effect_parameters(self.machine, name, joints, shared)]
+            matching = [n for n in own if n == key or n.split(".")[-1] == key]
+            if not matching:
+                raise SpecError(f"effect {name} has no parameter {key!r}; it has {', '.join(own)}")
+            chosen.update(dict.fromkeys(matching, value))
+        return wider.with_values(chosen)
+
+    def without_effect(self, name: str, joints: tuple[int, ...] | None = None) -> Model:
+        """The model without an effect, on the given joints or anywhere. Raises SpecError when it is not there."""
+        uses = [u for u in self.effects if u.name == name and (joints is None or set(u.joints) & set(joints))]
+        if not uses:
+            raise SpecError(
+                f"effect {name!r}: not in this model; it has {', '.join(u.name for u in self.effects) or 'none'}"
+            )
+        kept: list[EffectUse] = []
+        for use in self.effects:
+            left = tuple(j for j in use.joints if joints is not None and j not in joints) if use in uses else use.joints
+            if use not in uses or left:
+                kept.append(use.model_copy(update={"joints": left}))
+        names = {p.name for p in base_parameters(self.machine)} | set(self.ties)
+        for use in kept:
+            names |= {p.name for p in effect_parameters(self.machine, use.name, use.joints, use.shared)}
+        return self._changed(effects=tuple(kept), values={n: v for n, v in self.values.items() if n in names})
+
+    def tied(self, name: str, members: tuple[str, ...]) -> Model:
+        """The model with several parameters sharing one value, that of the first, under a new name."""
+        value = self.parameter(members[0]).value
+        for member in members[1:]:
+            self.parameter(member)
+        values = {n: v for n, v in self.values.items() if n not in members} | {name: value}
+        return self._changed(ties={**self.ties, name: members}, values=values)
+
+    def with_published_inertia(self, published: bool = True) -> Model:
+        """The model with link 3's inertia as published (7.28), or exact."""
+        return self._changed(published_inertia=published)
+
+    def with_lineage(self, lineage: Lineage) -> Model:
+        """The model with another lineage."""
+        return self.model_copy(update={"lineage": lineage})
+
+    def _changed(self, **changes: Any) -> Model:
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self)(**{**fields, **changes})
+
+
+def base_model(machine: Machine, *, friction: bool = True) -> Model:
+    """The model that a machine file describes: rigid bodies, motors and the friction it gives values for."""
+    uses = []
+    if friction:
+        for name, entries in FRICTION_OF_MACHINE.items():
+            joints = tuple(
+                j
+                for j in machine.modelled_joints
+                if any(getattr(machine.joint(j).friction, e) is not None for e in entries)
+            )
+            uses += [EffectUse(name=name, joints=joints)] if joints else []
+    for joint in machine.modelled_joints:
+        joint_scale(machine, joint)  # refuses a joint without inertia
+    return Model(machine=machine, effects=tuple(uses))
+
+
+def _check_use(machine: Machine, use: EffectUse) -> None:
+    kind = effect(use.name)
+    if kind.whole_machine and use.joints:
+        raise SpecError(f"effect {use.name} belongs to the whole machine, not to joints {list(use.joints)}")
+    if not kind.whole_machine and not use.joints:
+        raise SpecError(f"effect {use.name}: name the joints it acts on, of {list(machine.modelled_joints)}")
+    for joint in use.joints:
+        if joint not in machine.modelled_joints:
+            raise SpecError(f"effect {use.name} on joint {joint}: modelled are joints {list(machine.modelled_joints)}")
+
+
+def _overlap(one: EffectUse, other: EffectUse) -> bool:
+    return one.name == other.name and (not one.joints or bool(set(one.joints) & set(other.joints)))
+
+
+def _tied(found: list[Parameter], name: str, members: tuple[str, ...]) -> list[Parameter]:
+    tied = [p for p in found if p.name in members]
+    if len(tied) != len(members):
+        raise SpecError(
+            f"tie {name!r}: {sorted(set(members) - {p.name for p in tied})} are not parameters of the model"
+        )
+    first = tied[0]
+    one = Parameter(
+        name, first.unit, first.value, first.source, tuple(s for p in tied for s in p.slots),
+        low=max(p.low for p in tied), high=min(p.high for p in tied), null=first.null, deviation=first.deviation,
+        effect=first.effect, joints=tuple(sorted({j for p in tied for j in p.joints})),
+    )  # fmt: skip
+    return [one if p is first else p for p in found if p is first or p not in tied]

@@ -1,0 +1,187 @@
+"""A machine file's numbers as parameters, and the sizes that follow from them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import BoardPid, Body, Cylinder, DcMotor, Joint, Machine, NoController, PlainGain, Rod
+from daq.contracts.quantity import Quantity
+from model.effects.effect import JointScale
+from model.effects.transmission import contact_compliance
+from model.machine_model import layout as at
+from model.machine_model.parameter import Parameter
+
+NO_LIMIT = 1e9
+"""Stands in the vector for a limit that is not set."""
+SENSOR_COUNTS = 4096
+DAC_COUNTS = 127
+PRESLIDING_COUNTS = 0.5
+"""Counts of the sensor over which friction builds up: an assumption, below what the sensor sees."""
+
+
+def parameter(
+    name: str, quantity: Quantity, slot: int, joints: tuple[int, ...] = (), low: float = -math.inf
+) -> Parameter:
+    """A parameter from a number of the machine file; `low` bounds it where the file does not."""
+    source = quantity.source + (" (assumed)" if quantity.assumed else "")
+    return Parameter(
+        name, quantity.unit, quantity.value, source, (slot,),
+        low=low if quantity.low is None else quantity.low,
+        high=math.inf if quantity.high is None else quantity.high,
+        deviation=quantity.deviation, joints=joints,
+    )  # fmt: skip
+
+
+def base_parameters(machine: Machine) -> tuple[Parameter, ...]:
+    """Parameters that every model of the machine has: geometry, inertia, motors, controller delay."""
+    found = [p for number in machine.modelled_joints for p in _of_joint(number, machine.joint(number))]
+    if machine.load is not None:
+        found.append(parameter("load.mass", machine.load, at.LOAD, low=0.0))
+    if not isinstance(machine.controller, NoController):
+        found.append(parameter("controller.delay", machine.controller.delay, at.DELAY, low=0.0))
+    return tuple(found)
+
+
+def _of_joint(number: int, joint: Joint) -> Iterator[Parameter]:
+    def named(name: str, quantity: Quantity, column: int, low: float = -math.inf) -> Parameter:
+        return parameter(name.format(number), quantity, at.slot(number, column), (number,), low)
+
+    geometry = joint.geometry
+    if geometry.a.value != 0.0:
+        yield named("link{}.length", geometry.a, at.A, 0.0)
+    if geometry.d.value != 0.0:
+        yield named("link{}.offset", geometry.d, at.D)
+    yield named("link{}.mass", joint.link.mass, at.MASS, 0.0)
+    if isinstance(joint.link, Cylinder):
+        yield named("link{}.radius", joint.link.radius, at.RADIUS, 0.0)
+    elif isinstance(joint.link, Body):
+        for axis, quantity in enumerate(joint.link.centre):
+            yield named(f"link{{}}.centre_{'xyz'[axis]}", quantity, at.CENTRE_X + axis)
+        for k, entry in enumerate(("xx", "yy", "zz", "xy", "xz", "yz")):
+            yield named(
+                f"link{{}}.inertia_{entry}", joint.link.inertia[k], at.INERTIA_XX + k, 0.0 if k < 3 else -math.inf
+            )
+    drive = joint.drive
+    if isinstance(drive, DcMotor):
+        yield named("joint{}.motor.resistance", drive.resistance, at.RESISTANCE, 1e-6)
+        yield named("joint{}.motor.torque_constant", drive.torque_constant, at.TORQUE_CONSTANT, 1e-9)
+        yield named("joint{}.motor.back_emf_constant", drive.back_emf_constant, at.BACK_EMF, 0.0)
+        yield named("joint{}.motor.rotor_inertia", drive.rotor_inertia, at.ROTOR_INERTIA, 0.0)
+    else:
+        yield named("joint{}.drive.gain", drive.gain, at.TORQUE_CONSTANT)
+        if drive.inertia is not None:
+            yield named("joint{}.drive.inertia", drive.inertia, at.ROTOR_INERTIA, 0.0)
+
+
+def nominal_vector(machine: Machine) -> NDArray[np.float64]:
+    """The flat vector of the machine file alone: every effect, friction included, at its null value."""
+    n = len(machine.modelled_joints)
+    vector = np.zeros(at.size(n))
+    vector[at.GRAVITY_X : at.GRAVITY_Z + 1] = machine.gravity
+    vector[at.LOAD] = 0.0 if machine.load is None else machine.load.value
+    vector[at.PERIOD] = 0.0 if isinstance(machine.controller, NoController) else machine.controller.period.value
+    vector[at.DELAY] = 0.0 if isinstance(machine.controller, NoController) else machine.controller.delay.value
+    for number in machine.modelled_joints:
+        _fill_joint(vector[at.slot(number, 0) : at.slot(number + 1, 0)], machine, number)
+    return vector
+
+
+def _fill_joint(row: NDArray[np.float64], machine: Machine, number: int) -> None:
+    joint, scale = machine.joint(number), joint_scale(machine, number)
+    geometry = joint.geometry
+    row[at.A], row[at.ALPHA] = geometry.a.value, geometry.alpha.value
+    row[at.D], row[at.THETA] = geometry.d.value, geometry.theta.value
+    row[at.MASS] = joint.link.mass.value
+    if isinstance(joint.link, Cylinder):
+        row[at.RADIUS] = joint.link.radius.value
+    elif isinstance(joint.link, Body):
+        row[at.CENTRE_X : at.CENTRE_Z + 1] = [c.value for c in joint.link.centre]
+        row[at.INERTIA_XX : at.INERTIA_YZ + 1] = [i.value for i in joint.link.inertia]
+    _fill_drive(row, joint.drive)
+    row[at.PRESLIDING] = PRESLIDING_COUNTS * scale.resolution
+    row[at.STRIBECK_SPEED], row[at.COOLING_TIME], row[at.RIPPLE_CYCLES] = 1.0, 1.0, 1.0
+    row[at.CONTACT_COMPLIANCE] = contact_compliance(scale)
+    row[at.RANGE], row[at.RAD_PER_COUNT] = scale.range, 0.0
+    sensor = joint.sensor
+    if sensor is not None:
+        row[at.AT_ZERO] = sensor.at_zero.value
+        row[at.RAD_PER_COUNT] = sensor.direction * sensor.range.value / 2**sensor.bits
+    if isinstance(machine.controller, BoardPid) and sensor is not None:
+        row[at.VOLTS_PER_COUNT] *= sensor.direction
+
+
+def _fill_drive(row: NDArray[np.float64], drive: DcMotor | PlainGain) -> None:
+    if isinstance(drive, DcMotor):
+        row[at.RESISTANCE], row[at.INDUCTANCE] = drive.resistance.value, drive.inductance.value
+        row[at.TORQUE_CONSTANT], row[at.BACK_EMF] = drive.torque_constant.value, drive.back_emf_constant.value
+        row[at.ROTOR_INERTIA], row[at.GEAR] = drive.rotor_inertia.value, drive.gear_ratio.value
+        row[at.VOLTS_PER_COUNT] = drive.scale.counts_to_volts(1.0)
+        row[at.SUPPLY] = NO_LIMIT if drive.supply_limit is None else drive.supply_limit.value
+    else:
+        row[at.RESISTANCE] = row[at.GEAR] = row[at.VOLTS_PER_COUNT] = 1.0
+        row[at.INDUCTANCE] = 1e-3
+        row[at.TORQUE_CONSTANT] = drive.gain.value
+        row[at.ROTOR_INERTIA] = 0.0 if drive.inertia is None else drive.inertia.value
+        row[at.SUPPLY] = NO_LIMIT
+
+
+def joint_scale(machine: Machine, number: int) -> JointScale:
+    """Natural sizes of a joint (from 1)."""
+    joint = machine.joint(number)
+    drive = joint.drive
+    range_ = 2 * math.pi if joint.sensor is None else joint.sensor.range.value
+    counts = SENSOR_COUNTS if joint.sensor is None else 2**joint.sensor.bits
+    speed = supply = 0.0
+    if isinstance(drive, DcMotor):
+        supply = NO_LIMIT if drive.supply_limit is None else drive.supply_limit.value
+        volts = min(supply, drive.scale.counts_to_volts(DAC_COUNTS))
+        torque = drive.gear_ratio.value * drive.torque_constant.value * volts / drive.resistance.value
+        if drive.back_emf_constant.value > 0:
+            speed = volts / (drive.back_emf_constant.value * drive.gear_ratio.value)
+        gear = drive.gear_ratio.value
+    else:
+        supply, volts, torque, gear = NO_LIMIT, 10.0, abs(drive.gain.value) * 10.0, 1.0
+    friction = joint.friction.viscous_motor_side or joint.friction.viscous
+    controller = machine.controller
+    return JointScale(
+        torque=torque, volts=volts, speed=speed or 1.0, resolution=range_ / counts, range=range_,
+        viscous=0.0 if friction is None else friction.value,
+        inertia=_transmission_inertia(machine, number),
+        period=0.02 if isinstance(controller, NoController) else controller.period.value,
+        length=abs(joint.geometry.a.value) or _radius(joint), mass=joint.link.mass.value, supply=supply, gear=gear,
+    )  # fmt: skip
+
+
+def _radius(joint: Joint) -> float:
+    return joint.link.radius.value if isinstance(joint.link, Cylinder) else 0.1
+
+
+def _transmission_inertia(machine: Machine, number: int) -> float:
+    """Rotor and link in series (kg·m²), the link at the least that it shows: its own bodies, folded."""
+    joint = machine.joint(number)
+    link = joint.link
+    own = link.mass.value
+    if joint.kind == "revolute":
+        if isinstance(link, Cylinder):
+            own *= 0.5 * link.radius.value**2
+        elif isinstance(link, Rod):
+            own *= joint.geometry.a.value**2 / 3
+        else:
+            own = max(float(i.value) for i in link.inertia[:3]) or own * 0.01
+    if number == machine.modelled_joints[-1] and machine.load is not None:
+        own += machine.load.value * (joint.geometry.a.value**2 if joint.kind == "revolute" else 1.0)
+    drive = joint.drive
+    rotor = (
+        drive.rotor_inertia.value * drive.gear_ratio.value**2
+        if isinstance(drive, DcMotor)
+        else (0.0 if drive.inertia is None else drive.inertia.value)
+    )
+    both = [i for i in (own, rotor) if i > 0]
+    if not both:
+        raise SpecError(f"machine {machine.name}: joint {number} has no inertia: neither its link nor its drive")
+    return both[0] * both[1] / (both[0] + both[1]) if len(both) == 2 else both[0]

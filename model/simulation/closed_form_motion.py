@@ -1,0 +1,156 @@
+"""Motion of the waist-shoulder-elbow arm over a stretch of constant drive: RK4 over its closed form. Compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import NDArray
+
+from model.drives.piecewise import magnitude
+from model.dynamics import effective_inertia as lumped
+from model.dynamics.compilation import compiled, inlined
+from model.dynamics.dual import sin_cos
+from model.dynamics.linear_solve import solve_3
+from model.dynamics.three_joint import horizontal_gravity_torques, mass_matrix_and_bias
+from model.machine_model import layout as at
+from model.simulation.joint_torques import (
+    current_after,
+    deflection,
+    extra_torque,
+    motor_damping,
+    motor_gain,
+    steady_current,
+    still_stuck,
+)
+
+# Columns of the state of a joint.
+POSITION, SPEED, DEFLECTION, STUCK, CURRENT, ROTOR_POSITION, ROTOR_SPEED, RISE = range(8)
+STATE = 8
+
+
+@inlined
+def friction_levels(theta_2: Any, theta_3: Any, arms: Any, plain: Any, weight_2: Any, weight_3: Any) -> Any:
+    """Levels of Coulomb friction (N·m) of the three joints, (7.32) to (7.34) in magnitude plus a constant each.
+
+    `weight_2` is m2 g, `weight_3` that of link 3 with its load.
+    """
+    s2, c2 = sin_cos(theta_2)
+    s23, c23 = sin_cos(theta_2 + theta_3)
+    _, c3 = sin_cos(theta_3)
+    along_2 = weight_2 * s2
+    along_3 = weight_3 * s23
+    return (
+        plain[0] + arms[0] * magnitude(along_2 * c2 + along_3 * c23),
+        plain[1] + arms[1] * magnitude(along_2 + along_3 * c3),
+        plain[2] + arms[2] * magnitude(along_3),
+    )
+
+
+@inlined
+def _special(
+    joint: NDArray[Any], flags: int, time: Any, elapsed: Any, q: Any, speed: Any, z: Any, state: Any, volts: Any
+) -> Any:
+    """What the effects that most models leave out add to a joint's torque at a stage of a step."""
+    gain = motor_gain(joint, state[RISE])
+    steady = steady_current(joint, state[RISE], volts, speed)
+    current = steady
+    if flags & at.HAS_INDUCTANCE:
+        current = current_after(joint, state[RISE], state[CURRENT], steady, elapsed)
+    to_torque = joint[at.GEAR] * joint[at.TORQUE_CONSTANT]
+    lag = to_torque * (current - steady) + 0.0 * gain
+    return lag + extra_torque(joint, flags, time, q, speed, z, state[STUCK], to_torque * current)
+
+
+@compiled
+def advance(
+    state: NDArray[Any], volts: NDArray[Any], start: complex, duration: complex, steps: int,
+    shared: NDArray[Any], joints: NDArray[Any], body: NDArray[Any], flags: NDArray[Any],
+) -> None:  # fmt: skip
+    """Advance the state (3, STATE) by `duration` s in equal steps at constant motor volts; rigid transmissions.
+
+    `body` holds the effective parameters (22), then m2 g and the weight of link 3 with its load.
+    """
+    h = duration / steps
+    half, sixth = 0.5 * h, h / 6.0
+    g1, g2, g3 = (
+        motor_gain(joints[0], state[0, RISE]),
+        motor_gain(joints[1], state[1, RISE]),
+        motor_gain(joints[2], state[2, RISE]),
+    )
+    drive_1, drive_2, drive_3 = g1 * volts[0], g2 * volts[1], g3 * volts[2]
+    damping_1 = motor_damping(joints[0], state[0, RISE])
+    damping_2 = motor_damping(joints[1], state[1, RISE])
+    damping_3 = motor_damping(joints[2], state[2, RISE])
+    soft_1, soft_2, soft_3 = (
+        1.0 / joints[0, at.PRESLIDING],
+        1.0 / joints[1, at.PRESLIDING],
+        1.0 / joints[2, at.PRESLIDING],
+    )
+    arms = (joints[0, at.COULOMB_ARM], joints[1, at.COULOMB_ARM], joints[2, at.COULOMB_ARM])
+    plain = (joints[0, at.COULOMB], joints[1, at.COULOMB], joints[2, at.COULOMB])
+    offset_1, offset_2, offset_3 = joints[0, at.THETA], joints[1, at.THETA], joints[2, at.THETA]
+    weight_2, weight_3 = body[lumped.SIZE], body[lumped.SIZE + 1]
+    tilted = body[lumped.GRAVITY_X] != 0.0 or body[lumped.GRAVITY_Y] != 0.0
+    special = flags[0] | flags[1] | flags[2]
+
+    q1, q2, q3 = state[0, POSITION], state[1, POSITION], state[2, POSITION]
+    v1, v2, v3 = state[0, SPEED], state[1, SPEED], state[2, SPEED]
+    z1, z2, z3 = state[0, DEFLECTION], state[1, DEFLECTION], state[2, DEFLECTION]
+    l1, l2, l3 = 0.0 * q1, 0.0 * q1, 0.0 * q1
+    for step in range(steps):
+        a1, a2, a3 = 0.0 * q1, 0.0 * q1, 0.0 * q1  # accelerations of the stage before
+        u1, u2, u3 = v1, v2, v3  # speeds of the stage
+        dq1, dq2, dq3 = 0.0 * q1, 0.0 * q1, 0.0 * q1  # displacements of the stage
+        qs1, qs2, qs3 = 0.0 * q1, 0.0 * q1, 0.0 * q1  # weighted sums of speeds and accelerations
+        vs1, vs2, vs3 = 0.0 * q1, 0.0 * q1, 0.0 * q1
+        for stage in range(4):
+            reach = 0.0 * h if stage == 0 else (h if stage == 3 else half)
+            if stage > 0:
+                dq1, dq2, dq3 = reach * u1, reach * u2, reach * u3
+                u1, u2, u3 = v1 + reach * a1, v2 + reach * a2, v3 + reach * a3
+            y1, y2, y3 = deflection(z1, dq1, soft_1), deflection(z2, dq2, soft_2), deflection(z3, dq3, soft_3)
+            p2, p3 = q2 + dq2, q3 + dq3
+            l1, l2, l3 = friction_levels(p2 + offset_2, p3 + offset_3, arms, plain, weight_2, weight_3)
+            t1 = drive_1 - damping_1 * u1 - y1 * l1
+            t2 = drive_2 - damping_2 * u2 - y2 * l2
+            t3 = drive_3 - damping_3 * u3 - y3 * l3
+            if special:
+                now = start + step * h + reach
+                t1 += _special(joints[0], flags[0], now, reach, q1 + dq1, u1, y1, state[0], volts[0])
+                t2 += _special(joints[1], flags[1], now, reach, p2, u2, y2, state[1], volts[1])
+                t3 += _special(joints[2], flags[2], now, reach, p3, u3, y3, state[2], volts[2])
+            if tilted:
+                b1, b2, b3 = horizontal_gravity_torques(q1 + dq1 + offset_1, p2 + offset_2, p3 + offset_3, body)
+                t1, t2, t3 = t1 - b1, t2 - b2, t3 - b3
+            d11, d12, d13, d22, d23, d33, b1, b2, b3 = mass_matrix_and_bias(
+                p2 + offset_2, p3 + offset_3, u1, u2, u3, body
+            )
+            a1, a2, a3 = solve_3(d11, d12, d13, d22, d23, d33, t1 - b1, t2 - b2, t3 - b3)
+            weight = 2.0 if stage == 1 or stage == 2 else 1.0
+            qs1, qs2, qs3 = qs1 + weight * u1, qs2 + weight * u2, qs3 + weight * u3
+            vs1, vs2, vs3 = vs1 + weight * a1, vs2 + weight * a2, vs3 + weight * a3
+        dq1, dq2, dq3 = sixth * qs1, sixth * qs2, sixth * qs3
+        q1, q2, q3 = q1 + dq1, q2 + dq2, q3 + dq3
+        v1, v2, v3 = v1 + sixth * vs1, v2 + sixth * vs2, v3 + sixth * vs3
+        z1, z2, z3 = deflection(z1, dq1, soft_1), deflection(z2, dq2, soft_2), deflection(z3, dq3, soft_3)
+        if special:
+            state[0, DEFLECTION], state[1, DEFLECTION], state[2, DEFLECTION] = z1, z2, z3
+            _finish(state[0], joints[0], flags[0], l1, v1, volts[0], h)
+            _finish(state[1], joints[1], flags[1], l2, v2, volts[1], h)
+            _finish(state[2], joints[2], flags[2], l3, v3, volts[2], h)
+            z1, z2, z3 = state[0, DEFLECTION], state[1, DEFLECTION], state[2, DEFLECTION]
+    state[0, POSITION], state[1, POSITION], state[2, POSITION] = q1, q2, q3
+    state[0, SPEED], state[1, SPEED], state[2, SPEED] = v1, v2, v3
+    state[0, DEFLECTION], state[1, DEFLECTION], state[2, DEFLECTION] = z1, z2, z3
+
+
+@compiled
+def _finish(
+    state: NDArray[Any], joint: NDArray[Any], flags: int, level: complex, speed: complex, volts: complex, h: complex
+) -> None:
+    """What a step leaves behind beside position and speed: current, and whether the joint sticks."""
+    if flags & at.HAS_INDUCTANCE:
+        steady = steady_current(joint, state[RISE], volts, speed)
+        state[CURRENT] = current_after(joint, state[RISE], state[CURRENT], steady, h)
+    if flags & at.HAS_STICTION:
+        still_stuck(joint, level, speed, state[DEFLECTION : DEFLECTION + 1], state[STUCK : STUCK + 1])

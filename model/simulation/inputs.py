@@ -1,0 +1,156 @@
+"""What drives a simulation, period by period, from a recorded trace."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import TraceError
+from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid
+from daq.contracts.trace import Trace
+from model.drives import controller as pid
+
+Floats = NDArray[np.float64]
+
+REST_COUNTS = 2.0
+"""Counts of the sensor within which the readings before the first new set point count as one posture."""
+REST_PERIODS = 25
+"""At most so many of them are averaged."""
+LARGEST_ANGLE = 20.0
+"""rad; more than three turns of a joint are taken for degrees."""
+
+
+@dataclass(frozen=True)
+class RunInputs:
+    """Everything that a run takes from a record, on the grid of control periods.
+
+    Args:
+        joints: numbers of the joints, from 1, all that the model moves.
+        period: s. time: (k,) s, of the record's clock.
+        set_points: (k, n) rad, held where the record has gaps. drive: (k, n) motor volts, for a run in open loop.
+        initial: (n, 2) position (rad) and speed (rad/s). first_drive: (n,) commanded volts before the first period.
+        rows: (m,) position of each sample on the grid. gains: (n, GAINS).
+    """
+
+    joints: tuple[int, ...]
+    period: float
+    time: Floats
+    set_points: Floats
+    drive: Floats
+    initial: Floats
+    first_drive: Floats
+    rows: Floats
+    gains: Floats
+    noise: Floats = field(repr=False)
+    name: str = ""
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
+    """Inputs of a run that repeats a trace.
+
+    The arm starts at rest at the posture measured before the first new set point (at the first reading, and with
+    the measured speed, where the trace has one), with the drive of the first sample.
+
+    Raises:
+        TraceError: for fewer than three samples, a joint that is missing, angles that look like degrees, or neither
+            set points (with a controller) nor drive (without).
+    """
+    joints = machine.modelled_joints
+    if len(trace) < 3:
+        raise TraceError(f"trace {trace.record.trace_id}: {len(trace)} samples; at least 3 are needed")
+    columns = [trace.column(j) for j in joints]
+    measured = trace.position[:, columns]
+    _check_unit(trace, measured, machine)
+    period = _period(trace, machine)
+    rows = _rows(trace, period)
+    count = int(np.ceil(rows[-1] - 1e-6)) + 1
+    controlled = not isinstance(machine.controller, NoController)
+    if controlled and trace.set_point is None:
+        raise TraceError(f"trace {trace.record.trace_id}: has no set points; simulate it in open loop from its drive")
+    if not controlled and trace.drive is None:
+        raise TraceError(
+            f"trace {trace.record.trace_id}: has no drive, and {machine.name} has no controller to form one"
+        )
+    set_points = _held(measured if trace.set_point is None else trace.set_point[:, columns], rows, count)
+    drive = _held(np.zeros_like(measured) if trace.drive is None else trace.drive[:, columns], rows, count)
+    initial = np.zeros((len(joints), 2))
+    initial[:, 0] = _rest_posture(trace, measured, set_points[0], machine)
+    if trace.velocity is not None:
+        initial[:, 0], initial[:, 1] = measured[0], trace.velocity[0, columns]
+    return RunInputs(
+        joints, period, trace.time[0] + period * np.arange(count), set_points, drive, initial, drive[0].copy(), rows,
+        _gains(machine, trace), np.zeros((count, len(joints))), trace.record.trace_id,
+    )  # fmt: skip
+
+
+def _check_unit(trace: Trace, measured: Floats, machine: Machine) -> None:
+    for k, joint in enumerate(machine.modelled_joints):
+        largest = float(np.abs(measured[:, k]).max())
+        if (
+            machine.joint(joint).kind == "revolute"
+            and machine.joint(joint).sensor is not None
+            and largest > LARGEST_ANGLE
+        ):
+            raise TraceError(
+                f"trace {trace.record.trace_id}: joint {joint} reaches {largest:.4g} rad; degrees? "
+                f"angles must be in rad, up to {LARGEST_ANGLE:g}"
+            )
+
+
+def _period(trace: Trace, machine: Machine) -> float:
+    if trace.record.period is not None:
+        return trace.record.period
+    if not isinstance(machine.controller, NoController):
+        return machine.controller.period.value
+    return float(np.median(np.diff(trace.time)))
+
+
+def _rows(trace: Trace, period: float) -> Floats:
+    """Where each sample lies on the grid of periods: whole numbers when the record was made tick by tick."""
+    if trace.tick is not None:
+        return np.asarray(trace.tick - trace.tick[0], dtype=np.float64)
+    rows = (trace.time - trace.time[0]) / period
+    whole = np.round(rows)
+    return np.asarray(whole if np.abs(rows - whole).max() < 0.05 else rows)
+
+
+def _held(samples: Floats, rows: Floats, count: int) -> Floats:
+    """Samples on the grid, each held until the next one."""
+    last = np.searchsorted(rows, np.arange(count) + 1e-6, side="right") - 1
+    return np.ascontiguousarray(samples[np.clip(last, 0, len(samples) - 1)])
+
+
+def _rest_posture(trace: Trace, measured: Floats, first: Floats, machine: Machine) -> Floats:
+    """Mean reading before the set points first change, as long as the arm keeps still."""
+    still = np.ones(len(trace), dtype=bool)
+    if trace.set_point is not None:
+        columns = [trace.column(j) for j in machine.modelled_joints]
+        still &= (np.abs(trace.set_point[:, columns] - first) < 1e-9).all(axis=1)
+    for k, joint in enumerate(machine.modelled_joints):
+        sensor = machine.joint(joint).sensor
+        near = 1e-9 if sensor is None else REST_COUNTS * sensor.range.value / 2**sensor.bits
+        still &= np.abs(measured[:, k] - measured[0, k]) <= near
+    until = int(np.argmin(still)) if not still.all() else len(still)
+    return np.asarray(measured[: max(1, min(until, REST_PERIODS))].mean(axis=0))
+
+
+def _gains(machine: Machine, trace: Trace) -> Floats:
+    """Gains of the modelled joints: the record's own where it has them, else the machine's."""
+    gains = np.zeros((len(machine.modelled_joints), pid.GAINS))
+    controller = machine.controller
+    if isinstance(controller, NoController):
+        return gains
+    for k, joint in enumerate(machine.modelled_joints):
+        gains[k, pid.P : pid.D + 1] = controller.gains[joint - 1]
+        if isinstance(controller, BoardPid):
+            gains[k, pid.SCALE] = controller.dac_counts_per_adc_count.value
+            if trace.record.gains and joint in trace.record.gains:
+                gains[k, pid.P : pid.D + 1] = trace.record.gains[joint]
+        elif isinstance(controller, SampledPid) and controller.velocity_gains is not None:
+            gains[k, pid.INNER_P : pid.INNER_D + 1] = controller.velocity_gains[joint - 1]
+    return gains

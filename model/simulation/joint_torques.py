@@ -1,0 +1,116 @@
+"""Torques on one joint beside the rigid-body ones: motor, friction, and what the effects add. Compiled.
+
+Friction that opposes motion is carried by z in [−1, 1], the deflection of an elastic, perfectly plastic contact: it
+follows the joint's displacement over the presliding distance and is clamped (Prandtl). The torque is z times the level
+of friction, so a joint at rest holds a load without creeping, no step is stiff near zero speed, and the derivative
+exists on both sides of every corner.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.drives.piecewise import clamped, magnitude, outside
+from model.dynamics.compilation import compiled, inlined
+from model.dynamics.dual import sin_cos
+from model.machine_model import layout as at
+
+RESTICK_SPEED = 1e-3
+"""rad/s (m/s): a sliding joint slower than this sticks again."""
+
+TWO_PI = 2.0 * np.pi
+
+
+@inlined
+def deflection(z: Any, displacement: Any, softness: Any) -> Any:
+    """z after a displacement; `softness` is one over the presliding distance."""
+    return clamped(z + displacement * softness, 1.0 + 0.0 * z)
+
+
+@inlined
+def motor_gain(joint: NDArray[Any], rise: Any) -> Any:
+    """Joint torque a volt (N·m/V), n K_T / R, for a winding warmed by `rise`."""
+    return joint[at.GEAR] * joint[at.TORQUE_CONSTANT] / (joint[at.RESISTANCE] * (1.0 + rise))
+
+
+@inlined
+def motor_damping(joint: NDArray[Any], rise: Any) -> Any:
+    """Joint torque a rad/s (N·m·s/rad): back-EMF through the winding, and viscous friction (7.30)."""
+    back_emf = joint[at.BACK_EMF] * (1.0 + joint[at.BACK_EMF_ERROR])
+    electrical = joint[at.TORQUE_CONSTANT] * back_emf / (joint[at.RESISTANCE] * (1.0 + rise))
+    return joint[at.GEAR] * joint[at.GEAR] * (electrical + joint[at.VISCOUS])
+
+
+@inlined
+def steady_current(joint: NDArray[Any], rise: Any, volts: Any, speed: Any) -> Any:
+    """Current once it has settled, A; `speed` is the joint's, on the motor's side of the transmission."""
+    back_emf = joint[at.BACK_EMF] * (1.0 + joint[at.BACK_EMF_ERROR])
+    return (volts - back_emf * joint[at.GEAR] * speed) / (joint[at.RESISTANCE] * (1.0 + rise))
+
+
+@inlined
+def current_after(joint: NDArray[Any], rise: Any, current: Any, steady: Any, duration: Any) -> Any:
+    """Current after `duration` at a constant speed: the exact exponential of the winding."""
+    rate = joint[at.RESISTANCE] * (1.0 + rise) / joint[at.INDUCTANCE]
+    return steady + (current - steady) * np.exp(-rate * duration)
+
+
+@compiled
+def extra_torque(
+    joint: NDArray[Any], flags: int, time: complex, q: complex, speed: complex, z: complex, stuck: complex,
+    motor_torque: complex,
+) -> Any:  # fmt: skip
+    """Torque on the joint from effects that most models leave out, N·m; zero at their null values.
+
+    `stuck` is 1 where the joint sticks, else 0; `motor_torque` is the motor's own at the joint.
+    """
+    torque = 0.0 * (q + time + joint[at.COULOMB])
+    if flags & at.HAS_STICTION:
+        torque -= z * stuck * joint[at.BREAKAWAY]
+    if joint[at.STRIBECK] != 0.0:
+        torque -= z * joint[at.STRIBECK] * np.exp(-magnitude(speed) / joint[at.STRIBECK_SPEED])
+    if joint[at.DIRECTION] != 0.0:
+        torque -= 0.5 * joint[at.DIRECTION] * z * z
+    if joint[at.GEAR_LOSS] != 0.0:
+        torque -= z * joint[at.GEAR_LOSS] * magnitude(motor_torque)
+    if joint[at.RIPPLE_SINE] != 0.0 or joint[at.RIPPLE_COSINE] != 0.0:
+        s, c = sin_cos(joint[at.RIPPLE_CYCLES] * q)
+        torque += joint[at.RIPPLE_SINE] * s + joint[at.RIPPLE_COSINE] * c
+    if joint[at.SPRING] != 0.0:
+        torque -= joint[at.SPRING] * (q - joint[at.SPRING_REST])
+    if joint[at.DISTURBANCE_SINE] != 0.0 or joint[at.DISTURBANCE_COSINE] != 0.0:
+        s, c = sin_cos(TWO_PI * joint[at.DISTURBANCE_FREQUENCY] * time)
+        torque += joint[at.DISTURBANCE_SINE] * s + joint[at.DISTURBANCE_COSINE] * c
+    return torque
+
+
+@compiled
+def still_stuck(joint: NDArray[Any], level: complex, speed: complex, z: NDArray[Any], stuck: NDArray[Any]) -> None:
+    """Breaks away when the contact is stretched to its end; sticks again when motion stops or turns.
+
+    Sticking again keeps the torque: the contact takes up the smaller deflection that carries it.
+    """
+    if stuck[0].real > 0.5:
+        if magnitude(z[0]).real >= 1.0:
+            stuck[0] = 0.0 * stuck[0]
+    elif magnitude(speed).real < RESTICK_SPEED or speed.real * z[0].real < 0.0:
+        whole = level + joint[at.BREAKAWAY]
+        if whole.real > 0.0:
+            z[0] = z[0] * level / whole
+        stuck[0] = 1.0 + 0.0 * stuck[0]
+
+
+@inlined
+def transmitted(joint: NDArray[Any], twist: Any, twist_rate: Any) -> Any:
+    """Torque through a transmission that gives and has play, N·m, for rotor less link angle (rad at the joint)."""
+    stretched = outside(twist, 0.5 * joint[at.GAP])
+    if stretched.real == 0.0:
+        return 0.0 * (twist + twist_rate)
+    torque = (
+        stretched / (joint[at.COMPLIANCE] + joint[at.CONTACT_COMPLIANCE]) + joint[at.TRANSMISSION_DAMPING] * twist_rate
+    )
+    # damping must not pull parts together that have left contact
+    return torque if torque.real * stretched.real > 0.0 else 0.0 * torque

@@ -1,0 +1,115 @@
+"""One control period: sample, form the drive, and let it act when its delay has passed. Compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.drives.amplifier import warmed
+from model.drives.controller import LAST_READING, board_pid, cascade, sampled_pid
+from model.drives.sensor import reading
+from model.dynamics.compilation import compiled
+from model.machine_model import layout as at
+from model.simulation.closed_form_motion import POSITION, RISE, SPEED
+
+QUEUE = 16
+"""Commands kept: the drive may act up to 14 periods late."""
+
+# What a run gives a period and joint.
+OUT_POSITION, OUT_SPEED, OUT_READING, OUT_ERROR, OUT_POWER, OUT_DRIVE = range(6)
+OUTPUTS = 6
+
+
+@compiled
+def sample(
+    k: int, j: int, state: NDArray[Any], set_points: NDArray[Any], recorded: NDArray[Any], noise: NDArray[Any],
+    gains: NDArray[Any], shared: NDArray[Any], joints: NDArray[Any], settings: NDArray[Any], memory: NDArray[Any],
+    out: NDArray[Any],
+) -> Any:  # fmt: skip
+    """Reading, error and power of joint index j in period k, written to `out`; returns the commanded motor volts."""
+    joint = joints[j]
+    kind, quantise = settings[at.CONTROLLER], settings[at.QUANTISE] != 0
+    has_sensor = joint[at.RAD_PER_COUNT].real != 0.0
+    read = reading(state[j, POSITION], noise[k, j], quantise, joint)
+    wanted = set_points[k, j] - joint[at.LOST] * (set_points[k, j] - set_points[max(k - 1, 0), j])
+    unit = joint[at.RAD_PER_COUNT] if has_sensor else 1.0 + 0.0 * joint[at.RAD_PER_COUNT]
+    zero = joint[at.AT_ZERO] if has_sensor else 0.0 * joint[at.AT_ZERO]
+    if kind == at.BOARD_PID:
+        error = wanted - read
+        if k == 0:
+            memory[j, 1] = error
+        power = board_pid(error, gains[j], joint, quantise, memory[j])
+        drive = power * joint[at.VOLTS_PER_COUNT]
+        error = error * unit
+    else:
+        error = wanted - (zero + unit * read)
+        if k == 0:
+            memory[j, 1], memory[j, LAST_READING] = error, read
+        scale = 1.0 + joint[at.GAIN_ERROR]
+        if kind == at.SAMPLED_PID:
+            drive = scale * sampled_pid(error, shared[at.PERIOD], gains[j], memory[j])
+        elif kind == at.CASCADE:
+            speed = unit * (read - memory[j, LAST_READING]) / shared[at.PERIOD]
+            drive = scale * cascade(error, speed, shared[at.PERIOD], gains[j], memory[j])
+            memory[j, LAST_READING] = read
+        else:
+            drive = recorded[k, j] + 0.0 * error
+        power = drive / joint[at.VOLTS_PER_COUNT]
+    out[OUT_POSITION, k, j] = state[j, POSITION]
+    out[OUT_SPEED, k, j] = state[j, SPEED]
+    out[OUT_READING, k, j] = zero + unit * read
+    out[OUT_ERROR, k, j] = error
+    out[OUT_POWER, k, j] = power
+    out[OUT_DRIVE, k, j] = drive
+    return drive
+
+
+@compiled
+def switching_times(shared: NDArray[Any], joints: NDArray[Any], order: NDArray[Any], times: NDArray[Any]) -> Any:
+    """When in a period each joint's drive changes (`times`, s), in which order, and whole periods of delay per joint.
+
+    Compared by their real parts; equal ones keep the joints' order, so that dual parts give exact derivatives.
+    """
+    n = joints.shape[0]
+    periods = np.zeros(n, dtype=np.int64)
+    for j in range(n):
+        delay = shared[at.DELAY] + joints[j, at.EXTRA_DELAY]
+        whole = int(np.floor(delay.real / shared[at.PERIOD].real + 1e-12))
+        periods[j] = min(max(whole, 0), QUEUE - 2)
+        times[j] = delay - periods[j] * shared[at.PERIOD]
+        i = j
+        while i > 0 and times[order[i - 1]].real > times[j].real:
+            order[i] = order[i - 1]
+            i -= 1
+        order[i] = j
+    return periods
+
+
+@compiled
+def step_count(duration: complex, step: float) -> int:
+    """Equal steps of at most `step` s in a stretch of time; at least one."""
+    return max(1, int(np.ceil(duration.real / step - 1e-9)))
+
+
+@compiled
+def warm_up(state: NDArray[Any], volts: NDArray[Any], shared: NDArray[Any], joints: NDArray[Any]) -> None:
+    """Resistance of each winding after one more period."""
+    for j in range(joints.shape[0]):
+        if joints[j, at.HEATING] != 0.0:
+            state[j, RISE] = warmed(state[j, RISE], volts[j], state[j, SPEED], shared[at.PERIOD], joints[j])
+
+
+@compiled
+def extra_flags(joints: NDArray[Any], flags: NDArray[Any]) -> NDArray[Any]:
+    """The joints' mode flags with the bit of every added torque that is not at its null value."""
+    result = flags.copy()
+    for j in range(joints.shape[0]):
+        for column in (
+            at.STRIBECK, at.DIRECTION, at.GEAR_LOSS, at.RIPPLE_SINE, at.RIPPLE_COSINE, at.SPRING,
+            at.DISTURBANCE_SINE, at.DISTURBANCE_COSINE,
+        ):  # fmt: skip
+            if joints[j, column] != 0.0:
+                result[j] |= at.HAS_EXTRA_TORQUE
+    return result
