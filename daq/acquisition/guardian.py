@@ -1,6 +1,7 @@
 """Whoever may end a run from outside: a signal, the stop socket, the parent process. One thread listens to all three.
 
-A stop never waits for the acquisition loop: the guardian writes it to the line itself, then tells the loop.
+A stop never waits for the acquisition loop: the guardian has it written to the line itself. It listens from before the
+port is opened until nothing can move any more.
 """
 
 from __future__ import annotations
@@ -18,35 +19,57 @@ from typing import Self
 
 from daq.acquisition.stop_socket import StopAnswer
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_CLOSE = b"\0"
+"""In the wake-up pipe, beside the numbers of signals."""
+CLIENT_PATIENCE = 0.1
+"""s that a client may take to accept its answer, a line that fits into any socket's buffer."""
+
 
 class EndCause(Enum):
     """Why a run is ended from outside."""
 
     STOP = "stopped from another terminal"
-    SIGNAL = "stopped by Ctrl-C or a signal"
+    PARENT = "stopped by whoever started the run"
+    SIGNAL = "stopped by a signal"
     ORPHANED = "the process that started this run is gone"
+    DEAF = "this run could no longer be stopped from outside"
 
 
 class Guardian:
-    """Listens until closed; every request to end calls `freeze` at once and is kept in `cause` (the first one stays).
+    """Listens until closed. Every request to end is kept in `cause` (the first one stays), then calls `freeze`.
 
-    freeze: sends STOP to the controller and says what became of it; called on the guardian's thread.
+    freeze: sends STOP to the controller and says what became of it; called on the guardian's thread, must not take
+            longer than a stop's answer may
+    parent: descriptor of the parent's pipe: any byte is a stop, its end the loss of the parent
+
+    Signals are written to the wake-up pipe by Python's own handler, at once, whatever the main thread is doing. Enter
+    and leave it on the main thread.
     """
 
-    def __init__(self, listener: socket.socket, parent: int | None, freeze: Callable[[EndCause], StopAnswer]) -> None:
+    def __init__(self, listener: socket.socket, parent: int | None, freeze: Callable[[str], StopAnswer]) -> None:
         self._listener = listener
         self._parent = parent
         self._freeze = freeze
-        self._wake_read, self._wake_write = os.pipe()
-        os.set_blocking(self._wake_write, False)
+        self._thread = threading.Thread(target=self._guard, name="guardian", daemon=True)
+        self._handlers: dict[int, object] = {}
+        self._wakeup_before = -1
         self._closing = False
-        self._thread = threading.Thread(target=self._listen, name="guardian", daemon=True)
-        self.cause: EndCause | None = None
-        self._previous: dict[int, object] = {}
+        self._cause: EndCause | None = None
+
+    @property
+    def cause(self) -> EndCause | None:
+        """Why the run is to end; None while nobody wants it to."""
+        if self._cause is None and not self._closing and not self._thread.is_alive():
+            return EndCause.DEAF
+        return self._cause
 
     def __enter__(self) -> Self:
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            self._previous[number] = signal.signal(number, self._on_signal)
+        self._wake_read, self._wake_write = os.pipe()
+        os.set_blocking(self._wake_write, False)
+        self._wakeup_before = signal.set_wakeup_fd(self._wake_write, warn_on_full_buffer=False)
+        for number in SIGNALS:
+            self._handlers[number] = signal.signal(number, lambda _number, _frame: None)
         self._thread.start()
         return self
 
@@ -54,48 +77,60 @@ class Guardian:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._closing = True
-        self._wake(b"q")
+        with contextlib.suppress(BlockingIOError):  # a full pipe wakes it as well
+            os.write(self._wake_write, _CLOSE)
         self._thread.join()
-        for number, handler in self._previous.items():
+        with contextlib.suppress(OSError):
+            while self._listener.fileno() >= 0:  # until nobody waits: the link is still there
+                self._serve(self._listener.accept()[0])
+        for number, handler in self._handlers.items():
             signal.signal(number, handler)  # type: ignore[arg-type]
+        signal.set_wakeup_fd(self._wakeup_before)
         os.close(self._wake_read)
         os.close(self._wake_write)
 
-    def _on_signal(self, _number: int, _frame: object) -> None:
-        self._wake(b"s")
-
-    def _wake(self, reason: bytes) -> None:
-        with contextlib.suppress(BlockingIOError):
-            os.write(self._wake_write, reason)
+    def _guard(self) -> None:
+        try:
+            self._listen()
+        except BaseException:
+            # Nobody can stop this run any more: it does not go on.
+            self._end(EndCause.DEAF)
+            raise
 
     def _end(self, cause: EndCause) -> StopAnswer:
-        answer = self._freeze(cause)
-        self.cause = self.cause or cause
-        return answer
+        self._cause = self._cause or cause
+        return self._freeze(cause.value)
 
     def _listen(self) -> None:
-        watched: list[int] = [self._wake_read, self._listener.fileno()]
-        if self._parent is not None:
-            watched.append(self._parent)
+        watched = select.poll()
+        for descriptor in (self._wake_read, self._listener.fileno(), *([] if self._parent is None else [self._parent])):
+            watched.register(descriptor, select.POLLIN)
         while not self._closing:
-            ready, _, _ = select.select(watched, [], [])
+            ready = {descriptor for descriptor, _ in watched.poll()}
+            if self._wake_read in ready and os.read(self._wake_read, 4096).strip(_CLOSE):
+                self._end(EndCause.SIGNAL)
             if self._listener.fileno() in ready:
                 self._answer_client()
-            if self._wake_read in ready and b"s" in os.read(self._wake_read, 64):
-                self._end(EndCause.SIGNAL)
             if self._parent in ready and self._parent is not None and not self._parent_speaks():
-                watched.remove(self._parent)
-                self._end(EndCause.ORPHANED)
+                watched.unregister(self._parent)
 
     def _parent_speaks(self) -> bool:
         assert self._parent is not None
         said = os.read(self._parent, 4096)
-        if said:
-            self._end(EndCause.STOP)
+        self._end(EndCause.PARENT if said else EndCause.ORPHANED)
         return bool(said)
 
     def _answer_client(self) -> None:
-        connection, _ = self._listener.accept()
-        with connection, contextlib.suppress(OSError):
-            connection.settimeout(0.1)
-            connection.sendall(self._end(EndCause.STOP).model_dump_json().encode() + b"\n")
+        try:
+            connection, _ = self._listener.accept()
+        except (BlockingIOError, ConnectionError):  # it has gone away meanwhile: it asked for a stop all the same
+            self._end(EndCause.STOP)
+            return
+        self._serve(connection)
+
+    def _serve(self, connection: socket.socket) -> None:
+        with connection:
+            answer = self._end(EndCause.STOP).model_dump_json().encode() + b"\n"
+            connection.settimeout(CLIENT_PATIENCE)
+            with contextlib.suppress(OSError):
+                connection.sendall(answer)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,8 +12,9 @@ from typing import Self
 
 from daq.acquisition.messages import REPORT, EventHappened, Failed, Finished, Job, Progress, Sampled
 
-GRACE = 5.0
-"""Seconds that the process has to close its trace once its parent wants to leave."""
+GRACE = 8.0
+"""Seconds that the process has to close its trace once its parent wants to leave: a second more of samples, a stop that
+the link may have to repeat for some, a slow disk."""
 
 
 class Acquisition:
@@ -28,13 +30,19 @@ class Acquisition:
             [sys.executable, "-m", "daq.acquisition"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            text=True,
             start_new_session=True,
         )
         assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._input, self._output = self._process.stdin, self._process.stdout
         with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.write(job.model_dump_json() + "\n")
-            self._process.stdin.flush()
+            self._input.write(job.model_dump_json().encode() + b"\n")
+            self._input.flush()
+
+    @property
+    def pid(self) -> int:
+        """Of the acquisition process."""
+        return self._process.pid
 
     def __enter__(self) -> Self:
         return self
@@ -42,31 +50,31 @@ class Acquisition:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.close()
+        # Both ends: a process that still wants to report must not wait for somebody who no longer listens.
+        for pipe in (self._input, self._output):
+            with contextlib.suppress(BrokenPipeError):
+                pipe.close()
         try:
             self._process.wait(GRACE)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._process.stdout.close()
 
     def __iter__(self) -> Iterator[Progress | EventHappened | Sampled | Finished | Failed]:
-        assert self._process.stdout is not None
-        ended = False
-        for line in self._process.stdout:
+        for line in self._output:
             report = REPORT.validate_json(line)
-            ended = ended or isinstance(report, Finished | Failed)
             yield report
-        if not ended:
-            code = self._process.wait()
-            yield Failed(message=f"the acquisition process ended without a word (exit code {code})", exit_code=1)
+            if isinstance(report, Finished | Failed):
+                return
+        code = self._process.wait()
+        end = f"signal {-code}" if code < 0 else f"exit code {code}"
+        line_left = "the arm holds its last set point; `daq traces salvage` finishes what was recorded"
+        yield Failed(message=f"the acquisition process ended without a word ({end}): {line_left}", exit_code=1)
 
     def stop(self) -> None:
-        """Asks for a stop: the process freezes the arm at once, records a second more, and reports the end."""
-        assert self._process.stdin is not None
-        with contextlib.suppress(BrokenPipeError, ValueError):
-            self._process.stdin.write("stop\n")
-            self._process.stdin.flush()
+        """Asks for a stop: the process freezes the arm at once, records a second more, and reports the end.
+
+        May be called from a signal handler, again and again: it only writes a few bytes to a pipe.
+        """
+        with contextlib.suppress(OSError, ValueError):
+            os.write(self._input.fileno(), b"stop\n")

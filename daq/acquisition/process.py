@@ -2,80 +2,34 @@
 
 from __future__ import annotations
 
-import os
 import sys
-import threading
-from collections.abc import Callable
+from contextlib import ExitStack
 
-from pydantic import ValidationError
-
+from daq.acquisition.freezer import Freezer
 from daq.acquisition.guardian import EndCause, Guardian
-from daq.acquisition.messages import (
-    EventHappened,
-    Failed,
-    Finished,
-    Job,
-    Progress,
-    Sampled,
-)
-from daq.acquisition.stop_socket import StopAnswer, stop_listener
+from daq.acquisition.job_input import read_job
+from daq.acquisition.messages import Failed, Finished, Job
+from daq.acquisition.speaker import Speaker
+from daq.acquisition.stop_socket import stop_listener
 from daq.contracts.errors import DaqError
-from daq.contracts.sample import SampleRow
-from daq.contracts.trace import TraceEvent
 from daq.driver import Controller
-from daq.runner import Consent, MissingConsentError, RunResult, run_experiment
-from daq.runner.arm_control import ArmControl
+from daq.runner import (
+    ArmControl,
+    Arrangement,
+    Consent,
+    MissingConsentError,
+    Outside,
+    RunResult,
+    StoppedError,
+    run_experiment,
+)
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.memory_map import default_memory_map, parse_memory_map
 
-Report = Progress | EventHappened | Sampled | Finished | Failed
-_EXIT_FAULT = 5
-_EXIT_STOPPED = 6
-
-
-class _Speaker:
-    """Writes reports, one a line; a reader that has gone away stops nobody."""
-
-    def __init__(self, samples: bool) -> None:
-        self._samples = samples
-        self._lock = threading.Lock()
-        self._heard = True
-
-    def say(self, report: Report) -> None:
-        """One line."""
-        with self._lock:
-            if not self._heard:
-                return
-            try:
-                sys.stdout.write(report.model_dump_json() + "\n")
-                sys.stdout.flush()
-            except BrokenPipeError:
-                self._heard = False
-                # Python flushes at exit again, and would complain again.
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-    def progress(self, fraction: float, text: str) -> None:
-        """How far the run is."""
-        self.say(Progress(fraction=fraction, text=text))
-
-    def happened(self, event: TraceEvent) -> None:
-        """An event."""
-        self.say(EventHappened(event=event))
-
-    def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
-        """A control period, where somebody wants them."""
-        if self._samples:
-            self.say(
-                Sampled(
-                    tick=row.tick,
-                    time=row.time,
-                    joints=joints,
-                    set_point=row.set_point,
-                    position=row.position,
-                    drive=row.drive,
-                    status=row.status,
-                )
-            )
+EXIT_CODES = {"complete": 0, "fault": 5, "interrupted": 5, "stopped": 6}
+EXIT_PROGRAM_FAULT = 1
+EXIT_WRONG_INPUT = 2
+EXIT_INTERRUPTED = 130
 
 
 def main() -> int:
@@ -83,76 +37,61 @@ def main() -> int:
 
     The rest of the input is the parent's: any byte is a stop, its end means the parent is gone.
     """
-    try:
-        job = Job.model_validate_json(_first_line())
-    except ValidationError as error:
-        _Speaker(samples=False).say(Failed(message=f"job: {error.errors()[0]['msg']}", exit_code=2))
-        return 2
-    speaker = _Speaker(job.report_samples)
-    try:
-        result = run_job(job, speaker)
-    except DaqError as error:
-        needs_consent = isinstance(error, MissingConsentError)
-        speaker.say(Failed(message=str(error), exit_code=error.exit_code, needs_consent=needs_consent))
-        return error.exit_code
-    except ProtocolError as error:
-        speaker.say(Failed(message=str(error), exit_code=2))
-        return 2
-    speaker.say(
-        Finished(
-            outcome=result.outcome,
-            trace=result.trace,
-            samples=result.samples,
-            missing=result.missing,
-            counters=result.counters,
-            reason=result.reason,
-        )
-    )
-    return {"complete": 0, "stopped": _EXIT_STOPPED}.get(result.outcome, _EXIT_FAULT)
-
-
-def run_job(job: Job, speaker: _Speaker) -> RunResult:
-    """Opens the port, listens for stop, runs. Raises DaqError."""
-    memory_map = default_memory_map() if job.memory_map is None else parse_memory_map(job.memory_map)
-    with Controller.connect(job.url, memory_map) as controller, stop_listener(job.robot) as listener:
-        control = ArmControl(controller)
-        with Guardian(listener, sys.stdin.fileno(), _freezer(job.robot, control)) as guardian:
-            return run_experiment(
-                controller,
-                control,
-                job.spec,
-                job.machine,
-                job.limits,
-                job.folder,
-                speaker,
-                consent=Consent(job.moves_real_arm),
-                ended=lambda: None if guardian.cause is None else guardian.cause.value,
-                interrupted=lambda: guardian.cause is EndCause.ORPHANED,
-                robot=job.robot,
+    with Speaker() as speaker:
+        try:
+            job = read_job(sys.stdin.fileno())
+            speaker.report_samples = job.report_samples
+            result = run_job(job, speaker)
+        except DaqError as error:
+            needs_consent = isinstance(error, MissingConsentError)
+            speaker.ended(Failed(message=str(error), exit_code=error.exit_code, needs_consent=needs_consent))
+            return error.exit_code
+        except ProtocolError as error:
+            speaker.ended(Failed(message=str(error), exit_code=EXIT_WRONG_INPUT))
+            return EXIT_WRONG_INPUT
+        except KeyboardInterrupt:
+            return EXIT_INTERRUPTED
+        except BaseException as error:
+            line = f"program fault: {type(error).__name__}: {error}"
+            speaker.ended(Failed(message=line, exit_code=EXIT_PROGRAM_FAULT))
+            raise
+        speaker.ended(
+            Finished(
+                outcome=result.outcome,
+                trace=result.trace,
+                samples=result.samples,
+                missing=result.missing,
+                counters=result.counters,
+                reason=result.reason,
             )
-
-
-def _freezer(robot: str, control: ArmControl) -> Callable[[EndCause], StopAnswer]:
-    def freeze(cause: EndCause) -> StopAnswer:
-        confirmation = control.stop(cause.value)
-        return StopAnswer(
-            robot=robot,
-            delivered=confirmation.sent,
-            confirmed=confirmation.acknowledged,
-            tick=confirmation.tick,
-            postures=tuple(confirmation.frozen.values()),
-            text=confirmation.problem or "",
         )
+    return EXIT_CODES[result.outcome]
 
-    return freeze
 
+def run_job(job: Job, speaker: Speaker) -> RunResult:
+    """Listens for stop, opens the port, runs. Raises DaqError, ProtocolError.
 
-def _first_line() -> bytes:
-    """Unbuffered: what follows belongs to the guardian."""
-    line = bytearray()
-    while not line.endswith(b"\n"):
-        byte = os.read(sys.stdin.fileno(), 1)
-        if not byte:
-            break
-        line += byte
-    return bytes(line)
+    The guardian listens before the port is opened, and no longer when the port is closed: a stop that comes later
+    finds nobody here, and opens the port itself.
+    """
+    memory_map = default_memory_map() if job.memory_map is None else parse_memory_map(job.memory_map)
+    with (
+        ExitStack() as closed_last,
+        Freezer(job.robot, job.url) as freezer,
+        stop_listener(job.robot) as listener,
+        Guardian(listener, sys.stdin.fileno(), freezer.freeze) as guardian,
+    ):
+        controller = closed_last.enter_context(Controller.connect(job.url, memory_map))
+        control = freezer.control = ArmControl(controller)
+        if guardian.cause is not None:
+            # It came while there was nothing to freeze. Now there is.
+            control.stop(guardian.cause.value)
+            raise StoppedError(f"{guardian.cause.value} before it began; nothing moved")
+        outside = Outside(
+            ended=lambda: None if guardian.cause is None else guardian.cause.value,
+            interrupted=lambda: guardian.cause is EndCause.ORPHANED,
+        )
+        run = Arrangement(
+            controller, control, job.spec, job.machine, job.limits, job.folder, speaker, outside, job.robot
+        )
+        return run_experiment(run, Consent(job.moves_real_arm))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import os
 import socket
+import stat
 import tempfile
 import time
 from collections.abc import Iterator
@@ -21,8 +22,10 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from daq.contracts.errors import ReachError
 
 FOLDER_VARIABLE = "DAQ_RUNTIME_FOLDER"
+APP = "ma2000-daq"
 ANSWER_TIMEOUT = 1.0
 """Seconds after which an unanswered stop is reported as not delivered."""
+BACKLOG = 16
 
 
 class StopAnswer(BaseModel):
@@ -31,6 +34,7 @@ class StopAnswer(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     robot: str
+    port: str = ""
     delivered: bool
     confirmed: bool
     tick: int | None = None
@@ -40,51 +44,60 @@ class StopAnswer(BaseModel):
 
 @dataclass(frozen=True)
 class StopAttempt:
-    """One socket that was asked, and its answer (None: nobody answered in time)."""
+    """One process that was asked, and its answer (None: it did not answer in time)."""
 
     path: Path
     answer: StopAnswer | None
     seconds: float
 
+    @property
+    def robot(self) -> str:
+        """The robot's name, from the socket's: that of a process that does not answer too."""
+        return self.path.stem.rpartition("-")[0]
 
-def runtime_folder() -> Path:
-    """Folder of the stop sockets: DAQ_RUNTIME_FOLDER, else the session's own, else one of this user's under /tmp."""
+
+def runtime_folders() -> list[Path]:
+    """Where stop sockets may lie, the first being where they are made: DAQ_RUNTIME_FOLDER alone where it is set; else
+    the session's own folder, else one of this user's among the temporary files.
+
+    A terminal may lack what another one has in its environment, so whoever stops looks into all of them.
+    """
     if FOLDER_VARIABLE in os.environ:
-        return Path(os.environ[FOLDER_VARIABLE])
-    session = os.environ.get("XDG_RUNTIME_DIR")
-    if session and Path(session).is_dir():
-        return Path(session) / "ma2000-daq"
-    return Path(tempfile.gettempdir()) / f"ma2000-daq-{os.getuid()}"
-
-
-def _own_folder() -> Path:
-    """The folder, made if need be. Raises ReachError when it is another user's: /tmp belongs to everyone."""
-    folder = runtime_folder()
-    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-    if FOLDER_VARIABLE not in os.environ and folder.stat().st_uid != os.getuid():
-        raise ReachError(f"stop socket folder {folder} belongs to another user: set {FOLDER_VARIABLE}")
-    return folder
+        return [Path(os.environ[FOLDER_VARIABLE])]
+    sessions = [Path("/run/user") / str(os.getuid())]
+    if session := os.environ.get("XDG_RUNTIME_DIR"):
+        sessions.insert(0, Path(session))
+    folders = [session / APP for session in sessions if session.is_dir() and os.access(session, os.W_OK | os.X_OK)]
+    folders.append(Path(tempfile.gettempdir()) / f"{APP}-{os.getuid()}")
+    return list(dict.fromkeys(folders))
 
 
 @contextlib.contextmanager
 def stop_listener(robot: str) -> Iterator[socket.socket]:
-    """A listening socket for stop requests of one robot, removed at the end. Raises ReachError when it cannot be made:
-    a robot that cannot be stopped from outside is not moved."""
-    path = runtime_folder() / f"{robot}-{os.getpid()}.sock"
+    """A listening, non-blocking socket for stop requests of one robot, removed at the end.
+
+    Raises ReachError when it cannot be made: a robot that cannot be stopped from outside is not moved.
+    """
+    folder = runtime_folders()[0]
+    path = folder / f"{robot}-{os.getpid()}.sock"
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         try:
-            _own_folder()
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            _require_own(folder)
             path.unlink(missing_ok=True)
             listener.bind(str(path))
-            listener.listen(16)
+            listener.listen(BACKLOG)
+            listener.setblocking(False)
         except OSError as error:
-            raise ReachError(f"stop socket {path}: cannot be made: {error}; set {FOLDER_VARIABLE}") from error
-        yield listener
+            reason = error.strerror or str(error)
+            raise ReachError(f"stop socket {path}: cannot be made: {reason}; set {FOLDER_VARIABLE}") from error
+        try:
+            yield listener
+        finally:
+            path.unlink(missing_ok=True)
     finally:
         listener.close()
-        with contextlib.suppress(OSError):
-            path.unlink(missing_ok=True)
 
 
 def request_stop(robot: str | None = None) -> list[StopAttempt]:
@@ -92,32 +105,70 @@ def request_stop(robot: str | None = None) -> list[StopAttempt]:
 
     Sockets whose process is gone are removed and not counted.
     """
-    pattern = f"{robot or '*'}-*.sock"
-    asked: list[tuple[Path, socket.socket, float]] = []
-    for path in sorted(runtime_folder().glob(pattern)):
-        connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        connection.settimeout(ANSWER_TIMEOUT)
-        begun = time.monotonic()
-        try:
-            connection.connect(str(path))
-        except ConnectionRefusedError:
-            connection.close()
-            path.unlink(missing_ok=True)
+    asked = []
+    for folder in runtime_folders():
+        if not _is_own(folder):
             continue
-        except OSError:
-            connection.close()
-            asked.append((path, connection, begun))
-            continue
-        asked.append((path, connection, begun))
-    return [StopAttempt(path, _answer(connection), time.monotonic() - begun) for path, connection, begun in asked]
+        for path in sorted(folder.glob("*.sock")):
+            if robot is None or path.stem.rpartition("-")[0] == robot:
+                asked += _ask(path)
+    attempts = []
+    for path, connection, begun in asked:
+        with connection:
+            answer, gone = _answer(connection)
+        if not gone:
+            attempts.append(StopAttempt(path, answer, time.monotonic() - begun))
+    return attempts
 
 
-def _answer(connection: socket.socket) -> StopAnswer | None:
+def _require_own(folder: Path) -> None:
+    """Temporary files belong to everyone: another user's folder may hold another user's socket."""
+    if not _is_own(folder):
+        raise ReachError(
+            f"stop socket folder {folder}: must belong to this user and be writable by nobody else; "
+            f"set {FOLDER_VARIABLE} to one that is"
+        )
+
+
+def _is_own(folder: Path) -> bool:
+    try:
+        found = folder.lstat()
+    except OSError:
+        return False
+    others_may_write = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not others_may_write
+
+
+def _ask(path: Path) -> list[tuple[Path, socket.socket, float]]:
+    """Connects, which is the request; nothing when nobody is there any more."""
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    connection.settimeout(ANSWER_TIMEOUT)
+    begun = time.monotonic()
+    try:
+        connection.connect(str(path))
+    except (ConnectionRefusedError, FileNotFoundError):
+        connection.close()
+        path.unlink(missing_ok=True)
+        return []
+    except OSError:
+        # Somebody is there and cannot be reached: that is an attempt without answer.
+        return [(path, connection, begun)]
+    return [(path, connection, begun)]
+
+
+def _answer(connection: socket.socket) -> tuple[StopAnswer | None, bool]:
+    """The answer, and whether the process went away without giving one: it moves nothing any more."""
     received = b""
     try:
-        with connection:
-            while piece := connection.recv(4096):
-                received += piece
-        return StopAnswer.model_validate_json(received)
-    except (OSError, ValidationError):
-        return None
+        while piece := connection.recv(4096):
+            received += piece
+    except ConnectionResetError:
+        return None, True
+    except OSError:
+        return None, False
+    if not received:
+        return None, True
+    try:
+        return StopAnswer.model_validate_json(received), False
+    except ValidationError:
+        return None, False

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-import signal
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
 from daq.cli.context import Invocation, console, print_json
+from daq.cli.stop_keys import StopKeys
 from daq.contracts.errors import SafetyError
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import Machine
 
-_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 EXIT_CODES = {"complete": 0, "stopped": 6, "fault": 5, "interrupted": 5}
 
 
@@ -60,7 +60,7 @@ def acquire(call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Pa
         moves_real_arm=consent,
     )
     end = _shown(job)
-    if not isinstance(end, Finished) and end.needs_consent and console().is_terminal:
+    if not isinstance(end, Finished) and end.needs_consent and _can_be_asked():
         if not typer.confirm(f"{job.url} is a real arm and will move. Is its workspace clear?", err=True):
             raise AcquisitionFailedError("not agreed: nothing moved", end.exit_code)
         end = _shown(job.model_copy(update={"moves_real_arm": True}))
@@ -69,31 +69,36 @@ def acquire(call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Pa
     return end
 
 
+def _can_be_asked() -> bool:
+    """Consent is a person's: what comes through a pipe is nobody's word."""
+    return console().is_terminal and sys.stdin.isatty()
+
+
 def _shown(job: Job) -> Finished | Failed:
-    """One acquisition process, its progress and events on the terminal, Ctrl-C passed on as a stop."""
+    """One acquisition process, its progress and events on the terminal; Ctrl-C and its like are passed on as a stop."""
+    from rich.markup import escape
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     from daq.acquisition import messages
     from daq.acquisition.parent import Acquisition
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[text]}"), TimeElapsedColumn())
-    with Acquisition(job) as process, Progress(*columns, console=console(), transient=True) as bar:
-        handlers = {number: signal.signal(number, lambda *_: process.stop()) for number in _STOP_SIGNALS}
+    with (
+        StopKeys() as keys,
+        Acquisition(job) as process,
+        Progress(*columns, console=console(), transient=True) as bar,
+    ):
+        keys.stops(process.stop)
         task = bar.add_task(job.spec.trajectory.kind, total=1.0, text="connecting")
-        try:
-            for report in process:
-                if isinstance(report, messages.Progress):
-                    bar.update(task, completed=report.fraction, text=report.text)
-                elif isinstance(report, messages.EventHappened) and report.event.kind not in ("start", "end"):
-                    event = report.event
-                    bar.console.print(
-                        f"[dim]{event.time:8.2f} s[/dim]  {event.kind.replace('_', ' ')}: {event.message}"
-                    )
-                elif isinstance(report, messages.Finished | messages.Failed):
-                    return report
-        finally:
-            for number, handler in handlers.items():
-                signal.signal(number, handler)
+        for report in process:
+            if isinstance(report, messages.Progress):
+                bar.update(task, completed=report.fraction, text=report.text)
+            elif isinstance(report, messages.EventHappened) and report.event.kind not in ("start", "end"):
+                event = report.event
+                line = escape(f"{event.kind.replace('_', ' ')}: {event.message}")
+                bar.console.print(f"[dim]{event.time:8.2f} s[/dim]  {line}")
+            elif isinstance(report, messages.Finished | messages.Failed):
+                return report
     raise AssertionError("an acquisition always ends with a report")
 
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import typer
 
 from daq.cli.context import Invocation, JsonOption, invocation, print_json
 from daq.contracts.errors import DaqError
+
+if TYPE_CHECKING:
+    from daq.acquisition.stop_socket import StopAnswer, StopAttempt
 
 app = typer.Typer(add_completion=False)
 
@@ -16,51 +21,71 @@ EXIT_NOT_DELIVERED = 3
 def stop(context: typer.Context, json: JsonOption = False) -> None:
     """Freeze every robot that is being moved, and the configured one: set points become the measured posture.
 
-    Ends with 0 when every stop was confirmed by its board, with 3 when one was NOT DELIVERED or there was no robot.
-    A program's stop never replaces the hardware's own.
+    Ends with 0 when every stop was confirmed by its board, with 3 when one was NOT DELIVERED or NOT CONFIRMED, or there
+    was no robot. A program's stop never replaces the hardware's own.
     """
     from daq.acquisition.stop_socket import request_stop
 
-    answers = [
-        attempt.answer.model_dump() if attempt.answer else _undelivered(attempt.path.stem, "the process did not answer")
-        for attempt in request_stop()
-    ]
-    if not answers:
-        answers = [answer for answer in [_stop_configured(invocation(context))] if answer is not None]
+    answers = [_answered(attempt) for attempt in request_stop()]
+    answers += _stop_configured(invocation(context), {answer.port for answer in answers})
     if json:
-        print_json(answers)
-    for answer in [] if json else answers:
-        print(_told(answer))
-    if not answers and not json:
+        print_json([answer.model_dump() for answer in answers])
+    elif not answers:
         print("no robot is being moved from here, and none is configured: nothing to stop")
-    if not answers or not all(answer["confirmed"] for answer in answers):
+    else:
+        for answer in answers:
+            print(_told(answer))
+    if not answers or not all(answer.confirmed for answer in answers):
         raise typer.Exit(EXIT_NOT_DELIVERED)
 
 
-def _stop_configured(call: Invocation) -> dict[str, object] | None:
-    """Nobody holds the port: open it and stop what is behind it."""
-    url = call.port_option or call.settings.robot.port
-    if url is None or url.startswith("mock://"):
-        return None
-    from daq.link import Link
+def _stop_configured(call: Invocation, reached: set[str]) -> list[StopAnswer]:
+    """The robot of the command line or the configuration, unless a process that holds its port has been asked.
 
-    name = call.settings.robot.name
+    A configuration that cannot be read is no reason not to have stopped the others; it is told.
+    """
+    try:
+        url = call.port_option or call.settings.robot.port
+        name = "robot" if call.port_option else call.settings.robot.name
+    except DaqError as error:
+        return [_undelivered("configured robot", "", str(error))]
+    if url is None or url.startswith("mock://") or url in reached:
+        return []
+    return [_stop_at(name, url)]
+
+
+def _stop_at(name: str, url: str) -> StopAnswer:
+    """Nobody of ours holds the port: open it and stop what is behind it."""
+    from daq.acquisition.stop_socket import StopAnswer
+    from daq.link import Link, LinkError, RequestRefusedError
+
     try:
         with Link.open(url) as link:
             stopped = link.stop()
+    except LinkError as error:
+        return StopAnswer(robot=name, port=url, delivered=error.sent, confirmed=False, text=str(error))
+    except RequestRefusedError as error:
+        return StopAnswer(robot=name, port=url, delivered=True, confirmed=False, text=str(error))
     except DaqError as error:
-        return _undelivered(name, str(error))
-    return {"robot": name, "delivered": True, "confirmed": True, "tick": stopped.tick, "postures": stopped.postures,
-            "text": ""}  # fmt: skip
+        return _undelivered(name, url, str(error))
+    return StopAnswer(
+        robot=name, port=url, delivered=True, confirmed=True, tick=stopped.tick, postures=tuple(stopped.postures)
+    )
 
 
-def _undelivered(robot: str, why: str) -> dict[str, object]:
-    return {"robot": robot, "delivered": False, "confirmed": False, "tick": None, "postures": (), "text": why}
+def _answered(attempt: StopAttempt) -> StopAnswer:
+    return attempt.answer or _undelivered(attempt.robot, "", "the process that moves it did not answer")
 
 
-def _told(answer: dict[str, object]) -> str:
-    if answer["confirmed"]:
-        return f"{answer['robot']}: stopped, confirmed by the board: set points frozen at tick {answer['tick']}"
-    if answer["delivered"]:
-        return f"{answer['robot']}: stop sent, NOT CONFIRMED by the board: {answer['text']}. Use the emergency stop."
-    return f"{answer['robot']}: stop NOT DELIVERED: {answer['text']}. Use the emergency stop."
+def _undelivered(robot: str, port: str, why: str) -> StopAnswer:
+    from daq.acquisition.stop_socket import StopAnswer
+
+    return StopAnswer(robot=robot, port=port, delivered=False, confirmed=False, text=why)
+
+
+def _told(answer: StopAnswer) -> str:
+    if answer.confirmed:
+        return f"{answer.robot}: stopped, confirmed by the board: set points frozen at tick {answer.tick}"
+    if answer.delivered:
+        return f"{answer.robot}: stop sent, NOT CONFIRMED by the board: {answer.text}. Use the emergency stop."
+    return f"{answer.robot}: stop NOT DELIVERED: {answer.text}. Use the emergency stop."

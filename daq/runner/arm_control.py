@@ -3,18 +3,36 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 
+from daq.contracts.errors import DaqError
 from daq.driver import Controller, StopConfirmation
 from daq.safety import Action, Arm, Event, State, advance
 
+_ORDERLY = (Event.ARM, Event.START, Event.FINISHED, Event.DISARM)
+"""Steps of a run that goes as planned: none of them is taken any more once the arm has been halted."""
+
+
+class StoppedError(DaqError):
+    """Somebody has stopped the arm; what was about to go on does not."""
+
+    exit_code = 6
+
 
 class ArmControl:
-    """One arm. `stop` may come from any thread; everything else from the thread that runs the experiment."""
+    """One arm. `stop` may come from any thread; everything else from the thread that runs the experiment.
+
+    A halt (a stop, a trip, a lost link) is remembered before it is written to the line: from then on nothing that leads
+    to motion is begun here, and no freeze is released, until an explicit RESET.
+    """
 
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
         self._lock = threading.Lock()
         self._arm = Arm()
+        self._halted: str | None = None
+        self._frozen = False
         self.handle(Event.CONNECTED)
 
     @property
@@ -23,28 +41,76 @@ class ArmControl:
         return self._arm
 
     @property
+    def halted(self) -> str | None:
+        """Why the arm has been halted since the last reset; None while it has not."""
+        return self._halted
+
+    @property
     def may_send(self) -> bool:
         """Whether set points may be sent now."""
-        return self._arm.state is State.RUNNING
+        return self._arm.state is State.RUNNING and self._halted is None
 
     def handle(self, event: Event, cause: str | None = None) -> StopConfirmation | None:
         """Takes an event and carries out its actions; returns what became of a freeze, if there was one.
 
-        Raises IllegalEventError, and LinkError when a release cannot be sent.
+        Raises StoppedError for an orderly step when the arm has been halted meanwhile, IllegalEventError, and LinkError
+        when a release cannot be sent.
         """
         with self._lock:
+            if event in _ORDERLY:
+                self.require_not_halted()
             self._arm, actions = advance(self._arm, event, cause)
+            if event is Event.RESET:
+                self._halted, self._frozen = None, False
+            if Action.FREEZE in actions:
+                self._halted = self._halted or cause or event.value
         confirmation = None
         for action in actions:
             if action is Action.FREEZE:
-                confirmation = self._controller.stop()
+                confirmation = self._freeze()
             elif action is Action.RELEASE:
-                self._controller.release()
+                self._release()
         return confirmation
 
     def stop(self, cause: str) -> StopConfirmation:
-        """Freezes the arm at once, from any thread: the stop is on the line before anything else is done."""
-        confirmation = self._controller.stop()
+        """Freezes the arm at once, from any thread: the stop is on the line before any lock is waited for."""
+        self._halted = self._halted or cause
+        confirmation = self._freeze()
         with self._lock:
             self._arm, _ = advance(self._arm, Event.STOP, cause)
         return confirmation
+
+    @contextmanager
+    def frozen_on_error(self) -> Iterator[None]:
+        """Whatever ends the block early, the arm is frozen before anything else is done about it."""
+        try:
+            yield
+        except BaseException as error:
+            if not self._frozen:
+                self.stop(f"{type(error).__name__}: {error}")
+            raise
+
+    def _freeze(self) -> StopConfirmation:
+        confirmation = self._controller.stop()
+        self._frozen = self._frozen or confirmation.acknowledged
+        return confirmation
+
+    def _release(self) -> None:
+        self._controller.release()
+        if self._halted is not None:
+            # A stop was written while the release was on its way, and the release may have undone it.
+            self._controller.stop()
+            self.require_not_halted()
+
+    def require_not_halted(self) -> None:
+        """Raises StoppedError when the arm has been halted."""
+        if self._halted is not None:
+            raise StoppedError(f"the arm has been stopped: {self._halted}")
+
+
+def told(confirmation: StopConfirmation) -> str:
+    """One line about what became of a stop."""
+    if confirmation.acknowledged:
+        return f"the board confirmed: set points are frozen since tick {confirmation.tick}"
+    sent = "was sent but NOT CONFIRMED" if confirmation.sent else "could NOT BE DELIVERED"
+    return f"the stop {sent} ({confirmation.problem}): the arm holds its last set point; use the emergency stop"

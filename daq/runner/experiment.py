@@ -2,63 +2,40 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Protocol
 
-from daq.contracts.errors import SafetyError
+from daq.contracts.errors import DaqError, SafetyError, TraceError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
-from daq.contracts.sample import SampleRow
-from daq.contracts.trace import EventKind, Outcome, TraceEvent, TraceRecord
-from daq.driver import EVERY_JOINT, Controller
-from daq.runner.arm_control import ArmControl
+from daq.contracts.trace import Outcome, TraceRecord
+from daq.driver import EVERY_JOINT, Controller, GainsNotTakenError
+from daq.link import LinkError
+from daq.runner.arm_control import ArmControl, StoppedError
 from daq.runner.follower import Ending, Follower
-from daq.safety import Event, Violation, check_move_to_start, check_plan
+from daq.runner.gains import GainChange, put_back, set_gains
+from daq.runner.preparation import Consent, Prepared, prepare
+from daq.runner.recorder import Ears, Recorder, ToldOnly
+from daq.safety import Event
 from daq.traces.naming import new_trace_id, trace_path
-from daq.traces.room import require_room
 from daq.traces.writer import TraceWriter
-from daq.trajectories import Plan, plan, plan_move, start_angles
-from firmware_protocol.commands import StatusFlag
-from firmware_protocol.framing import FRAME_OVERHEAD
+from daq.trajectories import Plan
 
 AFTERMATH = 1.0
 """Seconds recorded after a stop, a fault or the loss of the parent."""
-LINE_SHARE = 0.6
-"""Share of the line that samples of all joints may take; else only the experiment's joints are recorded."""
+PATIENCE_IN_LOCK_STEP = 5.0
+"""s that a fast run waits for the disk; in real time nothing waits."""
 
 
-class Ears(Protocol):
-    """Who listens while a run goes on."""
+class RunFaultError(DaqError):
+    """The run ended in a fault before there was anything to record, or its record was lost. The arm is frozen."""
 
-    def progress(self, fraction: float, text: str) -> None:
-        """How far the run is."""
-        ...
-
-    def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
-        """A recorded control period."""
-        ...
-
-    def happened(self, event: TraceEvent) -> None:
-        """An event that is in the trace too."""
-        ...
-
-
-@dataclass(frozen=True)
-class Consent:
-    """What the operator has agreed to. A controller with an arm behind it is not moved without `moves_real_arm`."""
-
-    moves_real_arm: bool = False
-
-
-class MissingConsentError(SafetyError):
-    """A real arm, and nobody has agreed that it may move."""
+    exit_code = 5
 
 
 @dataclass(frozen=True)
@@ -73,166 +50,130 @@ class RunResult:
     counters: dict[str, float] = field(default_factory=dict)
 
 
-@dataclass
-class _Recorder:
-    """Passes rows and events on to the trace and to whoever listens."""
+@dataclass(frozen=True)
+class Outside:
+    """What the world wants of a run while it goes on.
 
-    writer: TraceWriter
-    joints: tuple[int, ...]
+    ended:       why somebody wants the end; None while nobody does
+    interrupted: whether that was the loss of whoever started the run
+    """
+
+    ended: Callable[[], str | None] = lambda: None
+    interrupted: Callable[[], bool] = lambda: False
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """Everything one run works with."""
+
+    controller: Controller
+    control: ArmControl
+    spec: ExperimentSpec
+    machine: Machine
+    limits: Limits
+    folder: Path
     ears: Ears
-    first: int | None = None
-    last: int = 0
-    samples: int = 0
-
-    def row(self, row: SampleRow) -> None:
-        if self.first is None:
-            self.first = row.tick
-        self.last = row.tick
-        self.samples += 1
-        self.writer.sample(row)
-        self.ears.sampled(self.joints, row)
-
-    def event(self, row: SampleRow, kind: EventKind, message: str, joint: int | None = None) -> None:
-        event = TraceEvent(time=row.time, kind=kind, message=message, tick=row.tick, joint=joint)
-        self.writer.event(event)
-        self.ears.happened(event)
-
-    @property
-    def missing(self) -> int:
-        return 0 if self.first is None else self.last - self.first + 1 - self.samples
+    outside: Outside
+    robot: str = "ma2000"
 
 
-@dataclass
-class _MoveObserver:
-    """On the way to the start nothing is recorded; what happens there is told all the same."""
-
-    ears: Ears
-
-    def row(self, _row: SampleRow) -> None:
-        return
-
-    def event(self, row: SampleRow, kind: EventKind, message: str, joint: int | None = None) -> None:
-        self.ears.happened(TraceEvent(time=row.time, kind=kind, message=message, tick=row.tick, joint=joint))
-
-
-def run_experiment(
-    controller: Controller,
-    control: ArmControl,
-    spec: ExperimentSpec,
-    machine: Machine,
-    limits: Limits,
-    folder: Path,
-    ears: Ears,
-    *,
-    consent: Consent,
-    ended: Callable[[], str | None],
-    interrupted: Callable[[], bool],
-    robot: str = "ma2000",
-) -> RunResult:
-    """Runs `spec` and returns when its trace is closed.
+def run_experiment(run: Arrangement, consent: Consent) -> RunResult:
+    """Runs the experiment and returns when its trace is closed.
 
     Nothing has moved and nothing is recorded when this raises SafetyError (a limit, a frozen board, no consent),
-    TraceError (no room for a trace) or SpecError. `ended` gives a reason once somebody wants the end; `interrupted`
-    tells whether that was the loss of whoever started the run.
+    SpecError or TraceError (no room for a trace). Once the arm may move, every error freezes it before it goes on:
+    StoppedError (stopped before the record began) and RunFaultError (a fault before the record began, or the record
+    could not be written) say what is left.
     """
-    _require_fit(controller, consent)
-    joints = _recorded(controller, spec)
-    for joint, gain in spec.gains.items():
-        controller.set_gains(joint, *gain)
+    try:
+        prepared = prepare(run.controller, run.spec, run.machine, run.limits, run.folder, consent)
+    except SafetyError:
+        run.control.require_not_halted()  # a stop in this very moment is the reason then
+        raise
+    with run.control.frozen_on_error():
+        run.control.handle(Event.ARM)
+        changes = set_gains(run.controller, run.spec.gains, run.outside.ended)
+        run.control.handle(Event.START)
+        _move_to_start(run, prepared)
+        try:
+            return _record(run, prepared, changes)
+        except TraceError as error:
+            raise RunFaultError(f"{error}; the run was ended and the arm frozen") from error
 
-    approach = Follower(controller, control, machine, limits, EVERY_JOINT, _MoveObserver(ears), ended)
-    here = approach.look()
-    _require_still(here, machine, limits)
-    target = start_angles(spec, machine)
-    move = plan_move(machine, here.set_point, target)
-    motion = plan(spec, machine, target)
-    _require_allowed("move to start", check_move_to_start(move, machine, limits))
-    _require_allowed("experiment", check_plan(motion, machine, limits))
 
-    require_room(folder, len(motion), len(joints))
-
-    control.handle(Event.ARM)
-    control.handle(Event.START)
-    ears.progress(0.0, "moving to the start")
-    ending = approach.follow(move, lambda _index: None)
-    if ending.kind != "finished":
-        raise SafetyError(f"the move to the start ended before it was there: {ending.cause}")
-
-    record = _record(controller, spec, machine, robot)
-    writer = TraceWriter(
-        trace_path(folder, record), record, joints, attachments={"experiment.json": spec.model_dump_json().encode()},
-        patience=5.0 if controller.link.lock_step else 0.0,
+def _move_to_start(run: Arrangement, prepared: Prepared) -> None:
+    """Raises StoppedError or RunFaultError when the arm did not get there; it is frozen then."""
+    run.ears.progress(0.0, "moving to the start")
+    approach = Follower(
+        run.controller, run.control, run.machine, run.limits, EVERY_JOINT, ToldOnly(run.ears), run.outside.ended,
+        every_period=False,
     )  # fmt: skip
-    recorder = _Recorder(writer, joints, ears)
-    with writer:
-        follower = Follower(controller, control, machine, limits, joints, recorder, ended)
-        ending = follower.follow(motion, _progress(ears, motion))
-        if ending.kind in ("stopped", "fault"):
-            follower.observe(round(AFTERMATH / controller.period_s))
+    ending = approach.follow(prepared.move, lambda _index: None)
+    if ending.kind != "finished":
+        line = f"the move to the start ended before it was there: {ending.cause}; nothing was recorded"
+        raise StoppedError(line) if ending.kind == "stopped" else RunFaultError(line)
+
+
+def _record(run: Arrangement, prepared: Prepared, changes: tuple[GainChange, ...]) -> RunResult:
+    record = _trace_record(run)
+    writer = TraceWriter(
+        trace_path(run.folder, record), record, prepared.joints,
+        attachments={"experiment.json": run.spec.model_dump_json().encode()},
+        patience=PATIENCE_IN_LOCK_STEP if run.controller.link.lock_step else 0.0,
+    )  # fmt: skip
+    recorder = Recorder(writer, prepared.joints, run.ears)
+    follower = Follower(
+        run.controller, run.control, run.machine, run.limits, prepared.joints, recorder, run.outside.ended
+    )
+    with writer, run.control.frozen_on_error():
+        for change in changes:
+            follower.tell("gains", change.message)
+        ending = follower.follow(prepared.motion, _progress(run.ears, prepared.motion))
         if ending.kind == "finished":
-            control.handle(Event.FINISHED)
-            control.handle(Event.DISARM)
-        outcome = _outcome(ending, interrupted())
-        counters = controller.counters.numbers()
+            ending = _finish(run, changes)
+        if ending.kind != "finished":
+            for change in changes:
+                follower.tell("gains", change.left)
+            if ending.kind != "lost":
+                follower.observe(round(AFTERMATH / run.controller.period_s))
+        outcome = _outcome(ending, run.outside.interrupted())
+        counters = run.controller.counters.numbers()
         path = writer.close(outcome, counters)
     return RunResult(outcome, ending.cause, path, recorder.samples, recorder.missing, counters)
 
 
-def _require_fit(controller: Controller, consent: Consent) -> None:
-    if not controller.identity.simulated and not consent.moves_real_arm:
-        raise MissingConsentError(
-            f"{controller.link.url} is a real arm: it moves only with the operator's consent (--yes)"
-        )
-    flags = controller.status().flags
-    if StatusFlag.FROZEN in flags:
-        raise SafetyError("the arm has been stopped and holds its posture; `daq reset` ends that")
+def _finish(run: Arrangement, changes: tuple[GainChange, ...]) -> Ending:
+    """The plan is through: gains back, state idle; unless somebody stops the arm in this very moment."""
+    try:
+        put_back(run.controller, changes, run.outside.ended)
+        run.control.handle(Event.FINISHED)
+        run.control.handle(Event.DISARM)
+    except StoppedError as error:
+        run.control.stop(str(error))
+        return Ending("stopped", str(error))
+    except (LinkError, GainsNotTakenError) as error:
+        run.control.handle(Event.TRIP, str(error))
+        return Ending("fault", f"the plan was carried out, but its gains could not be put back: {error}")
+    return Ending("finished")
 
 
-def _require_still(row: SampleRow, machine: Machine, limits: Limits) -> None:
-    """The arm must be where its controller holds it, before it is asked for anything else."""
-    allowed = limits.following_error_counts
-    for index, error in enumerate(row.error):
-        counts = error / machine.calibration(index + 1).rad_per_count
-        if allowed is not None and abs(counts) > allowed:
-            raise SafetyError(
-                f"joint {index + 1} is {counts:.0f} ADC counts from its set point, allowed are ±{allowed}: "
-                f"it stands at {math.degrees(row.position[index]):.1f}°; is it blocked, or without power?"
-            )
-
-
-def _require_allowed(what: str, violations: list[Violation]) -> None:
-    if violations:
-        more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""
-        raise SafetyError(f"{what} refused: {violations[0]}{more}; nothing moved")
-
-
-def _recorded(controller: Controller, spec: ExperimentSpec) -> tuple[int, ...]:
-    """Joints to record: as the experiment says, else all that the line has room for."""
-    if spec.record is not None:
-        return spec.record
-    per_joint = 2 + 7
-    both_ways = 4 * FRAME_OVERHEAD + 1 + 5 + 5 + 6 + per_joint * len(EVERY_JOINT)
-    room = controller.link.bytes_per_second * controller.period_s * LINE_SHARE
-    return EVERY_JOINT if both_ways <= room else spec.joints
-
-
-def _record(controller: Controller, spec: ExperimentSpec, machine: Machine, robot: str) -> TraceRecord:
-    now = datetime.now(UTC)
+def _trace_record(run: Arrangement) -> TraceRecord:
+    controller, now = run.controller, datetime.now(UTC)
     return TraceRecord(
         trace_id=new_trace_id(),
         created=now,
         software=f"ma2000-daq {version('ma2000-daq')}",
         source="mock" if controller.identity.simulated else "real",
-        robot=robot,
-        operator=spec.operator,
-        machine=machine,
+        robot=run.robot,
+        operator=run.spec.operator,
+        machine=run.machine,
         memory_map=controller.memory_map.model_dump(mode="json"),
-        spec=spec,
+        spec=run.spec,
         gains=controller.gains(),
         period=controller.period_s,
         drive_unit="V",
         clock={"utc": now.timestamp(), "monotonic": time.monotonic(), "controller_clock": controller.clock.now()},
-        notes=spec.notes,
+        notes=run.spec.notes,
     )
 
 

@@ -12,7 +12,8 @@ from daq.contracts.sample import SampleRow
 from daq.contracts.trace import EventKind
 from daq.driver import BoardSnapshot, Controller, ControllerRestartedError, NoSampleError
 from daq.link import LinkError, RequestRefusedError
-from daq.runner.arm_control import ArmControl
+from daq.runner.arm_control import ArmControl, told
+from daq.runner.lag import Lag
 from daq.runner.rows import RowMaker
 from daq.safety import Event, RunningGuards, Verdict
 from daq.trajectories import Plan
@@ -28,8 +29,8 @@ class Observer(Protocol):
         """A control period."""
         ...
 
-    def event(self, row: SampleRow, kind: EventKind, message: str, joint: int | None = None) -> None:
-        """Something that happened in the period of `row`."""
+    def event(self, time: float, kind: EventKind, message: str, tick: int | None, joint: int | None = None) -> None:
+        """Something that happened at `time` (s from the first row), in the period `tick`."""
         ...
 
 
@@ -42,7 +43,12 @@ class Ending:
 
 
 class Follower:
-    """Sends a plan's set points and takes every period's sample. `ended` says why somebody outside wants the end."""
+    """Sends a plan's set points, one a control period, and takes the samples; the guards judge each.
+
+    ended:        says why somebody outside wants the end; None while nobody does
+    every_period: True takes each period once, in order, as a record needs; False takes the newest, which is all that a
+                  move needs and what a slow line can do
+    """
 
     def __init__(
         self,
@@ -53,6 +59,8 @@ class Follower:
         joints: tuple[int, ...],
         observer: Observer,
         ended: Callable[[], str | None],
+        *,
+        every_period: bool = True,
     ) -> None:
         self._controller = controller
         self._control = control
@@ -61,58 +69,61 @@ class Follower:
         self._joints = joints
         self._observer = observer
         self._ended = ended
+        self._every_period = every_period
         self._rows = RowMaker(machine, joints, controller.period_s)
+        self._lag = Lag(controller.period_s)
         self._retries = controller.counters.retries
         self.last: SampleRow | None = None
-
-    def look(self) -> SampleRow:
-        """Waits for the next period; sends nothing. Raises LinkError, ControllerRestartedError, NoSampleError."""
-        return self._next({})[0]
 
     def observe(self, periods: int) -> None:
         """Records so many periods without sending anything, as far as the robot still answers."""
         try:
             for _ in range(periods):
-                self._observer.row(self.look())
+                row, _ = self._next({})
+                self._observer.row(row)
         except (LinkError, ControllerRestartedError, NoSampleError) as error:
-            if self.last is not None:
-                self._observer.event(self.last, "link_lost", str(error))
+            self.tell("link_lost", str(error))
 
     def follow(self, plan: Plan, progress: Callable[[int], None]) -> Ending:
-        """Plays `plan` from its first set point, which is where the arm's set points are, to its last."""
+        """Plays `plan` from its first set point, which is where the arm's set points are, to its last.
+
+        Whatever the ending, the arm is frozen when this returns, unless the plan is finished: then it holds its last
+        set point. Raises only what the observer raises.
+        """
         guards = RunningGuards(self._machine, self._limits, self._joints, plan.moving)
         try:
             return self._play(plan, guards, progress)
         except (LinkError, NoSampleError) as error:
-            self._tell("link_lost", str(error))
-            self._control.handle(Event.LINK_LOST, str(error))
-            return Ending("lost", str(error))
+            return self._halted(Event.LINK_LOST, "link_lost", "lost", str(error))
         except ControllerRestartedError as error:
-            self._tell("restart", str(error))
-            self._control.handle(Event.TRIP, str(error))
-            return Ending("fault", str(error))
+            return self._halted(Event.TRIP, "restart", "fault", str(error))
+
+    def tell(self, kind: EventKind, message: str) -> None:
+        """An event at the last row's time; at the beginning, when there is none."""
+        time, tick = (0.0, None) if self.last is None else (self.last.time, self.last.tick)
+        self._observer.event(time, kind, message, tick)
 
     def _play(self, plan: Plan, guards: RunningGuards, progress: Callable[[int], None]) -> Ending:
         # The first set point is where the arm's set points are already: sending it again makes row and plan agree.
         index, hold = -1, False
         while True:
-            following = self._set_points(plan, index + 1)
-            sending = {} if hold or index + 1 >= len(plan) else following
+            go_on = not hold and index + 1 < len(plan)
             outside = self._ended()
             if outside is not None:
                 return self._stopped(outside)
             try:
-                row, snapshot = self._next(sending)
+                row, snapshot = self._next(self._set_points(plan, index + 1) if go_on else {})
             except RequestRefusedError as error:
                 return self._stopped(self._ended() or str(error))
             self._observer.row(row)
-            if sending:
+            if go_on:
                 index += 1
                 for mark in plan.marks_at(index):
-                    self._observer.event(row, mark.kind, mark.message, mark.joint)
-            progress(index)
-            planned = self._set_points(plan, index + 1)
-            verdict = guards.check(row, planned, self._set_points(plan, index) if snapshot.set_points_missed else None)
+                    self._observer.event(row.time, mark.kind, mark.message, row.tick, mark.joint)
+                progress(index)
+            expected = self._set_points(plan, index) if snapshot.set_points_missed else None
+            verdict = guards.check(row, self._set_points(plan, index + 1), expected)
+            verdict |= self._lag.check(row.tick, snapshot.jitter)
             ending = self._judge(verdict, row)
             if ending is not None:
                 return ending
@@ -125,41 +136,40 @@ class Follower:
         return {joint: int(postures[joint - 1]) for joint in plan.moving}
 
     def _next(self, sending: dict[int, int]) -> tuple[SampleRow, BoardSnapshot]:
-        after = None if self.last is None else self.last.tick
+        after = self.last.tick if self._every_period and self.last is not None else None
         snapshot = self._controller.next_snapshot(after, self._joints, sending)
         row = self._rows.row(snapshot)
         self.last = row
-        if snapshot.missing_before:
-            self._observer.event(
-                row, "missing", f"{snapshot.missing_before} samples before tick {row.tick} are missing"
-            )
         if row.tick % RETRIES_LOOKED_AT_EVERY == 0:
-            self._tell_retries(row)
+            self._tell_retries()
         return row, snapshot
 
-    def _tell_retries(self, row: SampleRow) -> None:
+    def _tell_retries(self) -> None:
         retries = self._controller.counters.retries
         if retries != self._retries:
-            self._observer.event(row, "retry", f"{retries - self._retries} requests had to be repeated")
+            self.tell("retry", f"{retries - self._retries} requests had to be repeated")
             self._retries = retries
 
     def _judge(self, verdict: Verdict, row: SampleRow) -> Ending | None:
         for finding in verdict.findings:
-            self._observer.event(row, finding.kind, finding.message, finding.joint)
+            self._observer.event(row.time, finding.kind, finding.message, row.tick, finding.joint)
         if verdict.trips:
-            cause = "; ".join(verdict.trips)
-            self._tell("fault", cause)
-            self._control.handle(Event.TRIP, cause)
-            return Ending("fault", cause)
+            return self._halted(Event.TRIP, "fault", "fault", "; ".join(verdict.trips))
         if verdict.stop is not None:
             return self._stopped(self._ended() or verdict.stop)
         return None
 
     def _stopped(self, cause: str) -> Ending:
-        self._tell("stop", cause)
-        self._control.handle(Event.STOP, cause)
-        return Ending("stopped", cause)
+        return self._halted(Event.STOP, "stop", "stopped", cause)
 
-    def _tell(self, kind: EventKind, message: str) -> None:
-        if self.last is not None:
-            self._observer.event(self.last, kind, message)
+    def _halted(
+        self, event: Event, told_as: EventKind, ending: Literal["stopped", "fault", "lost"], cause: str
+    ) -> Ending:
+        """Freezes first, tells afterwards: nothing that listens may delay it."""
+        confirmation = self._control.handle(event, cause)
+        self.tell(told_as, cause)
+        if confirmation is not None:
+            self.tell("note", told(confirmation))
+            if not confirmation.acknowledged:
+                cause = f"{cause}; {told(confirmation)}"
+        return Ending(ending, cause)

@@ -1,0 +1,38 @@
+"""The job, read from the parent's pipe; what follows it there belongs to the guardian."""
+
+from __future__ import annotations
+
+import os
+
+from pydantic import ValidationError
+
+from daq.acquisition.messages import Job
+from daq.contracts.errors import SpecError
+from daq.runner import StoppedError
+
+LONGEST_JOB = 256 << 20
+"""Bytes: a recorded path of hours."""
+
+
+def read_job(descriptor: int) -> Job:
+    """The job of the first line.
+
+    Raises SpecError when there is none, or it is not valid; StoppedError when the parent wants a stop already.
+    """
+    data = bytearray()
+    while b"\n" not in data:
+        piece = os.read(descriptor, 65536)
+        if not piece:
+            raise SpecError("job: the input ended before the job was complete")
+        data += piece
+        if len(data) > LONGEST_JOB:
+            raise SpecError(f"job: longer than {LONGEST_JOB} bytes")
+    line, _, rest = bytes(data).partition(b"\n")
+    if rest:
+        raise StoppedError("stopped before it began; nothing moved")
+    try:
+        return Job.model_validate_json(line)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "text"
+        raise SpecError(f"job: {where}: {first['msg']}") from error

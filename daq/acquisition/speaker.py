@@ -1,0 +1,91 @@
+"""Reports on their way to the parent process, off the acquisition loop: a parent that does not read delays nothing."""
+
+from __future__ import annotations
+
+import os
+import queue
+import sys
+import threading
+from types import TracebackType
+from typing import Self
+
+from daq.acquisition.messages import EventHappened, Failed, Finished, Progress, Sampled
+from daq.contracts.sample import SampleRow
+from daq.contracts.trace import TraceEvent
+
+Report = Progress | EventHappened | Sampled | Finished | Failed
+WAITING_REPORTS = 4096
+"""Reports that may wait for a parent that does not read (80 s of samples); those beyond are not told."""
+
+
+class Speaker:
+    """Writes reports to standard output, one a line, on a thread of its own; a reader that has gone stops nobody.
+
+    The end of the run is told however long the reader takes: leaving the `with` block waits for it.
+    """
+
+    def __init__(self) -> None:
+        self.report_samples = False
+        self.untold = 0
+        """Reports that found no room."""
+        self._output = sys.stdout.fileno()
+        self._queue: queue.Queue[Report | None] = queue.Queue(WAITING_REPORTS)
+        self._thread = threading.Thread(target=self._write_all, name="reports", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._queue.put(None)
+        self._thread.join()
+
+    def ended(self, report: Finished | Failed) -> None:
+        """The last report; waits for room."""
+        self._queue.put(report)
+
+    def progress(self, fraction: float, text: str) -> None:
+        """How far the run is."""
+        self._say(Progress(fraction=fraction, text=text))
+
+    def happened(self, event: TraceEvent) -> None:
+        """An event."""
+        self._say(EventHappened(event=event))
+
+    def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
+        """A control period, where somebody wants them."""
+        if self.report_samples:
+            self._say(
+                Sampled(
+                    tick=row.tick,
+                    time=row.time,
+                    joints=joints,
+                    set_point=row.set_point,
+                    position=row.position,
+                    drive=row.drive,
+                    status=row.status,
+                )
+            )
+
+    def _say(self, report: Report) -> None:
+        try:
+            self._queue.put_nowait(report)
+        except queue.Full:
+            self.untold += 1
+
+    def _write(self, data: bytes) -> None:
+        # Past Python's own buffer: what is left there would be tried again, and complained about, at exit.
+        while data:
+            data = data[os.write(self._output, data) :]
+
+    def _write_all(self) -> None:
+        heard = True
+        while (report := self._queue.get()) is not None:
+            if not heard:
+                continue
+            try:
+                self._write(report.model_dump_json().encode() + b"\n")
+            except OSError:
+                heard = False

@@ -1,0 +1,41 @@
+"""Set points answer what the arm does now: on samples that are too old nothing is sent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from daq.safety import Verdict
+from daq.safety.findings import Finding
+
+OLDEST_TO_ACT_ON = 0.06
+"""Age (s) of a sample beyond which set points wait: an assumption, three control periods. A host that was kept from its
+work for a moment catches up within that; older samples would let it send many set points at once, in the dark."""
+LONGEST_BEHIND = 1.0
+"""s that samples may stay too old before the run ends in a fault: an assumption."""
+
+
+@dataclass
+class Lag:
+    """Judges the age of each sample. Time is the board's."""
+
+    period: float
+    since: int | None = None
+
+    def check(self, tick: int, age: float) -> Verdict:
+        """`age` (s): by how much a sample came later than the quickest ones after their ticks."""
+        if age <= OLDEST_TO_ACT_ON:
+            was, self.since = self.since, None
+            if was is None:
+                return Verdict()
+            line = f"samples are up to date again after {(tick - was) * self.period:.2f} s: set points go on"
+            return Verdict(findings=(Finding("resume", line),))
+        line = f"the sample of tick {tick} came {age * 1e3:.0f} ms late"
+        findings: tuple[Finding, ...] = ()
+        if self.since is None:
+            self.since = tick
+            findings = (Finding("pause", f"{line}, set points wait for fresh ones"),)
+        behind = (tick - self.since) * self.period
+        if behind <= LONGEST_BEHIND:
+            return Verdict(hold=True, findings=findings)
+        trip = f"{line}, and all for {behind:.2f} s: is the line too slow, or this computer too busy?"
+        return Verdict(hold=True, trips=(trip,), findings=findings)

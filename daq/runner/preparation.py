@@ -1,0 +1,116 @@
+"""Everything that is asked and checked before an arm may move. Nothing here changes anything on the board."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from daq.contracts.errors import SafetyError
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.limits import Limits
+from daq.contracts.machine import Machine
+from daq.contracts.sample import SampleRow
+from daq.driver import EVERY_JOINT, Controller
+from daq.runner.rows import RowMaker
+from daq.safety import Violation, check_move_to_start, check_plan
+from daq.traces.room import require_room
+from daq.trajectories import Plan, control_period, plan, plan_move, start_angles
+from firmware_protocol.commands import StatusFlag
+from firmware_protocol.framing import FRAME_OVERHEAD
+
+LINE_SHARE = 0.6
+"""Share of the line that samples of all joints may take; else only the experiment's joints are recorded."""
+PERIOD_TOLERANCE = 0.01
+"""By how much (relative) the controller's period may differ from the machine file's."""
+
+
+@dataclass(frozen=True)
+class Consent:
+    """What the operator has agreed to. A controller with an arm behind it is not moved without `moves_real_arm`."""
+
+    moves_real_arm: bool = False
+
+
+class MissingConsentError(SafetyError):
+    """A real arm, and nobody has agreed that it may move."""
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A run that has passed every check: joints to record, the way to the start, the motion."""
+
+    joints: tuple[int, ...]
+    move: Plan
+    motion: Plan
+
+
+def prepare(
+    controller: Controller, spec: ExperimentSpec, machine: Machine, limits: Limits, folder: Path, consent: Consent
+) -> Prepared:
+    """Looks at the arm, plans, and checks. Raises SafetyError, SpecError, TraceError (no room), LinkError,
+    NoSampleError, ControllerRestartedError; nothing has changed on the board then."""
+    _require_consent(controller, consent)
+    _require_period(controller, machine)
+    if StatusFlag.FROZEN in controller.status().flags:
+        raise SafetyError("the arm has been stopped and holds its posture; `daq reset` ends that")
+    here = _look(controller, machine)
+    _require_still(here, machine, limits)
+    target = start_angles(spec, machine)
+    move = plan_move(machine, here.set_point, target)
+    motion = plan(spec, machine, target)
+    _require_allowed("move to start", check_move_to_start(move, machine, limits))
+    _require_allowed("experiment", check_plan(motion, machine, limits))
+    joints = recorded_joints(controller, spec)
+    require_room(folder, len(motion), len(joints))
+    return Prepared(joints, move, motion)
+
+
+def recorded_joints(controller: Controller, spec: ExperimentSpec) -> tuple[int, ...]:
+    """Joints to record: as the experiment says, else all that the line has room for."""
+    if spec.record is not None:
+        return spec.record
+    per_joint = 2 + 7
+    both_ways = 4 * FRAME_OVERHEAD + 1 + 5 + 5 + 6 + per_joint * len(EVERY_JOINT)
+    room = controller.link.bytes_per_second * controller.period_s * LINE_SHARE
+    return EVERY_JOINT if both_ways <= room else spec.joints
+
+
+def _require_consent(controller: Controller, consent: Consent) -> None:
+    if not controller.identity.simulated and not consent.moves_real_arm:
+        raise MissingConsentError(
+            f"{controller.link.url} is a real arm: it moves only with the operator's consent (--yes)"
+        )
+
+
+def _require_period(controller: Controller, machine: Machine) -> None:
+    """Speeds are counted in set points a period: a controller with another period would move at another speed."""
+    planned = control_period(machine)
+    if abs(controller.period_s - planned) > PERIOD_TOLERANCE * planned:
+        raise SafetyError(
+            f"{controller.link.url} has a control period of {controller.period_s * 1e3:g} ms, the machine file "
+            f"{machine.name} says {planned * 1e3:g} ms: speeds would be wrong; correct controller.period there"
+        )
+
+
+def _look(controller: Controller, machine: Machine) -> SampleRow:
+    """The next control period of all joints; sends nothing."""
+    return RowMaker(machine, EVERY_JOINT, controller.period_s).row(controller.next_snapshot())
+
+
+def _require_still(row: SampleRow, machine: Machine, limits: Limits) -> None:
+    """The arm must be where its controller holds it, before it is asked for anything else."""
+    allowed = limits.following_error_counts
+    for index, error in enumerate(row.error):
+        counts = error / machine.calibration(index + 1).rad_per_count
+        if allowed is not None and abs(counts) > allowed:
+            raise SafetyError(
+                f"joint {index + 1} is {counts:.0f} ADC counts from its set point, allowed are ±{allowed}: "
+                f"it stands at {math.degrees(row.position[index]):.1f}°; is it blocked, or without power?"
+            )
+
+
+def _require_allowed(what: str, violations: list[Violation]) -> None:
+    if violations:
+        more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""
+        raise SafetyError(f"{what} refused: {violations[0]}{more}; nothing moved")
