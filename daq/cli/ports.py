@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import typer
 
 from daq.cli.context import JsonOption, print_json
@@ -16,8 +18,10 @@ def ports(json: JsonOption = False) -> None:
 
     found = find_ports()
     if json:
-        print_json([vars(port) if hasattr(port, "__dict__") else port for port in found])
-    elif not found:
-        print("no serial port found; `daq --port mock:// …` needs none")
-    for port in [] if json else found:
-        print(port)
+        print_json([asdict(port) for port in found])
+        return
+    if not found:
+        print("no serial port found; the mock needs none (`daq --port mock:// …`)")
+    for port in found:
+        told = ", ".join(text for text in (port.description, port.maker, port.serial_number) if text)
+        print(f"{port.url}  {told}")

@@ -1,0 +1,45 @@
+"""Single keys of a terminal, read without waiting."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+import termios
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from daq.contracts.errors import SpecError
+
+LEFT, RIGHT = "\x1b[D", "\x1b[C"
+
+
+@contextmanager
+def keys() -> Iterator[Keyboard]:
+    """The terminal's keys, one by one; its mode is put back at the end. Raises SpecError without a terminal.
+
+    Ctrl-C stays a signal: it must stop the arm whatever this program does.
+    """
+    if not sys.stdin.isatty():
+        raise SpecError("jogging needs a terminal: keys drive the arm; use `daq teach step` in scripts")
+    descriptor = sys.stdin.fileno()
+    before = termios.tcgetattr(descriptor)
+    try:
+        tty.setcbreak(descriptor)
+        yield Keyboard(descriptor)
+    finally:
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+
+
+class Keyboard:
+    """Keys that have been pressed since the last look."""
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+
+    def pressed(self) -> str:
+        """Everything typed since the last look; empty when nothing was."""
+        if not select.select([self._descriptor], [], [], 0)[0]:
+            return ""
+        return os.read(self._descriptor, 1024).decode("utf-8", "replace")
