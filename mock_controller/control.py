@@ -58,6 +58,7 @@ class Control:
             "help": self._help,
             "state": self._state,
             "counts": self._counts,
+            "snapshots": self._snapshots,
             "fault_on": self._fault_on,
             "fault_off": self._fault_off,
             "fault_list": self._fault_list,
@@ -128,6 +129,13 @@ class Control:
             },
             "board": dataclasses.asdict(self._device.board.counters),
         }
+
+    def _snapshots(self, request: Answer) -> Answer:
+        """Periods after tick "after" (0) that the ring still keeps, as the board recorded them."""
+        after = request.get("after", 0)
+        if isinstance(after, bool) or not isinstance(after, int):
+            raise ControlError('"after": the number of a tick is needed')
+        return {"snapshots": [dataclasses.asdict(kept) for kept in self._device.board.snapshots.after(after)]}
 
     def _fault_on(self, request: Answer) -> Answer:
         """Switches a fault on: "fault": "NAME:PARAMETER=VALUE,…"."""

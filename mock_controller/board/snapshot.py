@@ -51,3 +51,7 @@ class SnapshotRing:
         # Ticks in the ring are consecutive, so the place is known.
         place = max(tick + 1 - self._snapshots[0].tick, 0)
         return self._snapshots[place]
+
+    def after(self, tick: int) -> list[PeriodSnapshot]:
+        """All that are kept with a tick above `tick`, oldest first."""
+        return [snapshot for snapshot in self._snapshots if snapshot.tick > tick]

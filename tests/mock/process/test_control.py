@@ -87,6 +87,21 @@ def test_faults_are_switched_listed_and_counted(desk: Desk) -> None:
     assert counts["bridge"]["answered"] == {"Advance": 2}
 
 
+def test_snapshots_are_the_boards_own_record(desk: Desk) -> None:
+    desk.host.ask(WriteSetPoints(((1, 520),)))
+    desk.host.ask(Advance(90_000))
+    newest = desk.host.board.snapshots.newest()
+    assert newest is not None
+    snapshots = desk.say("snapshots", after=newest.tick - 2)["snapshots"]
+    assert [snapshot["tick"] for snapshot in snapshots] == [newest.tick - 1, newest.tick]
+    assert snapshots[-1]["time_us"] == newest.time_us
+    assert snapshots[-1]["set_points"] == list(newest.set_points)
+    assert snapshots[-1]["set_points"][0] == 520
+    assert snapshots[-1]["positions"] == list(newest.positions)
+    assert desk.say("snapshots", after=newest.tick)["snapshots"] == []
+    assert desk.say("snapshots", after="yesterday")["ok"] is False
+
+
 def test_supply_line_and_process_can_fail(desk: Desk) -> None:
     assert desk.say("brown_out")["ok"]
     assert not desk.host.board.powered
