@@ -45,5 +45,13 @@ class LazyGroup(typer.core.TyperGroup):
             module = import_module(SUBCOMMANDS[args[0]][0])
             command = typer.main.get_command(module.app)
             command.name = args[0]
+            _without_rich(command)
             self.add_command(command, args[0])
         return super().resolve_command(ctx, args)
+
+
+def _without_rich(command: Any) -> None:
+    """Help of every level looks alike, and none of it loads rich."""
+    command.rich_markup_mode = None
+    for sub in getattr(command, "commands", {}).values():
+        _without_rich(sub)
