@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -67,17 +67,19 @@ class _Row:
     wanted: Floats | None = None
 
 
-def plot_trace(trace: Trace, path: Path) -> Path:
+def plot_trace(trace: Trace, path: Path, joints: tuple[int, ...] | None = None) -> Path:
     """Draw a trace into a PNG, SVG, PDF or self-contained HTML file, by the suffix of `path`. Returns `path`.
 
-    Raises TraceError for another suffix, a trace without samples, or a file that cannot be written.
+    `joints` are drawn; None draws those that the experiment moves, or all where there is no experiment.
+    Raises TraceError for another suffix, a joint that the trace has not, a trace without samples, or a file that
+    cannot be written.
     """
     path = Path(path)
     if path.suffix not in SUFFIXES:
         raise TraceError(f"{path}: plots are made as {', '.join(SUFFIXES)}")
     if len(trace) == 0:
         raise TraceError(f"trace {trace.record.trace_id}: has no samples to plot")
-    data = html_page(trace) if path.suffix == ".html" else picture(trace, path.suffix.removeprefix("."))
+    data = html_page(trace, joints) if path.suffix == ".html" else picture(trace, path.suffix.removeprefix("."), joints)
     try:
         path.write_bytes(data)
     except OSError as error:
@@ -85,32 +87,34 @@ def plot_trace(trace: Trace, path: Path) -> Path:
     return path
 
 
-def picture(trace: Trace, kind: str) -> bytes:
+def picture(trace: Trace, kind: str, joints: tuple[int, ...] | None = None) -> bytes:
     """The figure as `png`, `svg` or `pdf`."""
     import matplotlib as mpl
 
     with mpl.rc_context(_STYLE):
         stream = io.BytesIO()
         metadata = {"Date": None} if kind == "svg" else None
-        figure_of(trace).savefig(stream, format=kind, dpi=200, facecolor="white", metadata=metadata)
+        figure_of(trace, joints).savefig(stream, format=kind, dpi=200, facecolor="white", metadata=metadata)
     return stream.getvalue()
 
 
-def html_page(trace: Trace) -> bytes:
+def html_page(trace: Trace, joints: tuple[int, ...] | None = None) -> bytes:
     """One HTML file that needs nothing else: the figure, what the trace says about itself, and its events."""
     from jinja2 import Environment, PackageLoader
 
-    svg = picture(trace, "svg").decode()
+    svg = picture(trace, "svg", joints).decode()
     page = Environment(loader=PackageLoader("daq.traces"), autoescape=True).get_template("trace.html.j2")
     return page.render(
         title=_title(trace), svg=svg[svg.index("<svg") :], facts=_facts(trace), events=trace.events
     ).encode()
 
 
-def figure_of(trace: Trace) -> Figure:
+def figure_of(trace: Trace, joints: tuple[int, ...] | None = None) -> Figure:
     """The figure: a row a signal, a column a joint, marks where something happened."""
     from matplotlib.figure import Figure
 
+    recorded = trace.joints
+    trace = _only(trace, joints)
     rows = _rows(trace)
     columns = min(len(trace.joints), JOINTS_ABREAST)
     bands = math.ceil(len(trace.joints) / columns)
@@ -132,8 +136,19 @@ def figure_of(trace: Trace) -> Figure:
     _legend(axes[0][0], trace)
     figure.align_ylabels()
     figure.suptitle(_title(trace), x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
-    figure.supxlabel(_foot(trace), x=0.01, ha="left", fontsize=7.5, color=QUIET)
+    figure.supxlabel(_foot(trace, recorded), x=0.01, ha="left", fontsize=7.5, color=QUIET)
     return figure
+
+
+def _only(trace: Trace, joints: tuple[int, ...] | None) -> Trace:
+    """The trace with the joints to draw."""
+    if joints is None:
+        moved = trace.record.spec.joints if trace.record.spec else trace.joints
+        joints = tuple(joint for joint in trace.joints if joint in moved) or trace.joints
+    columns = [trace.column(joint) for joint in joints]
+    names = ("position", "set_point", "error", "drive", "velocity", "power_raw")
+    signals = {name: getattr(trace, name)[:, columns] for name in names if getattr(trace, name) is not None}
+    return replace(trace, joints=joints, **signals)
 
 
 def _rows(trace: Trace) -> list[_Row]:
@@ -249,10 +264,12 @@ def _title(trace: Trace) -> str:
     return title if record.outcome in ("complete", None) else f"{title}: {record.outcome}"
 
 
-def _foot(trace: Trace) -> str:
+def _foot(trace: Trace, recorded: tuple[int, ...]) -> str:
     record = trace.record
     created = record.created.strftime("%Y-%m-%d %H:%M:%S UTC")
-    return f"{created}   trace {record.trace_id}   {len(trace)} samples, {trace.missing} missing   {record.software}"
+    foot = f"{created}   trace {record.trace_id}   {len(trace)} samples, {trace.missing} missing   {record.software}"
+    held = [str(joint) for joint in recorded if joint not in trace.joints]
+    return f"{foot}   recorded too: joint {', '.join(held)}" if held else foot
 
 
 def _facts(trace: Trace) -> list[tuple[str, str]]:

@@ -1,5 +1,6 @@
 """Plots hold what the trace holds; how they look was judged by eye."""
 
+import dataclasses
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import TraceError
+from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.trace import Trace, TraceEvent
 from daq.traces.plot import figure_of, plot_trace
 from daq.traces.reader import read_trace
@@ -32,6 +34,19 @@ def test_a_figure_shows_every_signal_with_its_unit_and_every_joint(trace: Trace)
     values = np.asarray(measured.get_ydata(), dtype=float)
     np.testing.assert_allclose(values[np.isfinite(values)], np.degrees(trace.position[:, 1]))
     assert np.isnan(values).sum() == 1
+
+
+def test_only_the_joints_that_the_experiment_moves_are_drawn_unless_others_are_asked_for(trace: Trace) -> None:
+    spec = ExperimentSpec(joints=(1, 3))
+    held = dataclasses.replace(trace, record=trace.record.model_copy(update={"spec": spec}))
+
+    def drawn(joints: tuple[int, ...] | None) -> list[str]:
+        return [title for axis in figure_of(held, joints).axes if (title := axis.get_title("left"))]
+
+    assert drawn(None) == ["joint 1, waist", "joint 3, elbow"]
+    assert drawn((2,)) == ["joint 2, shoulder"]
+    with pytest.raises(TraceError, match="joint 5 is not in it"):
+        drawn((5,))
 
 
 def test_the_same_trace_gives_the_same_picture(trace: Trace, tmp_path: Path) -> None:
