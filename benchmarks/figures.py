@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Figure:
-    """One measured value. `met` is None where there is nothing to meet; `beside` is the floor or rival of the same run."""
+    """One measured value. `met` is None without a target; `beside` is its floor or rival in the same run."""
 
     name: str
     value: str

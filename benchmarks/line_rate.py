@@ -1,4 +1,4 @@
-"""What a 115200 baud line carries: the share that sampling needs, and how close round trips come to what it allows.
+"""What a 115200 baud line carries: the share that sampling needs, and how close round trips come to its limit.
 
     python -m benchmarks line_rate
 
@@ -130,13 +130,13 @@ def main() -> int:
     with Controller(Link(endpoint)) as controller:
         alone, _ = share_of_line(controller, endpoint.passed, periods, moving=False)
         both, busier = share_of_line(controller, endpoint.passed, periods, moving=True)
-        tick = controller.status().tick
+        kept = Sample(controller.status().tick - 1, mask_of(JOINTS))
         figures = [
             at_most("a sample of 3 joints every 20 ms", alone, SHARE_TARGET, "% of the line", "both directions added"),
             Figure("the same with 3 set points", f"{both:.3g} % of the line",
                    beside=f"both directions added; the busier one {busier:.3g} %"),
             trip_figure("status", controller, ReadStatus(), 11, repeats),
-            trip_figure("sample of 3 joints that is there", controller, Sample(tick - 1, mask_of(JOINTS)), 27, min(repeats, 200)),
+            trip_figure("sample of 3 joints that is there", controller, kept, 27, min(repeats, 200)),
             trip_figure("48 bytes of memory", controller, ReadBlock(controller.memory_map.base, 48), 48, repeats),
         ]  # fmt: skip
     with Controller.connect("mock://?pty=1") as controller:

@@ -9,28 +9,24 @@ Host and mock share one core. Beside it: the mock's board and plant alone, run i
 from __future__ import annotations
 
 import argparse
-import contextlib
 import cProfile
-import json
 import os
 import pstats
-import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.figures import Figure, at_least, show
 from benchmarks.mock_control import MockControl
+from benchmarks.mock_process import started_mock
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import TraceEvent
 from daq.driver import Controller
-from daq.runner import Consent, run_experiment
-from daq.runner.arm_control import ArmControl
+from daq.runner import ArmControl, Arrangement, Consent, Outside, run_experiment
 from mock_controller.device import build_device
 from mock_controller.options import Options
 
@@ -72,21 +68,6 @@ class Silent:
         """An event."""
 
 
-@contextlib.contextmanager
-def started_mock(profile: Path | None) -> Iterator[tuple[str, int, str]]:
-    """A mock in lock-step: its port URL, process number and control URL. It inherits this process's cores."""
-    profiler = [] if profile is None else ["-m", "cProfile", "-o", str(profile)]
-    command = [sys.executable, *profiler, "-m", "mock_controller", "--tcp", "127.0.0.1:0", "--lock-step", "--owned"]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        ready = json.loads(process.stdout.readline())
-        try:
-            yield f"{ready['url']}?lock_step=1", process.pid, ready["control"]
-        finally:
-            process.stdin.close()
-
-
 def processor_time(process: int) -> float:
     """CPU time (s) that a process has used so far."""
     return time.clock_gettime((~process << 3) | 2)  # Linux: the scheduler's clock of another process
@@ -96,18 +77,10 @@ def ramps(controller: Controller, repeats: int, folder: Path) -> None:
     """Complete default ramps, one after the other, each with a trace of its own."""
     machine = load_machine("ma2000")
     for _ in range(repeats):
-        result = run_experiment(
-            controller,
-            ArmControl(controller),
-            ExperimentSpec(),
-            machine,
-            machine.limits,
-            folder,
-            Silent(),
-            consent=Consent(),
-            ended=lambda: None,
-            interrupted=lambda: False,
+        run = Arrangement(
+            controller, ArmControl(controller), ExperimentSpec(), machine, machine.limits, folder, Silent(), Outside()
         )
+        result = run_experiment(run, Consent())
         if result.outcome != "complete":
             raise RuntimeError(f"a ramp ended {result.outcome}: {result.reason}")
 
@@ -116,14 +89,14 @@ def measure(repeats: int, profiles: tuple[Path, Path] | None = None) -> Cost:
     """Runs ramps against a mock of its own. `profiles`: where host and mock leave what cProfile saw."""
     host_profile, mock_profile = profiles or (None, None)
     with (
-        started_mock(mock_profile) as (url, process, control_url),
-        Controller.connect(url) as controller,
-        MockControl(control_url) as control,
+        started_mock("--tcp", "127.0.0.1:0", "--lock-step", profile=mock_profile) as mock,
+        Controller.connect(f"{mock.url}?lock_step=1") as controller,
+        MockControl(mock.control) as control,
         tempfile.TemporaryDirectory() as folder,
     ):
         ramps(controller, 1, Path(folder))
         begun_us = control.ask("state")["time_us"]
-        mock_s, host_s, wall_s = processor_time(process), time.process_time(), time.perf_counter()
+        mock_s, host_s, wall_s = processor_time(mock.number), time.process_time(), time.perf_counter()
         if host_profile is None:
             ramps(controller, repeats, Path(folder))
         else:
@@ -131,7 +104,7 @@ def measure(repeats: int, profiles: tuple[Path, Path] | None = None) -> Cost:
                 ramps(controller, repeats, Path(folder))
             profile.dump_stats(host_profile)
         wall_s = time.perf_counter() - wall_s
-        host_s, mock_s = time.process_time() - host_s, processor_time(process) - mock_s
+        host_s, mock_s = time.process_time() - host_s, processor_time(mock.number) - mock_s
         passed_us = control.ask("state")["time_us"] - begun_us
     return Cost(round(passed_us * 1e-6 / PERIOD_S), wall_s, host_s, mock_s)
 

@@ -1,6 +1,6 @@
 """Start-up of the command line: `daq --help`, beside a Python that does nothing.
 
-    python -m benchmarks startup
+python -m benchmarks startup
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from multiprocessing.connection import Connection
 
 from benchmarks.figures import Figure, at_most, quantile, show
 from benchmarks.mock_control import MockControl
-from daq.acquisition.guardian import EndCause, Guardian
+from daq.acquisition.guardian import Guardian
 from daq.acquisition.stop_socket import FOLDER_VARIABLE, StopAnswer, request_stop, stop_listener
 from daq.driver import Controller
 from daq.link import RequestRefusedError
@@ -66,7 +66,7 @@ def _host(url: str, parent: Connection) -> None:
     """The host process. Told "run", it runs until it is stopped; told a number, it stops itself after so many s."""
     with Controller.connect(url) as controller, stop_listener(ROBOT) as listener:
 
-        def freeze(_cause: EndCause) -> StopAnswer:
+        def freeze(_cause: str) -> StopAnswer:
             confirmation = controller.stop()
             return StopAnswer(robot=ROBOT, delivered=confirmation.sent, confirmed=confirmation.acknowledged)
 

@@ -1,0 +1,203 @@
+"""Minutes of recording in real time over a line that damages one frame in a hundred: is anything lost, or wrong?
+
+python -m benchmarks long_run [--minutes 10]
+
+A complete run as `daq run` makes it: the acquisition process, a pseudo-terminal at 115200 baud, three joints, a trace
+on disk. The mock loses 0.5 % of the frames and flips a bit in another 0.5 %, in both directions. Meanwhile its own
+record of every control period is fetched through the control port, which never touches the line. At the end the
+trace is opened from disk and compared, count by count, with that record; and the damage done with what both ends have
+noticed: every frame struck ends one attempt of the host, which shows as one time-out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import tempfile
+import threading
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.figures import Figure, quantile, show
+from benchmarks.mock_control import MockControl
+from benchmarks.mock_process import started_mock
+from daq.acquisition.messages import Finished, Job
+from daq.acquisition.parent import Acquisition
+from daq.contracts.experiment import ExperimentSpec, Sine
+from daq.contracts.machine import Machine, load_machine
+from daq.contracts.trace import Trace
+from daq.driver.tick_time import TickTime
+from daq.traces.reader import read_trace
+
+BAUD = 115200
+RATE = 0.005
+# A frame that is lost is not flipped too: every frame is struck once at most, and strikes can be counted one by one.
+FAULTS = ("--fault", f"drop:rate={RATE}", "--fault", f"flip:rate={RATE}")
+JOINTS = (1, 2, 3)
+SINE_S = 4.0
+FETCH_EVERY_S = 0.4
+"""The mock's ring keeps 1.28 s."""
+
+
+@dataclass
+class BoardRecord:
+    """The mock's own record of its control periods, fetched bit by bit while a run goes on."""
+
+    control: MockControl
+    periods: dict[int, dict[str, Any]] = field(default_factory=dict)
+    _over: threading.Event = field(default_factory=threading.Event)
+
+    def fetch_until_over(self) -> None:
+        """To be run by a thread of its own."""
+        last = 0
+        while True:
+            over = self._over.wait(FETCH_EVERY_S)
+            for snapshot in self.control.ask("snapshots", after=last)["snapshots"]:
+                last = snapshot["tick"]
+                self.periods[last] = snapshot
+            if over:
+                return
+
+    def over(self) -> None:
+        """Ends the fetching after one last time."""
+        self._over.set()
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What a run left on disk, and what the mock knows of it."""
+
+    trace: Trace
+    report: Finished
+    board: dict[int, dict[str, Any]]
+    counts: dict[str, Any]
+    clock: dict[str, Any]
+
+
+def record(minutes: float, folder: Path) -> Recorded:
+    """Makes the run. Raises RuntimeError when it did not complete."""
+    machine = load_machine("ma2000")
+    sine = Sine(amplitude=math.radians(6.0), period=SINE_S, cycles=60 * minutes / SINE_S)
+    spec = ExperimentSpec(trajectory=sine, joints=JOINTS, record=JOINTS, hold=0.5)
+    with started_mock("--pty", "--baud", str(BAUD), *FAULTS) as mock, MockControl(mock.control) as control:
+        board = BoardRecord(control)
+        fetching = threading.Thread(target=board.fetch_until_over)
+        fetching.start()
+        job = Job(url=f"{mock.url}?baud={BAUD}", machine=machine, limits=machine.limits, spec=spec, folder=folder)
+        with Acquisition(job) as acquisition:
+            *_, last = acquisition
+        board.over()
+        fetching.join()
+        counts, clock = control.ask("counts"), control.ask("state")["clock"]
+    match last:
+        case Finished():
+            return Recorded(read_trace(last.trace), last, board.periods, counts, clock)
+        case _:
+            raise RuntimeError(f"no run: {last}")
+
+
+def wrong_samples(trace: Trace, board: dict[int, dict[str, Any]], machine: Machine) -> tuple[int, int]:
+    """Samples that differ from the board's record in any count of any joint; samples that it has no record of."""
+    assert trace.tick is not None
+    assert trace.set_point is not None
+    assert trace.error is not None
+    assert trace.power_raw is not None
+    wrong = unknown = 0
+    for row, tick in enumerate(trace.tick.tolist()):
+        kept = board.get(tick)
+        if kept is None:
+            unknown += 1
+            continue
+        same = True
+        for column, joint in enumerate(trace.joints):
+            own = machine.calibration(joint)
+            there = (kept["set_points"], kept["positions"], kept["errors"], kept["powers"])
+            here = (
+                own.rad_to_posture(float(trace.set_point[row, column])),
+                round(own.rad_to_counts(float(trace.position[row, column]))),
+                round(float(trace.error[row, column]) / own.rad_per_count),
+                int(trace.power_raw[row, column]),
+            )
+            same = same and here == tuple(register[joint - 1] for register in there)
+        wrong += not same
+    return wrong, unknown
+
+
+def accuracy_figures(done: Recorded, machine: Machine) -> list[Figure]:
+    """Nothing lost, nothing wrong, all damage noticed."""
+    trace, counters = done.trace, done.report.counters
+    wrong, unknown = wrong_samples(trace, done.board, machine)
+    faults = done.counts["faults"]
+    struck = sum(sum(where.values()) for where in faults.values())
+    flips_in, flips_out = (faults.get("flip", {}).get(where, 0) for where in ("to_host", "to_controller"))
+    timeouts, damaged = round(counters["timeouts"]), round(counters["damaged"])
+    seen_by_board = done.counts["bridge"]["damaged"]
+    dropped = faults.get("drop", {}).get("to_controller", 0)
+    bridge = done.counts["bridge"]
+    frames = bridge["frames_received"] + bridge["damaged"] + dropped + bridge["frames_sent"]
+    return [
+        Figure("outcome", done.report.outcome, "complete", done.report.outcome == "complete", done.report.reason),
+        Figure("ticks lost", f"{trace.missing}", "0", trace.missing == 0, f"of {len(trace)}"),
+        Figure("wrong samples", f"{wrong}", "0", wrong == 0, "against the board's own record"),
+        Figure("samples the record lacks", f"{unknown}", "0", unknown == 0, "not compared"),
+        Figure("frames struck", f"{struck}", beside=f"{100 * struck / (frames or 1):.2f} % of {frames} frames"),
+        Figure("struck and not noticed", f"{max(0, struck - timeouts)}", "0", timeouts >= struck,
+               f"{timeouts} time-outs, of which {max(0, timeouts - struck)} for a late answer"),
+        Figure("flipped to the host, not found damaged", f"{max(0, flips_in - damaged)}", "0",
+               damaged >= flips_in, f"{damaged} pieces found damaged, {flips_in} flipped"),
+        Figure("flipped to the board, not found damaged", f"{max(0, flips_out - seen_by_board)}",
+               "0", seen_by_board >= flips_out,
+               f"{seen_by_board} pieces found damaged, {flips_out} flipped"),
+    ]  # fmt: skip
+
+
+def timing_figures(done: Recorded) -> list[Figure]:
+    """From a tick, by the mock's own clock, to the sample's arrival and to the time stamp estimated for the tick."""
+    trace = done.trace
+    assert trace.tick is not None
+    assert trace.host_time is not None
+    zero_us = done.clock["monotonic_us_at_zero"]
+    estimate = TickTime(trace.record.period or 0.02)
+    arrival, stamp = [], []
+    for tick, host_time in zip(trace.tick.tolist(), trace.host_time.tolist(), strict=True):
+        stamped = estimate.arrived(tick, host_time)
+        if tick in done.board:
+            true = (zero_us + done.board[tick]["time_us"]) * 1e-6
+            arrival.append(1e3 * (host_time - true))
+            stamp.append(1e3 * (stamped - true))
+    quickest, usual = min(arrival), float(np.median(stamp))
+    jitter = [value - quickest for value in arrival]
+    wander = [abs(value - usual) for value in stamp]
+
+    def three(values: list[float]) -> str:
+        return f"{quantile(values, 0.5):.2f} / {quantile(values, 0.99):.2f} / {max(values):.2f} ms"
+
+    return [
+        Figure("tick to arrival, jitter: p50 / p99 / max", three(jitter),
+               beside=f"the quickest {quickest:.2f} ms after its tick: 6.3 ms of the board, 3.1 ms of line"),
+        Figure("tick to time stamp, jitter: p50 / p99 / max", three(wander), beside=f"stamps are {usual:.2f} ms late"),
+        Figure("mock behind its clock by over 2 ms", f"{done.clock['late_ticks']} periods",
+               beside=f"worst {done.clock['worst_late_us'] / 1e3:.1f} ms"),
+    ]  # fmt: skip
+
+
+def main() -> int:
+    """The exit code: 1 when a target was missed."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks long_run", description=__doc__)
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--quick", action="store_true", help="half a minute")
+    given = parser.parse_args()
+    minutes = 0.5 if given.quick else given.minutes
+    with tempfile.TemporaryDirectory() as folder:
+        done = record(minutes, Path(folder))
+    figures = accuracy_figures(done, load_machine("ma2000")) + timing_figures(done)
+    title = f"{minutes:g} minutes at 50 Hz, 1 % of frames damaged"
+    return show(title, f"python -m benchmarks long_run --minutes {minutes:g}", figures)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,38 @@
+"""A mock controller as a process of its own, outside the host that is measured."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class RunningMock:
+    """Where a mock is reached: its port URL, its control port's URL, and its process number."""
+
+    url: str
+    control: str
+    number: int
+
+
+@contextlib.contextmanager
+def started_mock(*options: str, profile: Path | None = None) -> Iterator[RunningMock]:
+    """A mock with these options of its command line; it ends with the block. Inherits this process's cores.
+
+    profile: where cProfile leaves what it saw of the whole process
+    """
+    profiler = [] if profile is None else ["-m", "cProfile", "-o", str(profile)]
+    command = [sys.executable, *profiler, "-m", "mock_controller", *options, "--owned"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        ready = json.loads(process.stdout.readline())
+        try:
+            yield RunningMock(ready["url"], ready["control"], process.pid)
+        finally:
+            process.stdin.close()
