@@ -1,0 +1,57 @@
+"""Whitening: the filter undoes a known correlation, and never claims less noise than the sensor has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from model.fitting.whitening import autocovariance, fitted_whitener, white
+
+
+def autoregressive(seed: int, count: int, weights: tuple[float, ...], deviation: float) -> NDArray[np.float64]:
+    """Samples of x_k = Σ w_i x_{k−i} + e_k, started long before."""
+    rng = np.random.default_rng(seed)
+    x = np.zeros(count + 500)
+    for k in range(len(weights), len(x)):
+        x[k] = sum(w * x[k - i] for i, w in enumerate(weights, start=1)) + deviation * rng.normal()
+    return x[500:]
+
+
+def test_finds_the_weights_of_a_known_process() -> None:
+    runs = [autoregressive(seed, 4000, (0.9, -0.5), 2.0) for seed in range(3)]
+    whitener = fitted_whitener(runs, 8, floor=1e-6)
+    found = whitener.predictors[-1]
+    assert found[:2] == pytest.approx([0.9, -0.5], abs=0.05)
+    assert np.abs(found[2:]).max(initial=0.0) < 0.05
+    assert whitener.deviations[-1] == pytest.approx(2.0, rel=0.03)
+
+
+def test_whitened_signal_is_white_from_the_first_sample_on() -> None:
+    whitener = fitted_whitener([autoregressive(1, 20_000, (0.95,), 1.0)], 4, floor=1e-6)
+    fresh = np.array([whitener.whitened(autoregressive(100 + s, 30, (0.95,), 1.0)) for s in range(2000)])
+    assert fresh[:, 0].std() == pytest.approx(1.0, abs=0.08)
+    assert fresh[:, 5:].std() == pytest.approx(1.0, abs=0.03)
+    assert np.mean(fresh[:, 1:] * fresh[:, :-1]) == pytest.approx(0.0, abs=0.03)
+
+
+def test_filters_every_column_alike() -> None:
+    whitener = fitted_whitener([autoregressive(2, 4000, (0.7,), 1.0)], 4, floor=1e-6)
+    columns = np.random.default_rng(0).normal(size=(40, 3))
+    one_by_one = np.stack([whitener.whitened(c) for c in columns.T], axis=1)
+    np.testing.assert_allclose(whitener.whitened(columns), one_by_one, atol=1e-12)
+
+
+def test_an_arm_that_stands_still_does_not_count_as_measured_without_noise() -> None:
+    assert fitted_whitener([np.zeros(500)], 8, floor=0.3).deviations[-1] == 0.3
+    drift = np.linspace(-1e-3, 1e-3, 500)
+    assert fitted_whitener([100 * drift], 8, floor=0.3).deviations[-1] >= 0.3
+
+
+def test_runs_are_not_joined_across_a_gap() -> None:
+    runs = [np.ones(10), -np.ones(10)]
+    assert autocovariance(runs, 1)[1] == pytest.approx(18 / 20)
+
+
+def test_white_only_scales() -> None:
+    np.testing.assert_allclose(white(2.0).whitened(np.array([2.0, -4.0])), [1.0, -2.0])
