@@ -36,13 +36,16 @@ def check(context: typer.Context) -> None:
     """Check the configuration, the machine file and the memory map; one line says what is wrong."""
     from daq.config import load_settings
     from daq.config.robot_files import load_memory_map
+    from daq.safety import unchecked
+    from daq.transport import parse_port_url
 
     settings, path = load_settings(invocation(context).config_file)
     machine = settings.machine()
     memory_map = load_memory_map(settings.robot.memory_map)
-    unset = [name for name in ("floor_height", "reach") if getattr(machine.limits, name) is None]
+    parse_port_url(settings.port)
+    unset = unchecked(machine, machine.limits)
     print(f"configuration: {path or 'none, defaults'}")
     print(f"machine:       {machine.name}, {len(machine.joints)} joints ({machine.title})")
     print(f"memory map:    {memory_map.name}; {len(memory_map.assumed)} addresses are assumed")
-    print(f"limits:        {'all set' if not unset else 'not set, so not checked: ' + ', '.join(unset)}")
+    print(f"limits:        {'; '.join(unset) or 'all set'}")
     print(f"port:          {settings.robot.port or 'none: the mock is used'}")

@@ -9,8 +9,9 @@ from typing import Annotated, Any
 
 import platformdirs
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
-from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict, SettingsError
 
+from daq.config.limits import merged_limits
 from daq.contracts.errors import SpecError
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine, load_machine
@@ -30,7 +31,7 @@ class RobotSettings(BaseModel):
     port: str | None = None
     memory_map: Path | None = None
     limits: Limits | None = None
-    """Replaces the machine file's limits as a whole; None keeps them."""
+    """Each limit that is given here replaces the machine file's; the others stay. None keeps all."""
 
 
 class TraceSettings(BaseModel):
@@ -84,10 +85,7 @@ class Settings(BaseSettings):
         machine = load_machine(self.robot.machine)
         if self.robot.limits is None:
             return machine
-        if len(self.robot.limits.joints) not in (0, len(machine.joints)):
-            given = len(self.robot.limits.joints)
-            raise SpecError(f"robot.limits.joints has {given} entries; {machine.name} has {len(machine.joints)} joints")
-        return machine.model_copy(update={"limits": self.robot.limits})
+        return machine.model_copy(update={"limits": merged_limits(machine, self.robot.limits)})
 
 
 def config_files(explicit: Path | None = None) -> list[Path]:
@@ -126,13 +124,24 @@ def _parse(path: Path) -> Settings:
 def _validated(data: dict[str, Any], origin: str) -> Settings:
     try:
         return Settings(**data)
+    except SettingsError as error:
+        # An environment variable of a whole section must hold JSON; its name is in the error's text.
+        raise SpecError(f"environment: {error}; write single keys, such as DAQ_ROBOT__PORT") from error
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         message = first["msg"].removeprefix("Value error, ")
         if first["type"] == "extra_forbidden":
             message = f"no such key; allowed here: {', '.join(_keys_at(first['loc'][:-1]))}"
-        raise SpecError(f"configuration {origin}: {key} = {first['input']!r}: {message}") from error
+        where = _variable_of(first["loc"]) or f"configuration {origin}"
+        raise SpecError(f"{where}: {key} = {first['input']!r}: {message}") from error
+
+
+def _variable_of(where: tuple[int | str, ...]) -> str | None:
+    """The environment variable that a value came from, since that goes before the file; None where there is none."""
+    name = "DAQ_" + "__".join(str(part) for part in where).upper()
+    found = next((variable for variable in os.environ if variable.upper() == name), None)
+    return None if found is None else f"environment {found}"
 
 
 def _keys_at(where: tuple[int | str, ...]) -> list[str]:
