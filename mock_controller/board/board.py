@@ -16,7 +16,7 @@ from functools import partial
 
 from firmware_protocol.memory_map import JOINTS, MemoryMap
 from firmware_protocol.units import DAC_MAX, GAIN_MAX, POSTURE_UNITS, counts_to_posture, posture_to_counts
-from mock_controller.board.memory import SharedMemory, encoded
+from mock_controller.board.memory import SharedMemory
 from mock_controller.board.parameters import BoardParameters
 from mock_controller.board.pid import IntegerPid
 from mock_controller.board.sensor import PositionSensors
@@ -130,7 +130,7 @@ class Board:
                 limit = POSTURE_UNITS - 1
                 raise BoardError(f"joint {joint}: set point of {posture}: joints 1 to {JOINTS}, values 0 to {limit}")
         by_index = [(joint - 1, posture) for joint, posture in postures.items()]
-        self._write_pairs(encoded(self.memory.map["set_point"], by_index))
+        self._write_pairs(self.memory.encoded("set_point", by_index))
 
     def hold_memory(self, duration_us: int) -> None:
         """The host's side keeps the memory busy for `duration_us` from now: every fetch in that time is missed."""
@@ -152,7 +152,7 @@ class Board:
             return tuple(self.memory.values("set_point"))
         self._frozen = True
         postures = tuple(counts_to_posture(counts) for counts in self._measured)
-        self._write_pairs(encoded(self.memory.map["set_point"], enumerate(postures)), by_freeze=True)
+        self._write_pairs(self.memory.encoded("set_point", enumerate(postures)), by_freeze=True)
         return postures
 
     def release(self) -> None:
@@ -288,11 +288,11 @@ class Board:
         now = self._time_us
         self._advance_plant(now)
         self._volts = [scale * power for scale, power in zip(self._volts_per_count, results.powers, strict=True)]
-        registers = self.memory.map
+        encoded = self.memory.encoded
         self._published = [
-            *encoded(registers["position"], enumerate(results.positions)),
-            *encoded(registers["error"], enumerate(results.errors)),
-            *encoded(registers["power"], enumerate(results.powers)),
+            *encoded("position", enumerate(results.positions)),
+            *encoded("error", enumerate(results.errors)),
+            *encoded("power", enumerate(results.powers)),
         ]
         self._stored = 0
         self._publishing_since_us = now

@@ -11,6 +11,20 @@ class MemoryAddressError(ValueError):
     """An access outside the shared memory."""
 
 
+class _Column:
+    """One register of all joints, laid out for the controller, which reads and writes it in every period."""
+
+    __slots__ = ("high", "highest", "low", "lowest", "mask", "sign")
+
+    def __init__(self, register: Register) -> None:
+        self.low = register.low
+        self.high = register.high
+        self.mask = (1 << register.bits) - 1
+        self.sign = 1 << (register.bits - 1) if register.signed else 0
+        self.lowest = -self.sign
+        self.highest = self.lowest + self.mask
+
+
 class SharedMemory:
     """RAM between host and controller, laid out by a memory map."""
 
@@ -18,6 +32,7 @@ class SharedMemory:
         self.map = memory_map
         self._base = memory_map.base
         self._bytes = bytearray(memory_map.size)
+        self._columns = {name: _Column(register) for name, register in memory_map.registers.items()}
 
     def check(self, address: int, count: int) -> None:
         """Raises MemoryAddressError unless `count` bytes from `address` lie in the memory."""
@@ -41,29 +56,31 @@ class SharedMemory:
 
     def values(self, name: str) -> list[int]:
         """Values of a register, one a joint (or a single one)."""
-        register = self.map[name]
-        if register.high is None:
-            return [register.decode(self.get(low)) for low in register.low]
-        pairs = zip(register.low, register.high, strict=True)
-        return [register.decode(self.get(low), self.get(high)) for low, high in pairs]
+        column, data, base = self._columns[name], self._bytes, self._base
+        mask, sign = column.mask, column.sign
+        if column.high is None:
+            raw = [data[low - base] & mask for low in column.low]
+        else:
+            pairs = zip(column.low, column.high, strict=True)
+            raw = [(data[low - base] | data[high - base] << 8) & mask for low, high in pairs]
+        return [(value ^ sign) - sign for value in raw] if sign else raw
 
     def store(self, name: str, values: Sequence[int]) -> None:
         """Stores all values of a register at once."""
-        for address, value in encoded(self.map[name], enumerate(values)):
+        for address, value in self.encoded(name, enumerate(values)):
             self.put(address, value)
 
+    def encoded(self, name: str, values: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+        """(address, byte) pairs for (index, value) pairs, low byte before high: the order in which they are stored.
 
-def encoded(register: Register, values: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
-    """(address, byte) pairs for (index, value) pairs, low byte before high: the order in which they are stored.
-
-    A value beyond the register's range becomes the nearest that fits.
-    """
-    lowest = -(1 << (register.bits - 1)) if register.signed else 0
-    highest = lowest + (1 << register.bits) - 1
-    pairs: list[tuple[int, int]] = []
-    for index, value in values:
-        low, high = register.encode(min(max(value, lowest), highest))
-        pairs.append((register.low[index], low))
-        if register.high is not None:
-            pairs.append((register.high[index], high))
-    return pairs
+        A value beyond the register's range becomes the nearest that fits.
+        """
+        column = self._columns[name]
+        low, high, lowest, highest = column.low, column.high, column.lowest, column.highest
+        pairs: list[tuple[int, int]] = []
+        for index, value in values:
+            fits = lowest if value < lowest else highest if value > highest else value
+            pairs.append((low[index], fits & 0xFF))
+            if high is not None:
+                pairs.append((high[index], fits >> 8 & 0xFF))
+        return pairs

@@ -69,6 +69,8 @@ class Plant:
         self._v = self._data.qvel
         self._applied = self._data.qfrc_applied
         self._coulomb = CoulombLevel(parameters)
+        self._presliding_rate = parameters.friction.presliding / self._step_s
+        """Joint rate (rad/s) that is the presliding displacement a step."""
         self._with_current = [i for i, joint in enumerate(parameters.joints) if joint.inductance > 0.0]
         self._half_damping = [0.0 if i in self._rotors else 0.5 * drive.damping for i, drive in enumerate(self._drives)]
         self._voltage_effects: list[ChangesDriveVoltage] = of_kind(self._modifications, ChangesDriveVoltage)
@@ -181,8 +183,10 @@ class Plant:
         v = self._v.tolist()
         bristle = self._deflect(v)
         level = self._coulomb.at(self._q.tolist())
-        half = self._half_damping
-        self._applied[:] = [pushed[i] - half[i] * v[i] - level[i] * bristle[i] for i in range(JOINTS)]
+        self._applied[:] = [
+            push - half * rate - most * deflection
+            for push, half, rate, most, deflection in zip(pushed, self._half_damping, v, level, bristle, strict=True)
+        ]
         mujoco.mj_step(self._model, self._data)
         self._steps += 1
 
@@ -221,9 +225,7 @@ class Plant:
 
     def _deflect(self, v: list[float]) -> list[float]:
         """Bristles after the displacement h·v that brought each joint to where it is now."""
-        h = self._step_s
-        presliding = self.parameters.friction.presliding
-        self._bristle = [deflect(z, h * rate, presliding) for z, rate in zip(self._bristle, v, strict=True)]
+        self._bristle = deflect(self._bristle, v, self._presliding_rate)
         return self._bristle
 
     def _advance_currents(self, speed_before: list[float]) -> None:

@@ -150,8 +150,9 @@ def test_friction_levels_follow_the_published_projections() -> None:
 @given(st.floats(-1, 1), st.lists(st.floats(-0.01, 0.01), max_size=20))
 def test_bristle_never_exceeds_its_level_and_ignores_how_motion_is_cut_in_steps(z: float, path: list[float]) -> None:
     for displacement in path:
-        halves = deflect(deflect(z, displacement / 2, 5e-4), displacement / 2, 5e-4)
-        z = deflect(z, displacement, 5e-4)
+        half = [displacement / 2]
+        (halves,) = deflect(deflect([z], half, 5e-4), half, 5e-4)
+        (z,) = deflect([z], [displacement], 5e-4)
         assert -1 <= z <= 1
         assert halves == pytest.approx(z, abs=1e-9)
 
