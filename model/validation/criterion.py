@@ -1,0 +1,94 @@
+"""The criterion of fidelity (4.63, 4.88 to 4.93): σ, λ² and their sum. Pure arithmetic and its typed result."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import BaseModel, ConfigDict
+
+from daq.contracts.errors import SpecError
+from model.validation.expected_deviation import Basis, Convention
+
+DAMPING_RATIO = 0.5
+"""ζ of the associate system (section 7.2.2)."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ParameterDistortion(_Part):
+    """What one parameter alone would have to do.
+
+    `change_down` and `change_up` (magnitudes, in `unit`) double the total mean squared error; None where no change
+    within the bounds does. `required` is σ, the standard deviation that would explain the residual: None is a very
+    large one, an insensitive parameter. `expected` is τ′, `contribution` is λ² = τ′²/σ².
+    """
+
+    name: str
+    unit: str
+    value: float
+    change_down: float | None
+    change_up: float | None
+    required: float | None
+    expected: float
+    basis: Basis
+    contribution: float
+
+    @property
+    def insensitive(self) -> bool:
+        """Whether no change doubles the error."""
+        return self.required is None
+
+
+class Curve(_Part):
+    """Mean squared error (rad², None where a run diverged) against one parameter's value, the others held."""
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+    errors: tuple[float | None, ...]
+
+
+class Fidelity(_Part):
+    """The transfer-function form of the distortion method for one model and its traces.
+
+    `outputs` are the joints whose errors count, `error_by_joint` their mean squared errors (rad²), `error` the sum.
+    The model explains the record when `sum_of_contributions` (Σλ²) is at least 1.
+    """
+
+    model: str
+    traces: tuple[str, ...]
+    outputs: tuple[int, ...]
+    convention: Convention
+    damping_ratio: float
+    error: float
+    error_by_joint: tuple[float, ...]
+    parameters: tuple[ParameterDistortion, ...]
+    sum_of_contributions: float
+    curves: tuple[Curve, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def explains(self) -> bool:
+        """Whether Σλ² ≥ 1 (4.93)."""
+        return self.sum_of_contributions >= 1.0
+
+    def parameter(self, name: str) -> ParameterDistortion:
+        """The parameter of that name. Raises KeyError."""
+        return {p.name: p for p in self.parameters}[name]
+
+
+def required_deviation(doubling_change: float, damping_ratio: float = DAMPING_RATIO) -> float:
+    """σ from α_d: σ² = 4ζ(ζ+1)/(2ζ+1) · α_d², that is 1.5 α_d² at ζ = 0.5 (4.63, 4.88).
+
+    Raises SpecError for a damping ratio that is not positive.
+    """
+    if not (math.isfinite(damping_ratio) and damping_ratio > 0):
+        raise SpecError(f"damping ratio {damping_ratio}: must be positive")
+    return doubling_change * math.sqrt(4 * damping_ratio * (damping_ratio + 1) / (2 * damping_ratio + 1))
+
+
+def contribution(required: float | None, expected: float) -> float:
+    """λ² = τ′²/σ² (4.92); none for a parameter that is insensitive."""
+    return 0.0 if required is None else (expected / required) ** 2

@@ -1,0 +1,148 @@
+"""The changes of single parameters that double an error: 2p root searches in step, so that runs can be batched."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError
+from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
+
+Floats = NDArray[np.float64]
+
+Errors = Callable[[Floats], Floats]
+"""Mean squared errors (m,) of parameter sets (m, p); NaN or inf where a run diverged."""
+
+GROWTH = 2.0
+"""Factor by which a search widens until the error has doubled."""
+TOLERANCE = 1e-3
+"""Relative accuracy of a doubling change."""
+LONGEST_SEARCH = 60
+"""Rounds, widening included."""
+
+
+@dataclass
+class Search:
+    """One parameter in one direction; changes are magnitudes.
+
+    `inside` is the largest change known not to double the error, `outside` the smallest known to; their levels are
+    √(E/E₀ − 1) − 1, which is linear in the change where E is a parabola. `slope` is E/E₀ near zero change.
+    """
+
+    parameter: int
+    sign: int
+    limit: float
+    trial: float
+    inside: float = 0.0
+    outside: float | None = None
+    inside_level: float = -1.0
+    outside_level: float = math.inf
+    lowest: float = 1.0
+    done: bool = False
+    last_sides: list[bool] = field(default_factory=list)
+
+    @property
+    def change(self) -> float | None:
+        """The change that doubles the error; None when none within the limit does."""
+        return self.outside
+
+    def take(self, ratio: float) -> None:
+        """The error ratio E/E₀ at `trial`; chooses the next trial."""
+        level = math.inf if not math.isfinite(ratio) else math.copysign(math.sqrt(abs(ratio - 1)), ratio - 1) - 1
+        if math.isfinite(ratio):
+            self.lowest = min(self.lowest, ratio)
+        beyond = level >= 0
+        if beyond:
+            self.outside, self.outside_level = self.trial, level
+        else:
+            self.inside, self.inside_level = self.trial, level
+        self.last_sides.append(beyond)
+        if self.outside is None:
+            self.done = self.trial >= self.limit
+            self.trial = min(self.limit, GROWTH * self.trial)
+            return
+        self.done = self.outside - self.inside <= TOLERANCE * self.outside
+        self.trial = self._between()
+
+    def _between(self) -> float:
+        """False position, or the middle after the same end moved twice."""
+        assert self.outside is not None
+        width = self.outside - self.inside
+        stuck = len(self.last_sides) >= 2 and self.last_sides[-1] == self.last_sides[-2]
+        if stuck or not math.isfinite(self.outside_level):
+            self.last_sides.clear()
+            return self.inside + 0.5 * width
+        share = -self.inside_level / (self.outside_level - self.inside_level)
+        # a little beyond the estimate, so that the bracket closes from both ends
+        share += 0.25 * TOLERANCE * (1 if self.outside_level > -self.inside_level else -1)
+        return self.inside + width * min(0.999, max(0.001, share))
+
+
+@dataclass(frozen=True)
+class Doubling:
+    """Changes (magnitudes) that double the error downwards and upwards; None where nothing within the bounds does.
+
+    `lowest` is the smallest E/E₀ met on the way: clearly below one means that the point was no minimum.
+    """
+
+    down: float | None
+    up: float | None
+    lowest: float
+
+    @property
+    def mean(self) -> float | None:
+        """α_d: the mean of both changes (4.63), the only one where the other does not exist, or None."""
+        known = [c for c in (self.down, self.up) if c is not None]
+        return sum(known) / len(known) if known else None
+
+
+def doubling_changes(
+    errors: Errors, best: Floats, low: Floats, high: Floats, first: Floats,
+    progress: Progress = silent, cancel: Cancel | None = None,
+) -> tuple[float, list[Doubling]]:  # fmt: skip
+    """Error at `best`, and for each of its p parameters the changes that double it.
+
+    Args:
+        errors: of many parameter sets at once.
+        best: (p,) the fitted parameters. low, high: (p,) finite bounds, within which changes are sought.
+        first: (p,) positive changes to begin with; any size will do, a good guess saves runs.
+
+    Raises:
+        SpecError: for bounds that do not hold `best`, or an error at it that is not positive and finite.
+        CancelledError: when cancelled.
+    """
+    cancel = cancel or Never()
+    if not ((low <= best) & (best <= high) & np.isfinite(low) & np.isfinite(high)).all():
+        raise SpecError("the parameters must lie within finite bounds")
+    least = float(errors(best[None])[0])
+    if not (math.isfinite(least) and least > 0):
+        raise SpecError(f"the model's mean squared error is {least}; a positive number is needed to double it")
+    searches = [
+        Search(p, sign, room, min(float(first[p]), room))
+        for p in range(len(best))
+        for sign, room in ((-1, float(best[p] - low[p])), (1, float(high[p] - best[p])))
+        if room > 0
+    ]
+    for round_ in range(LONGEST_SEARCH):
+        open_ = [s for s in searches if not s.done]
+        if not open_:
+            break
+        if cancel.is_set():
+            raise CancelledError
+        progress(1 - len(open_) / len(searches), f"doubling the error: round {round_ + 1}, {len(open_)} searches open")
+        points = np.tile(best, (len(open_), 1))
+        for row, search in zip(points, open_, strict=True):
+            row[search.parameter] += search.sign * search.trial
+        for search, error in zip(open_, errors(points), strict=True):
+            search.take(float(error) / least)
+    progress(1.0, "doubling the error: done")
+    return least, [_doubling([s for s in searches if s.parameter == p]) for p in range(len(best))]
+
+
+def _doubling(searches: list[Search]) -> Doubling:
+    sides = {s.sign: s.change for s in searches}
+    return Doubling(sides.get(-1), sides.get(1), min((s.lowest for s in searches), default=1.0))

@@ -1,0 +1,61 @@
+"""How far a parameter may be expected to lie from its value (τ′ of section 7.2.2)."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from daq.contracts.errors import SpecError
+from model.machine_model.parameter import Parameter
+
+LENGTH_SHARE = 0.03
+"""Expected standard deviation of a length or radius, as a share of its value."""
+MASS_SHARE = 0.10
+"""The same of a mass."""
+
+Convention = Literal["source", "three_sigma"]
+"""Gaussian parameters: `source` is τ′ = â/(3√2), with which the published sums come out; `three_sigma` is â/3."""
+
+Basis = Literal["length", "mass", "gaussian", "stated"]
+"""Where τ′ comes from; `stated` is the deviation written in the machine file or the effect."""
+
+
+def gaussian_share(convention: Convention) -> float:
+    """τ′/â of a parameter that must be positive: zero lies three standard deviations away.
+
+    The source takes the three as the argument of erf instead of the normal density's, hence its √2.
+    """
+    return 1 / (3 * math.sqrt(2)) if convention == "source" else 1 / 3
+
+
+def deviation_share(basis: Basis, convention: Convention) -> float:
+    """τ′/â of a length, a mass or a Gaussian parameter."""
+    return {"length": LENGTH_SHARE, "mass": MASS_SHARE}.get(basis, gaussian_share(convention))
+
+
+def basis_of(parameter: Parameter) -> Basis:
+    """Which rule gives a model parameter's expected deviation."""
+    last = parameter.name.split(".")[-1]
+    if parameter.effect is None and parameter.unit == "kg":
+        return "mass"
+    if parameter.effect is None and parameter.unit == "m" and last in ("length", "radius", "offset"):
+        return "length"
+    if parameter.value > 0 and parameter.low >= 0:
+        return "gaussian"
+    return "stated"
+
+
+def expected_deviation(parameter: Parameter, convention: Convention) -> tuple[float, Basis]:
+    """τ′ of a model parameter and the rule that gives it.
+
+    Raises:
+        SpecError: for a parameter that may be zero or negative and states no deviation of its own.
+    """
+    basis = basis_of(parameter)
+    if basis != "stated":
+        return abs(parameter.value) * deviation_share(basis, convention), basis
+    if parameter.deviation is None or not parameter.deviation > 0:
+        raise SpecError(
+            f"{parameter.name}: no expected deviation: its value is {parameter.value} {parameter.unit} and none is stated"
+        )
+    return parameter.deviation, basis
