@@ -161,3 +161,35 @@ def from_file(
     from daq.cli.spec_file import read_spec
 
     _carry_out(context, read_spec(file), {"folder": folder, "dry_run": dry_run, "yes": yes, "json": json})
+
+
+@app.command("preset")
+def by_name(
+    context: typer.Context,
+    name: Annotated[str, typer.Argument(help="Name of a preset; none lists them.")] = "",
+    folder: FolderOption = None,
+    dry_run: DryRunOption = False,
+    yes: YesOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Run an experiment that has a name, such as `diagnostic`; without a name, list them."""
+    from daq.trajectories.presets import PRESETS, preset
+
+    if not name:
+        for known, one in PRESETS.items():
+            print(f"{known:14s} {one.description}")
+        return
+    values = {"folder": folder, "dry_run": dry_run, "yes": yes, "json": json}
+    _carry_out(context, preset(name).spec, values)
+
+
+@app.command()
+def diagnostic(
+    context: typer.Context,
+    folder: FolderOption = None,
+    dry_run: DryRunOption = False,
+    yes: YesOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Run the set of about 55 s that tells hidden effects apart (the preset of that name)."""
+    by_name(context, "diagnostic", folder, dry_run, yes, json)
