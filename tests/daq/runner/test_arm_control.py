@@ -1,0 +1,111 @@
+"""A stop wins, in whatever moment it comes. The controller here only writes down what it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import pytest
+
+from daq.driver import Controller, StopConfirmation
+from daq.runner import ArmControl, StoppedError
+from daq.runner.arm_control import told
+from daq.safety import Event, State
+
+
+class Written:
+    """What went to the line, in order."""
+
+    def __init__(self) -> None:
+        self.requests: list[str] = []
+        self.during_release: Callable[[], Any] = lambda: None
+        self.answer = StopConfirmation(sent=True, acknowledged=True, tick=7)
+
+    def stop(self) -> StopConfirmation:
+        self.requests.append("stop")
+        return self.answer
+
+    def release(self) -> None:
+        self.requests.append("release")
+        self.during_release()
+
+
+def make() -> tuple[ArmControl, Written]:
+    written = Written()
+    return ArmControl(cast(Controller, written)), written
+
+
+def test_a_stop_while_the_release_is_on_its_way_is_not_undone_by_it() -> None:
+    control, written = make()
+    written.during_release = lambda: control.stop("now")
+    with pytest.raises(StoppedError, match="now"):
+        control.handle(Event.ARM)
+    assert written.requests == ["release", "stop", "stop"]
+
+
+@pytest.mark.parametrize("step", [Event.ARM, Event.START, Event.FINISHED, Event.DISARM])
+def test_after_a_stop_no_step_of_a_run_is_taken(step: Event) -> None:
+    control, written = make()
+    for event in (Event.ARM, Event.START):
+        control.handle(event)
+    control.stop("now")
+    written.requests.clear()
+    with pytest.raises(StoppedError, match="now"):
+        control.handle(step)
+    assert written.requests == []
+    assert not control.may_send
+
+
+def test_only_a_reset_ends_a_halt() -> None:
+    control, _ = make()
+    control.stop("now")
+    control.handle(Event.RESET)
+    assert control.halted is None
+    control.handle(Event.ARM)
+    assert control.arm.state is State.ARMED
+
+
+def test_the_first_cause_is_kept() -> None:
+    control, _ = make()
+    control.stop("first")
+    control.stop("second")
+    assert control.halted == "first"
+
+
+def test_an_error_freezes_before_anything_else_and_once_is_enough() -> None:
+    control, written = make()
+
+    def fail() -> None:
+        with control.frozen_on_error(), control.frozen_on_error():
+            raise RuntimeError("a bug")
+
+    with pytest.raises(RuntimeError):
+        fail()
+    assert written.requests == ["stop"]
+
+
+def test_a_freeze_that_was_not_confirmed_is_tried_again() -> None:
+    control, written = make()
+    written.answer = StopConfirmation(sent=True, acknowledged=False, problem="silence")
+
+    def fail() -> None:
+        with control.frozen_on_error(), control.frozen_on_error():
+            raise RuntimeError("a bug")
+
+    with pytest.raises(RuntimeError):
+        fail()
+    assert written.requests == ["stop", "stop"]
+
+
+@pytest.mark.parametrize(
+    ("confirmation", "words"),
+    [
+        (StopConfirmation(sent=True, acknowledged=True, tick=7), "confirmed: set points are frozen since tick 7"),
+        (StopConfirmation(sent=True, acknowledged=False, problem="silence"), "sent but NOT CONFIRMED (silence)"),
+        (StopConfirmation(sent=False, acknowledged=False, problem="no port"), "could NOT BE DELIVERED (no port)"),
+    ],
+    ids=["confirmed", "sent", "not sent"],
+)
+def test_what_is_said_of_a_stop_is_what_is_known(confirmation: StopConfirmation, words: str) -> None:
+    assert words in told(confirmation)
+    assert ("emergency stop" in told(confirmation)) == (not confirmation.acknowledged)

@@ -1,0 +1,29 @@
+"""Gains of an experiment: set before it moves, put back after it, left alone on an arm that has been stopped."""
+
+from __future__ import annotations
+
+from daq.traces.reader import read_trace
+from tests.daq.runner.rig import SHORT, Rig
+
+STIFF = SHORT.model_copy(update={"gains": {1: (4, 0, 0), 2: (2, 0, 0)}})
+"""Joint 2 has these gains already."""
+
+
+def test_gains_hold_for_the_run_and_are_put_back_after_it(arm: Rig) -> None:
+    before = arm.ask("state")["gains"]
+    trace = read_trace(arm.run(STIFF).trace)
+    assert trace.record.gains is not None
+    assert trace.record.gains[1] == (4, 0, 0)
+    assert [event.message for event in trace.events if event.kind == "gains"] == [
+        "joint 1: gains 4/0/0 for this run, 2/0/0 before"
+    ]
+    assert arm.ask("state")["gains"] == before
+
+
+def test_after_a_stop_the_gains_stay_and_the_trace_says_so(arm: Rig) -> None:
+    arm.ears.at_sample[5] = arm.stop_as_the_guardian_does
+    trace = read_trace(arm.run(STIFF).trace)
+    assert [event.message for event in trace.events if event.kind == "gains"][1:] == [
+        "joint 1: gains stay at 4/0/0, they were 2/0/0 before the run"
+    ]
+    assert arm.ask("state")["gains"][0] == [4, 0, 0]

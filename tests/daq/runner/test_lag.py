@@ -1,0 +1,37 @@
+"""On samples that are too old nothing is sent, and not for ever."""
+
+from __future__ import annotations
+
+from daq.runner.lag import LONGEST_BEHIND, OLDEST_TO_ACT_ON, Lag
+
+PERIOD = 0.02
+
+
+def test_a_sample_in_time_holds_nothing() -> None:
+    verdict = Lag(PERIOD).check(1, OLDEST_TO_ACT_ON)
+    assert (verdict.hold, verdict.trips, verdict.findings) == (False, (), ())
+
+
+def test_an_old_sample_holds_the_set_points_and_is_told_once() -> None:
+    lag = Lag(PERIOD)
+    first, second = lag.check(1, 0.08), lag.check(2, 0.07)
+    assert (first.hold, second.hold) == (True, True)
+    assert [finding.kind for finding in (*first.findings, *second.findings)] == ["pause"]
+    assert "80 ms late" in first.findings[0].message
+
+
+def test_set_points_go_on_when_samples_are_fresh_again() -> None:
+    lag = Lag(PERIOD)
+    lag.check(1, 0.08)
+    verdict = lag.check(4, 0.0)
+    assert not verdict.hold
+    assert [finding.kind for finding in verdict.findings] == ["resume"]
+    assert "0.06 s" in verdict.findings[0].message
+
+
+def test_samples_that_stay_old_end_the_run() -> None:
+    lag = Lag(PERIOD)
+    last = 1 + round(LONGEST_BEHIND / PERIOD)
+    trips = [lag.check(tick, 0.1).trips for tick in range(1, last + 2)]
+    assert trips[:-1] == [()] * last
+    assert "line too slow" in trips[-1][0]

@@ -1,0 +1,283 @@
+"""How runs end, and what each ending leaves: on the board, in the trace, in what is told."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq.contracts.experiment import ExperimentSpec, Pause
+from daq.runner import RunFaultError, StoppedError
+from daq.traces.reader import read_trace
+from daq.traces.verify import verify
+from tests.daq.runner.rig import LONG_RAMP, SHORT, Rig, rig
+
+AFTERMATH_PERIODS = 50
+COUNT = 2 * math.pi / 4096
+"""rad a count of the major axes."""
+
+
+@pytest.mark.parametrize("options", ["seed=5", "seed=5&no_sample=1"], ids=["SAMPLE", "double read"])
+def test_a_complete_run_ends_where_it_was_to_end(tmp_path: Path, options: str) -> None:
+    with rig(tmp_path, options) as arm:
+        result = arm.run()
+        state = arm.ask("state")
+    trace = read_trace(result.trace)
+    assert (result.outcome, result.reason, result.missing) == ("complete", "", 0)
+    assert not state["frozen"]
+    assert len(trace) == result.samples
+    assert trace.set_point is not None
+    moved = np.degrees(trace.set_point[-1] - trace.set_point[0])
+    assert moved[:3] == pytest.approx([5.4] * 3, abs=0.3)
+    assert moved[3:] == pytest.approx([0.0] * 3, abs=0.3)
+    assert np.abs(trace.position[-1, :3] - trace.set_point[-1, :3]).max() < 40 * COUNT
+
+
+def test_the_trace_of_a_complete_run_says_everything_about_it(arm: Rig, tmp_path: Path) -> None:
+    spec = SHORT.model_copy(update={"operator": "A. Nyone", "notes": "warm", "name": "short"})
+    result = arm.run(spec)
+    trace = read_trace(result.trace)
+    record = trace.record
+    assert (record.outcome, record.source, record.operator, record.notes) == ("complete", "mock", "A. Nyone", "warm")
+    assert record.spec == spec
+    assert record.machine == arm.machine
+    assert record.gains == dict.fromkeys(range(1, 7), (2, 0, 0))
+    assert record.period == 0.02
+    assert record.memory_map == arm.controller.memory_map.model_dump(mode="json")
+    assert record.counters == result.counters
+    assert {"requests", "retries", "torn", "missed_set_points", "missing_samples"} <= set(record.counters)
+    assert trace.joints == (1, 2, 3, 4, 5, 6)
+    assert [event.kind for event in trace.events] == ["start", "ramp_start", "ramp_end", "end"]
+    assert trace.tick is not None
+    assert (np.diff(trace.tick) == 1).all()
+    assert verify(result.trace).trustworthy
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_a_stop_in_the_middle_freezes_the_arm_and_a_second_more_is_recorded(arm: Rig) -> None:
+    arm.ears.at_sample[12] = arm.stop_as_the_guardian_does
+    result = arm.run(LONG_RAMP)
+    state = arm.ask("state")
+    with pytest.raises(StoppedError, match="stopped from another terminal"):
+        arm.run()
+    trace = read_trace(result.trace)
+    assert (result.outcome, trace.record.outcome) == ("stopped", "stopped")
+    assert result.reason == "stopped from another terminal"
+    assert state["frozen"]
+    assert AFTERMATH_PERIODS <= len(trace) - 12 <= AFTERMATH_PERIODS + 2
+    assert trace.set_point is not None
+    assert (trace.set_point[13:] == trace.set_point[13]).all()
+    assert [event.message for event in trace.events if event.kind == "note"] == [
+        f"the board confirmed: set points are frozen since tick {state['stop']['frozen_tick']}"
+    ]
+
+
+def test_a_stop_by_another_host_is_noticed_on_the_board(arm: Rig) -> None:
+    arm.ears.at_sample[12] = arm.controller.stop
+    result = arm.run()
+    assert result.outcome == "stopped"
+    assert "has been stopped" in result.reason or "stopped on the board" in result.reason
+
+
+def test_a_stop_on_the_way_to_the_start_leaves_a_frozen_arm_and_no_trace(arm: Rig, tmp_path: Path) -> None:
+    far = SHORT.model_copy(update={"start": {1: math.radians(200)}})
+    arm.ears.at_event["note"] = arm.stop_as_the_guardian_does  # "slow move starts"
+    with pytest.raises(StoppedError, match=r"move to the start.*another terminal.*nothing was recorded"):
+        arm.run(far)
+    state = arm.ask("state")
+    assert state["frozen"]
+    assert math.degrees(state["angles_rad"][0]) == pytest.approx(180, abs=1)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_stop_before_the_run_lets_nothing_begin(arm: Rig) -> None:
+    arm.stop_as_the_guardian_does()
+    before = arm.at_rest
+    with pytest.raises(StoppedError):
+        arm.run()
+    assert arm.at_rest == before
+    assert before["frozen"]
+
+
+def test_a_stop_in_the_moment_of_the_end_is_a_stop(arm: Rig) -> None:
+    arm.ears.at_progress = lambda fraction: arm.control.stop("just now") if fraction == 1.0 else None
+    result = arm.run()
+    assert arm.ask("state")["frozen"]
+    assert (result.outcome, result.reason) == ("stopped", "the arm has been stopped: just now")
+
+
+def test_the_loss_of_the_parent_ends_the_run_as_interrupted(arm: Rig) -> None:
+    def lose_parent() -> None:
+        arm.orphaned = True
+        arm.stop_as_the_guardian_does()
+
+    arm.ears.at_sample[12] = lose_parent
+    result = arm.run()
+    assert arm.ask("state")["frozen"]
+    assert result.outcome == read_trace(result.trace).record.outcome == "interrupted"
+    assert result.samples >= 12 + AFTERMATH_PERIODS
+
+
+def test_set_points_wait_for_a_joint_that_stalls_and_the_run_ends_in_a_fault(arm: Rig) -> None:
+    arm.ears.at_event["ramp_start"] = lambda: arm.ask("fault_on", fault="stalled_joint:joint=2")
+    result = arm.run(LONG_RAMP)
+    assert arm.ask("state")["frozen"]
+    trace = read_trace(result.trace)
+    kinds = [event.kind for event in trace.events]
+    assert (result.outcome, trace.record.outcome) == ("fault", "fault")
+    assert "joint 2" in result.reason
+    assert kinds.index("pause") < kinds.index("fault")
+    assert trace.set_point is not None
+    ahead = np.abs(trace.set_point - trace.position)[:, 1].max() / arm.machine.calibration(2).rad_per_count
+    assert 100 < ahead <= 127 + 1, "no set point is further from the arm than the following-error limit"
+    paused = [event.tick for event in trace.events if event.kind in ("pause", "fault") and event.tick is not None]
+    assert 0.5 <= (paused[1] - paused[0]) * 0.02 <= 0.6
+
+
+def test_a_joint_that_comes_free_again_goes_on_to_the_end(arm: Rig) -> None:
+    arm.ears.at_event["ramp_start"] = lambda: arm.ask("fault_on", fault="stalled_joint:joint=2")
+    arm.ears.at_event["pause"] = lambda: arm.ask("fault_off", fault="stalled_joint")
+    result = arm.run(LONG_RAMP)
+    assert result.outcome == "complete"
+    assert arm.kinds.index("pause") < arm.kinds.index("resume") < arm.kinds.index("ramp_end")
+
+
+def test_a_lost_link_keeps_what_was_recorded_and_says_that_the_stop_did_not_arrive(arm: Rig) -> None:
+    arm.ears.at_sample[20] = lambda: arm.ask("disconnect")
+    result = arm.run()
+    trace = read_trace(result.trace)
+    state = arm.ask("state")
+    arm.ask("reconnect")
+    assert (result.outcome, trace.record.outcome) == ("interrupted", "interrupted")
+    assert 20 <= len(trace) <= 22
+    assert "NOT" in result.reason
+    assert "emergency stop" in result.reason
+    assert [event.kind for event in trace.events][-2:] == ["link_lost", "note"]
+    assert trace.set_point is not None
+    sent = arm.machine.calibration(1).posture_to_rad(state["set_points"][0])
+    assert abs(sent - trace.position[-1, 0]) < 127 * COUNT, "the arm stays near where it was"
+
+
+def test_a_board_that_restarts_is_a_fault(arm: Rig) -> None:
+    arm.ears.at_sample[20] = lambda: arm.ask("brown_out")
+    result = arm.run()
+    assert arm.ask("state")["frozen"]
+    trace = read_trace(result.trace)
+    assert (result.outcome, trace.record.outcome) == ("fault", "fault")
+    assert "restart" in [event.kind for event in trace.events]
+
+
+def test_a_fault_on_the_way_to_the_start_is_told_and_nothing_recorded(arm: Rig, tmp_path: Path) -> None:
+    far = SHORT.model_copy(update={"start": {1: math.radians(270)}})
+    arm.ears.at_event["note"] = lambda: arm.ask("fault_on", fault="stalled_joint:joint=1")
+    with pytest.raises(RunFaultError, match=r"move to the start .* joint 1.*nothing was recorded"):
+        arm.run(far)
+    assert arm.ask("state")["frozen"]
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_memory_that_is_always_busy_is_a_fault(arm: Rig) -> None:
+    arm.ears.at_event["ramp_start"] = lambda: arm.ask("fault_on", fault="busy_memory")
+    result = arm.run(LONG_RAMP)
+    assert result.outcome == "fault"
+    assert "set points missed in a row" in result.reason
+    assert result.counters["missed_set_points"] >= 10
+
+
+def test_single_missed_set_points_are_told_and_borne(tmp_path: Path) -> None:
+    with rig(tmp_path, "seed=5&fault=busy_memory:rate=0.2") as arm:
+        result = arm.run()
+    assert result.outcome == "complete"
+    assert arm.kinds.count("missed_set_point") == result.counters["missed_set_points"] > 0
+
+
+@pytest.mark.parametrize("error", [RuntimeError("a bug"), KeyboardInterrupt(), MemoryError()], ids=repr)
+def test_whatever_goes_wrong_in_this_program_the_arm_is_frozen_first(
+    arm: Rig, tmp_path: Path, error: BaseException
+) -> None:
+    def fail() -> None:
+        raise error
+
+    arm.ears.at_sample[12] = fail
+    with pytest.raises(type(error)):
+        arm.run()
+    assert arm.ask("state")["frozen"]
+    (path,) = tmp_path.iterdir()
+    trace = read_trace(path)
+    assert trace.record.outcome == "interrupted"
+    assert len(trace) == 12
+
+
+def test_a_disk_that_fills_up_freezes_the_arm_and_says_where_the_rest_is(
+    arm: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    arm.ears.at_sample[12] = lambda: monkeypatch.setattr("daq.traces.disk.sync", full)
+    with pytest.raises(RunFaultError, match=r"(?s)No space left.*\.part.*arm frozen"):
+        arm.run(ExperimentSpec(trajectory=Pause(duration=60)))
+    assert arm.ask("state")["frozen"]
+
+
+def test_an_arm_at_its_start_already_needs_no_move(arm: Rig) -> None:
+    still = ExperimentSpec(trajectory=Pause(duration=0.1), settle=0, hold=0)
+    assert arm.run(still).outcome == "complete"
+    assert arm.run(still).outcome == "complete"
+
+
+def test_a_start_far_away_is_moved_to_slowly_and_not_recorded(arm: Rig) -> None:
+    far = SHORT.model_copy(update={"start": {1: math.radians(230), 3: math.radians(-40)}})
+    begun = arm.ask("state")["time_us"]
+    result = arm.run(far)
+    took = (arm.ask("state")["time_us"] - begun) * 1e-6
+    trace = read_trace(result.trace)
+    assert np.degrees(trace.position[0, [0, 2]]) == pytest.approx([230, -40], abs=1)
+    assert took > math.radians(50) / 0.25, "at no more than 0.25 rad/s"
+    assert len(trace) < 50
+
+
+def test_repeats_go_back_slowly_and_are_told_apart(arm: Rig) -> None:
+    result = arm.run(SHORT.model_copy(update={"repeats": 2}))
+    assert result.outcome == "complete"
+    notes = [event.message for event in arm.ears.events if event.message.startswith("repeat")]
+    assert notes == ["repeat 1 of 2", "repeat 2 of 2"]
+
+
+def test_limits_that_are_not_set_are_not_zero(arm: Rig) -> None:
+    free = arm.machine.model_copy(update={"limits": type(arm.machine.limits)()})
+    assert arm.run(machine=free).outcome == "complete"
+
+
+def test_a_slow_line_moves_to_the_start_all_the_same(tmp_path: Path) -> None:
+    spec = ExperimentSpec(trajectory=Pause(duration=0.2), joints=(1,), settle=0, hold=0, start={1: math.radians(190)})
+    with rig(tmp_path, "seed=5&baud=19200") as arm:
+        result = arm.run(spec)
+    trace = read_trace(result.trace)
+    assert result.outcome == "complete"
+    assert trace.joints == (1,)
+    assert math.degrees(trace.position[0, 0]) == pytest.approx(190, abs=1)
+
+
+def signals(arm: Rig, spec: ExperimentSpec) -> list[np.ndarray]:
+    trace = read_trace(arm.run(spec).trace)
+    found = (trace.tick, trace.time, trace.set_point, trace.position, trace.error, trace.drive, trace.power_raw)
+    return [signal for signal in (*found, trace.status, trace.host_time) if signal is not None]
+
+
+@pytest.mark.parametrize(
+    "options",
+    ["seed=7&no_sample=1", "seed=7&fault=flip:rate=0.03&fault=drop:rate=0.03&fault=delay:rate=0.05"],
+    ids=["double read", "wire faults"],
+)
+def test_two_runs_with_the_same_seed_agree_to_the_bit(tmp_path: Path, options: str) -> None:
+    found = []
+    for _ in range(2):
+        with rig(tmp_path, options) as arm:
+            found.append(signals(arm, SHORT))
+            faults = arm.ask("counts")["faults"]
+    assert len(found[0]) == 9
+    assert all((one == other).all() for one, other in zip(*found, strict=True))
+    assert ("flip" in str(faults)) == ("flip" in options)

@@ -1,0 +1,94 @@
+"""What is refused before anything moves: the board is as it was, and no file is left."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from daq.contracts.errors import DaqError, SafetyError, SpecError, TraceError
+from daq.contracts.experiment import ExperimentSpec, Ramp
+from daq.runner import Consent, MissingConsentError
+from tests.daq.runner.rig import SHORT, Rig
+
+OTHER_GAINS = SHORT.model_copy(update={"gains": {1: (9, 9, 9)}})
+"""Refused or not, a run must not have written them."""
+
+
+def refused(arm: Rig, error: type[DaqError], match: str, spec: ExperimentSpec = OTHER_GAINS) -> None:
+    before = arm.at_rest
+    with pytest.raises(error, match=match) as caught:
+        arm.run(spec)
+    assert "\n" not in str(caught.value)
+    assert arm.at_rest == before
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"trajectory": Ramp(amplitude=math.radians(200))}, r"experiment refused: joint \d: .* allowed are"),
+        ({"trajectory": Ramp(amplitude=math.radians(40), duration=0.2)}, r"experiment refused: joint \d: .*°/s"),
+        ({"start": {1: math.radians(20)}}, r"move to start refused: joint 1: .* allowed are"),
+    ],
+    ids=["range", "speed", "start"],
+)
+def test_a_plan_outside_the_limits(arm: Rig, tmp_path: Path, change: dict[str, object], match: str) -> None:
+    refused(arm, SafetyError, match, OTHER_GAINS.model_copy(update=change))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_real_arm_without_the_operators_consent(arm: Rig) -> None:
+    arm.pretend_real()
+    refused(arm, MissingConsentError, "is a real arm: it moves only with the operator's consent")
+
+
+def test_a_real_arm_moves_with_consent_and_its_trace_says_real(arm: Rig) -> None:
+    arm.pretend_real()
+    result = arm.run(consent=Consent(moves_real_arm=True))
+    assert arm.trace(result).record.source == "real"
+
+
+def test_an_arm_that_was_stopped_by_another_host(arm: Rig) -> None:
+    arm.controller.stop()
+    refused(arm, SafetyError, r"has been stopped .* `daq reset`")
+
+
+def test_an_arm_that_is_not_where_its_controller_holds_it(arm: Rig) -> None:
+    arm.ask("fault_on", fault="stalled_joint:joint=1")
+    reading = arm.controller.next_snapshot()[1]
+    arm.controller.set_points({1: reading.set_point + 60})
+    arm.controller.next_snapshot()
+    refused(arm, SafetyError, r"joint 1 is \d+ ADC counts from its set point, allowed are ±127.*blocked")
+
+
+def test_a_controller_with_another_period_than_the_machine_file_says(arm: Rig) -> None:
+    controller = arm.machine.controller
+    period = controller.period.model_copy(update={"value": 0.03})
+    arm.machine = arm.machine.model_copy(update={"controller": controller.model_copy(update={"period": period})})
+    refused(arm, SafetyError, "control period of 20 ms, the machine file ma2000 says 30 ms")
+
+
+def below_a_file(folder: Path) -> Path:
+    (folder / "file").write_text("")
+    return folder / "file" / "traces"
+
+
+def full(folder: Path) -> Path:
+    return folder
+
+
+@pytest.mark.parametrize("place", [below_a_file, full])
+def test_a_place_that_takes_no_trace(
+    arm: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: Callable[[Path], Path]
+) -> None:
+    arm.folder = place(tmp_path)
+    if place is full:
+        monkeypatch.setattr("daq.traces.room.RESERVE", 1e18)
+    refused(arm, TraceError, "cannot be written there|MB are free")
+
+
+def test_a_start_that_the_machine_does_not_have(arm: Rig) -> None:
+    arm.machine = arm.machine.model_copy(update={"rest_posture": None})
+    refused(arm, SpecError, "has no rest_posture")
