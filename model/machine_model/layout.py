@@ -83,11 +83,18 @@ SHARED = 10
     GAIN_ERROR,  # relative, of the controller
     EXTRA_DELAY,  # s
     LOST,  # share of set points
-) = range(62)
-PER_JOINT = 62
+    SHAPE,  # of the link: CYLINDER, ROD or BODY
+    PRISMATIC,  # 1, or 0 for a revolute joint
+    USER,  # the first of USER_COLUMNS for effects from files of the user's own
+) = range(65)
+USER_COLUMNS = 8
+PER_JOINT = USER + USER_COLUMNS
+
+CYLINDER, ROD, BODY = 0, 1, 2
 
 # Bits of the whole number that says which state-changing effects a joint has.
-HAS_INDUCTANCE, HAS_FLEXIBILITY, HAS_STICTION, HAS_EXTRA_TORQUE = 1, 2, 4, 8
+HAS_INDUCTANCE, HAS_FLEXIBILITY, HAS_STICTION, HAS_EXTRA_TORQUE, HAS_USER_EFFECT = 1, 2, 4, 8, 16
+"""From HAS_USER_EFFECT on, a bit for each effect of the user's own."""
 
 # Settings of a run, in this order.
 (CONTROLLER, QUANTISE, PUBLISHED_LOADS) = range(3)

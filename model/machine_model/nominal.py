@@ -102,6 +102,8 @@ def _fill_joint(row: NDArray[np.float64], machine: Machine, number: int) -> None
     elif isinstance(joint.link, Body):
         row[at.CENTRE_X : at.CENTRE_Z + 1] = [c.value for c in joint.link.centre]
         row[at.INERTIA_XX : at.INERTIA_YZ + 1] = [i.value for i in joint.link.inertia]
+    row[at.SHAPE] = {"cylinder": at.CYLINDER, "rod": at.ROD, "body": at.BODY}[joint.link.shape]
+    row[at.PRISMATIC] = float(joint.kind == "prismatic")
     _fill_drive(row, joint.drive)
     row[at.PRESLIDING] = PRESLIDING_COUNTS * scale.resolution
     row[at.STRIBECK_SPEED], row[at.COOLING_TIME], row[at.RIPPLE_CYCLES] = 1.0, 1.0, 1.0

@@ -14,18 +14,16 @@ from model.dynamics.linear_solve import solve_3
 from model.dynamics.three_joint import horizontal_gravity_torques, mass_matrix_and_bias
 from model.machine_model import layout as at
 from model.simulation.joint_torques import (
-    current_after,
+    DEFLECTION,
+    POSITION,
+    RISE,
+    SPEED,
+    after_step,
     deflection,
-    extra_torque,
     motor_damping,
     motor_gain,
-    steady_current,
-    still_stuck,
+    special_torque,
 )
-
-# Columns of the state of a joint.
-POSITION, SPEED, DEFLECTION, STUCK, CURRENT, ROTOR_POSITION, ROTOR_SPEED, RISE = range(8)
-STATE = 8
 
 
 @inlined
@@ -46,25 +44,11 @@ def friction_levels(theta_2: Any, theta_3: Any, arms: Any, plain: Any, weight_2:
     )
 
 
-@inlined
-def _special(
-    joint: NDArray[Any], flags: int, time: Any, elapsed: Any, q: Any, speed: Any, z: Any, state: Any, volts: Any
-) -> Any:
-    """What the effects that most models leave out add to a joint's torque at a stage of a step."""
-    gain = motor_gain(joint, state[RISE])
-    steady = steady_current(joint, state[RISE], volts, speed)
-    current = steady
-    if flags & at.HAS_INDUCTANCE:
-        current = current_after(joint, state[RISE], state[CURRENT], steady, elapsed)
-    to_torque = joint[at.GEAR] * joint[at.TORQUE_CONSTANT]
-    lag = to_torque * (current - steady) + 0.0 * gain
-    return lag + extra_torque(joint, flags, time, q, speed, z, state[STUCK], to_torque * current)
-
-
 @compiled
 def advance(
+    user: Any,
     state: NDArray[Any], volts: NDArray[Any], start: complex, duration: complex, steps: int,
-    shared: NDArray[Any], joints: NDArray[Any], body: NDArray[Any], flags: NDArray[Any],
+    joints: NDArray[Any], body: NDArray[Any], flags: NDArray[Any],
 ) -> None:  # fmt: skip
     """Advance the state (3, STATE) by `duration` s in equal steps at constant motor volts; rigid transmissions.
 
@@ -116,9 +100,9 @@ def advance(
             t3 = drive_3 - damping_3 * u3 - y3 * l3
             if special:
                 now = start + step * h + reach
-                t1 += _special(joints[0], flags[0], now, reach, q1 + dq1, u1, y1, state[0], volts[0])
-                t2 += _special(joints[1], flags[1], now, reach, p2, u2, y2, state[1], volts[1])
-                t3 += _special(joints[2], flags[2], now, reach, p3, u3, y3, state[2], volts[2])
+                t1 += special_torque(user, joints[0], flags[0], now, reach, q1 + dq1, u1, u1, y1, state[0], volts[0])
+                t2 += special_torque(user, joints[1], flags[1], now, reach, p2, u2, u2, y2, state[1], volts[1])
+                t3 += special_torque(user, joints[2], flags[2], now, reach, p3, u3, u3, y3, state[2], volts[2])
             if tilted:
                 b1, b2, b3 = horizontal_gravity_torques(q1 + dq1 + offset_1, p2 + offset_2, p3 + offset_3, body)
                 t1, t2, t3 = t1 - b1, t2 - b2, t3 - b3
@@ -135,22 +119,13 @@ def advance(
         z1, z2, z3 = deflection(z1, dq1, soft_1), deflection(z2, dq2, soft_2), deflection(z3, dq3, soft_3)
         if special:
             state[0, DEFLECTION], state[1, DEFLECTION], state[2, DEFLECTION] = z1, z2, z3
-            _finish(state[0], joints[0], flags[0], l1, v1, volts[0], h)
-            _finish(state[1], joints[1], flags[1], l2, v2, volts[1], h)
-            _finish(state[2], joints[2], flags[2], l3, v3, volts[2], h)
+            state[0, SPEED] = v1
+            after_step(state[0], joints[0], flags[0], l1, v1, volts[0], h)
+            state[1, SPEED] = v2
+            after_step(state[1], joints[1], flags[1], l2, v2, volts[1], h)
+            state[2, SPEED] = v3
+            after_step(state[2], joints[2], flags[2], l3, v3, volts[2], h)
             z1, z2, z3 = state[0, DEFLECTION], state[1, DEFLECTION], state[2, DEFLECTION]
     state[0, POSITION], state[1, POSITION], state[2, POSITION] = q1, q2, q3
     state[0, SPEED], state[1, SPEED], state[2, SPEED] = v1, v2, v3
     state[0, DEFLECTION], state[1, DEFLECTION], state[2, DEFLECTION] = z1, z2, z3
-
-
-@compiled
-def _finish(
-    state: NDArray[Any], joint: NDArray[Any], flags: int, level: complex, speed: complex, volts: complex, h: complex
-) -> None:
-    """What a step leaves behind beside position and speed: current, and whether the joint sticks."""
-    if flags & at.HAS_INDUCTANCE:
-        steady = steady_current(joint, state[RISE], volts, speed)
-        state[CURRENT] = current_after(joint, state[RISE], state[CURRENT], steady, h)
-    if flags & at.HAS_STICTION:
-        still_stuck(joint, level, speed, state[DEFLECTION : DEFLECTION + 1], state[STUCK : STUCK + 1])

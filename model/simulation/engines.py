@@ -1,9 +1,11 @@
-"""Which compiled run a model needs, and calling it with one or many parameter sets."""
+"""Which compiled run a model needs, and calling it with one or many parameter sets on all cores."""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,48 +13,68 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.machine import Cylinder, Machine, Rod
+from model.machine_model import layout as at
 from model.machine_model.model import Model
 
 if TYPE_CHECKING:
     from model.simulation.simulate import Prepared
+
+CHUNKS_A_CORE = 4
+"""Pieces of a batch a core: even where runs differ in length."""
 
 
 @dataclass(frozen=True)
 class Engine:
     """A compiled run. `published_loads`: load-dependent friction by (7.32) to (7.34)."""
 
-    single: Callable[..., None]
-    many: Callable[..., None]
+    batch: Callable[..., None]
     published_loads: bool
 
     def run(
-        self, prepared: Prepared, vector: NDArray[Any], initial: NDArray[Any], flags: NDArray[np.int64], step: float,
-        out: NDArray[Any],
-    ) -> None:  # fmt: skip
-        """One run into `out` (OUTPUTS, k, n)."""
-        self.single(
-            prepared.set_points, prepared.recorded, prepared.noise, initial, prepared.first_drive, vector,
-            prepared.gains, flags, prepared.settings, step, out,
-        )  # fmt: skip
-
-    def run_many(
         self, prepared: Sequence[Prepared], which: NDArray[np.int64], vectors: NDArray[Any], initials: NDArray[Any],
-        flags: NDArray[np.int64], step: float, out: NDArray[Any],
+        flags: NDArray[np.int64], step: float, out: NDArray[Any], cores: int | None = None,
     ) -> None:  # fmt: skip
-        """Runs on all cores: run r takes `prepared[which[r]]`, row r of `vectors` and `initials`."""
-        lengths = np.array([len(p.set_points) for p in prepared])
-        self.many(
-            _padded([p.set_points for p in prepared]), _padded([p.recorded for p in prepared]),
-            _padded([p.noise for p in prepared]), initials, np.array([p.first_drive for p in prepared]), lengths, which,
-            vectors, np.array([p.gains for p in prepared]), flags, np.array([p.settings for p in prepared]), step, out,
+        """Runs into `out` (r, OUTPUTS, k, n): run r takes `prepared[which[r]]`, row r of `vectors` and `initials`.
+
+        Threads share the work; the compiled code holds no lock of Python's. Results do not depend on their number.
+        """
+        arguments = (
+            which, np.array([len(p.set_points) for p in prepared]), _padded([p.set_points for p in prepared]),
+            _padded([p.recorded for p in prepared]), _padded([p.noise for p in prepared]), initials,
+            np.array([p.first_drive for p in prepared]), vectors, np.array([p.gains for p in prepared]), flags,
+            np.array([p.settings for p in prepared]), step, out,
         )  # fmt: skip
+        cores = available_cores() if cores is None else cores
+        if len(which) == 1 or cores == 1:
+            self.batch(0, len(which), *arguments)
+            return
+        edges = np.unique(np.linspace(0, len(which), min(len(which), cores * CHUNKS_A_CORE) + 1).astype(np.int64))
+        self.batch(int(edges[0]), int(edges[1]), *arguments)  # here, so that what has to be compiled is compiled once
+        with ThreadPoolExecutor(cores) as pool:
+            pieces = [
+                pool.submit(self.batch, int(a), int(b), *arguments) for a, b in zip(edges[1:-1], edges[2:], strict=True)
+            ]
+        for piece in pieces:
+            piece.result()
 
 
-def engine_for(model: Model) -> Engine:
-    """The engine of a model: the closed form where the machine is the waist-shoulder-elbow arm of rods."""
-    from model.simulation.kernel import many_closed_form, run_closed_form
+def available_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
-    return Engine(run_closed_form, many_closed_form, published_loads=True)
+
+def engine_for(model: Model, *, general: bool = False) -> Engine:
+    """The engine of a model: the closed form where the machine is the waist-shoulder-elbow arm of rods.
+
+    `general` takes the recursive form even there, to compare the two.
+    """
+    from model.simulation import kernel
+
+    rods = is_rod_arm(model.machine)
+    if general or not rods:
+        return Engine(kernel.run_chain, published_loads=rods)
+    flexible = bool((model.flags & at.HAS_FLEXIBILITY).any())
+    return Engine(kernel.run_flexible if flexible else kernel.run_closed_form, published_loads=True)
 
 
 def is_rod_arm(machine: Machine) -> bool:
@@ -67,6 +89,8 @@ def is_rod_arm(machine: Machine) -> bool:
 
 def _padded(arrays: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Arrays (k, n) of different k as one (t, longest, n)."""
+    if len(arrays) == 1:
+        return arrays[0][None]
     padded = np.zeros((len(arrays), max(len(a) for a in arrays), arrays[0].shape[1]))
     for row, array in zip(padded, arrays, strict=True):
         row[: len(array)] = array

@@ -17,11 +17,16 @@ from model.drives.piecewise import clamped, magnitude, outside
 from model.dynamics.compilation import compiled, inlined
 from model.dynamics.dual import sin_cos
 from model.machine_model import layout as at
+from model.simulation.specialised import user_torque
 
 RESTICK_SPEED = 1e-3
 """rad/s (m/s): a sliding joint slower than this sticks again."""
 
 TWO_PI = 2.0 * np.pi
+
+# Columns of the state of a joint.
+POSITION, SPEED, DEFLECTION, STUCK, CURRENT, ROTOR_POSITION, ROTOR_SPEED, RISE = range(8)
+STATE = 8
 
 
 @inlined
@@ -85,6 +90,45 @@ def extra_torque(
         s, c = sin_cos(TWO_PI * joint[at.DISTURBANCE_FREQUENCY] * time)
         torque += joint[at.DISTURBANCE_SINE] * s + joint[at.DISTURBANCE_COSINE] * c
     return torque
+
+
+@inlined
+def special_torque(
+    user: Any, joint: NDArray[Any], flags: int, time: Any, elapsed: Any, q: Any, speed: Any, rotor_speed: Any, z: Any,
+    state: NDArray[Any], volts: Any,
+) -> Any:  # fmt: skip
+    """What inductance, added torques and effects of the user's own add to a joint's torque at a stage of a step.
+
+    `elapsed` s since the step began; `user` is the tag of the user's effects.
+    """
+    steady = steady_current(joint, state[RISE], volts, rotor_speed)
+    current = steady
+    if flags & at.HAS_INDUCTANCE:
+        current = current_after(joint, state[RISE], state[CURRENT], steady, elapsed)
+    to_torque = joint[at.GEAR] * joint[at.TORQUE_CONSTANT]
+    torque = to_torque * (current - steady)
+    torque += extra_torque(joint, flags, time, q, speed, z, state[STUCK], to_torque * current)
+    if flags >= at.HAS_USER_EFFECT:
+        torque += user_torque(user, joint, flags, time, q, speed)
+    return torque
+
+
+@compiled
+def after_step(
+    state: NDArray[Any],
+    joint: NDArray[Any],
+    flags: int,
+    level: complex,
+    rotor_speed: complex,
+    volts: complex,
+    h: complex,
+) -> None:
+    """What a step leaves behind beside position and speed: current, and whether the joint sticks."""
+    if flags & at.HAS_INDUCTANCE:
+        steady = steady_current(joint, state[RISE], volts, rotor_speed)
+        state[CURRENT] = current_after(joint, state[RISE], state[CURRENT], steady, h)
+    if flags & at.HAS_STICTION:
+        still_stuck(joint, level, state[SPEED], state[DEFLECTION : DEFLECTION + 1], state[STUCK : STUCK + 1])
 
 
 @compiled

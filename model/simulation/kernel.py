@@ -1,114 +1,198 @@
-"""The compiled run of a whole trace: one entry for the closed form, its parallel form, and what both share.
+"""The compiled run of a whole record, and its entries: the closed form, its flexible form, and any chain.
 
 One module-level kernel holds every effect of the library. Effects that only add a term are off at their null value;
 those that add state have a flag. Real numbers for a simulation, dual numbers (complex128) for exact sensitivities.
+Every entry takes a batch of runs:
+
+    which: (r,) record of each run; first, last: the runs to do, first ≤ i < last.
+    lengths: (t,) periods of each record. set_points: (t, k, n) counts for the board's PID, rad else.
+    recorded: (t, k, n) motor volts where nothing controls. noise: (t, k, n) added to the readings before rounding.
+    initial: (r, n, 2) position and speed. first_drive: (t, n) commanded volts before the record.
+    vectors: (r, layout size). gains: (t, n, GAINS). flags: (n,). settings: (t, SETTINGS).
+    step: longest step of integration, s. out: (r, OUTPUTS, k, n), filled.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
+from numba.extending import overload
 from numpy.typing import NDArray
 
 from model.drives.amplifier import motor_volts
 from model.drives.controller import MEMORY
 from model.drives.piecewise import clamped
-from model.dynamics import effective_inertia as lumped
 from model.dynamics.compilation import compiled
-from model.dynamics.three_joint import gravity_torques
 from model.machine_model import layout as at
-from model.simulation.bodies import rod_arm_body
-from model.simulation.closed_form_motion import (
-    CURRENT, DEFLECTION, POSITION, ROTOR_POSITION, ROTOR_SPEED, SPEED, STATE, STUCK, advance, friction_levels,
-)  # fmt: skip
-from model.simulation.joint_torques import motor_gain, steady_current
+from model.simulation import closed_form_motion, general_motion
+from model.simulation.dynamics_of_run import body_of, friction_levels_of, gravity_of
+from model.simulation.joint_torques import (
+    CURRENT,
+    DEFLECTION,
+    POSITION,
+    ROTOR_POSITION,
+    ROTOR_SPEED,
+    SPEED,
+    STATE,
+    STUCK,
+    motor_gain,
+    steady_current,
+)
 from model.simulation.period import QUEUE, extra_flags, sample, step_count, switching_times, warm_up
+from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, NoUserEffect, entry
+
+Array = NDArray[Any]
 
 
-@compiled
-def run_closed_form(
-    set_points: NDArray[Any], recorded: NDArray[Any], noise: NDArray[Any], initial: NDArray[Any],
-    first_drive: NDArray[Any], vector: NDArray[Any], gains: NDArray[Any], flags: NDArray[Any],
-    settings: NDArray[Any], step: float, out: NDArray[Any],
+def advance_of(
+    kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any, flags: Any,
+    settings: Any, work: Any,
 ) -> None:  # fmt: skip
-    """Simulate one record of the waist-shoulder-elbow arm.
+    """Advances `state` over a stretch of constant motor volts."""
+    raise NotImplementedError("for compiled code")
 
-    Args:
-        set_points: (k, 3) counts for the board's PID, rad else. recorded: (k, 3) motor volts where nothing controls.
-        noise: (k, 3) added to the readings before rounding, counts (rad without a converter).
-        initial: (3, 2) position (rad) and speed (rad/s). first_drive: (3,) commanded volts before the record.
-        vector: flat parameters (`model.machine_model.layout`). gains: (3, GAINS). flags: (3,). settings: (SETTINGS,).
-        step: longest step of integration, s.
-        out: (OUTPUTS, k, 3), filled.
-    """
-    shared = vector[: at.SHARED]
-    joints = vector[at.SHARED :].reshape(3, at.PER_JOINT)
-    body = rod_arm_body(shared, joints)
-    modes = extra_flags(joints, flags)
-    state = np.zeros((3, STATE), dtype=vector.dtype)
-    memory = np.zeros((3, MEMORY), dtype=vector.dtype)
-    queue = np.zeros((QUEUE, 3), dtype=vector.dtype)
-    volts = np.zeros(3, dtype=vector.dtype)
-    order = np.zeros(3, dtype=np.int64)
-    times = np.zeros(3, dtype=vector.dtype)
-    periods = switching_times(shared, joints, order, times)
-    for j in range(3):
-        for i in range(QUEUE):
-            queue[i, j] = first_drive[j]
-        volts[j] = motor_volts(queue[0, j], joints[j])
-    _start(state, initial, volts, joints, body)
-    for k in range(set_points.shape[0]):
-        for j in range(3):
-            queue[k % QUEUE, j] = sample(
-                k, j, state, set_points, recorded, noise, gains, shared, joints, settings, memory, out
-            )
-        start, done = k * shared[at.PERIOD], 0.0 * shared[at.PERIOD]
-        for i in range(4):
-            until = times[order[i]] if i < 3 else shared[at.PERIOD]
-            if until != done:
-                steps = step_count(until - done, step)
-                advance(state, volts, start + done, until - done, steps, shared, joints, body, modes)
-            done = until
-            if i < 3:
-                j = order[i]
-                volts[j] = motor_volts(queue[(k - periods[j]) % QUEUE, j], joints[j])
-        warm_up(state, volts, shared, joints)
+
+@overload(advance_of, jit_options=OPTIONS)
+def _advance_of(
+    kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any, flags: Any,
+    settings: Any, work: Any,
+) -> Any:  # fmt: skip
+    if kind.instance_class is ClosedForm:
+
+        def closed_form(
+            kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any, flags: Any,
+    settings: Any, work: Any,
+        ) -> None:  # fmt: skip
+            closed_form_motion.advance(user, state, volts, start, duration, steps, joints, body, flags)
+
+        return closed_form
+
+    def general(
+        kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any, flags: Any,
+    settings: Any, work: Any,
+    ) -> None:  # fmt: skip
+        general_motion.advance(user, kind, state, volts, start, duration, steps, joints, body, flags, settings, work)
+
+    return general
 
 
 @compiled
-def _start(
-    state: NDArray[Any], initial: NDArray[Any], volts: NDArray[Any], joints: NDArray[Any], body: NDArray[Any]
+def batch(
+    user: Any, kind: Any, first: int, last: int, which: Array, lengths: Array,
+    set_points: Array, recorded: Array, noise: Array, initial: Array, first_drive: Array, vectors: Array, gains: Array,
+    flags: Array, settings: Array, step: float, out: Array,
+) -> None:  # fmt: skip
+    """Runs first … last − 1; `user` and `kind` are tags that choose the user's effects and the dynamics."""
+    n = initial.shape[1]
+    state = np.zeros((n, STATE), dtype=vectors.dtype)
+    memory = np.zeros((n, MEMORY), dtype=vectors.dtype)
+    queue = np.zeros((QUEUE, n), dtype=vectors.dtype)
+    volts = np.zeros(n, dtype=vectors.dtype)
+    order = np.zeros(n, dtype=np.int64)
+    times = np.zeros(n, dtype=vectors.dtype)
+    work = np.zeros((general_motion.WORK, n), dtype=vectors.dtype)
+    for r in range(first, last):
+        t = which[r]
+        shared = vectors[r, : at.SHARED]
+        joints = vectors[r, at.SHARED :].reshape(n, at.PER_JOINT)
+        modes = extra_flags(joints, flags)
+        body = body_of(kind, shared, joints, modes)
+        period = shared[at.PERIOD]
+        late = switching_times(shared, joints, order, times)
+        state[:], memory[:] = 0.0, 0.0
+        for j in range(n):
+            for i in range(QUEUE):
+                queue[i, j] = first_drive[t, j]
+            volts[j] = motor_volts(queue[0, j], joints[j])
+        friction_levels_of(kind, initial[r, :, 0].copy(), joints, body, settings[t], work[general_motion.LEVEL])
+        at_rest(state, initial[r], volts, joints, gravity_of(kind, initial[r, :, 0].copy(), joints, body), modes, work)
+        for k in range(lengths[t]):
+            for j in range(n):
+                queue[k % QUEUE, j] = sample(
+                    k, j, state, set_points[t], recorded[t], noise[t], gains[t], shared, joints, settings[t], memory,
+                    out[r],
+                )  # fmt: skip
+            done = 0.0 * period
+            for i in range(n + 1):
+                until = times[order[i]] if i < n else period
+                if until != done:
+                    steps = step_count(until - done, step)
+                    advance_of(
+                        kind,
+                        user,
+                        state,
+                        volts,
+                        k * period + done,
+                        until - done,
+                        steps,
+                        joints,
+                        body,
+                        modes,
+                        settings[t],
+                        work,
+                    )
+                done = until
+                if i < n:
+                    j = order[i]
+                    volts[j] = motor_volts(queue[(k - late[j]) % QUEUE, j], joints[j])
+            warm_up(state, volts, shared, joints)
+
+
+@compiled
+def at_rest(
+    state: Array, initial: Array, volts: Array, joints: Array, weights: Array, flags: Array, work: Array
 ) -> None:
-    """Initial state: at rest, friction carries what gravity and motor leave over, as far as it can."""
-    arms = (joints[0, at.COULOMB_ARM], joints[1, at.COULOMB_ARM], joints[2, at.COULOMB_ARM])
-    plain = (joints[0, at.COULOMB], joints[1, at.COULOMB], joints[2, at.COULOMB])
-    q = initial[:, 0]
-    theta_1, theta_2, theta_3 = q[0] + joints[0, at.THETA], q[1] + joints[1, at.THETA], q[2] + joints[2, at.THETA]
-    levels = friction_levels(theta_2, theta_3, arms, plain, body[lumped.SIZE], body[lumped.SIZE + 1])
-    weights = gravity_torques(theta_1, theta_2, theta_3, body)
-    for j in range(3):
+    """Initial state: friction carries at rest what gravity and motor leave over, as far as it can."""
+    for j in range(joints.shape[0]):
         state[j, POSITION], state[j, SPEED] = initial[j, 0], initial[j, 1]
         state[j, ROTOR_POSITION], state[j, ROTOR_SPEED] = initial[j, 0], initial[j, 1]
         state[j, STUCK] = 1.0 + 0.0 * initial[j, 0]
         state[j, CURRENT] = steady_current(joints[j], 0.0 * volts[j], volts[j], initial[j, 1])
-        left_over = motor_gain(joints[j], 0.0 * volts[j]) * volts[j] - weights[j]
-        if levels[j].real > 0.0 and initial[j, 1].real == 0.0:
-            state[j, DEFLECTION] = clamped(left_over / levels[j], 1.0 + 0.0 * left_over)
+        pull = motor_gain(joints[j], 0.0 * volts[j]) * volts[j]
+        level = work[general_motion.LEVEL, j]
+        if level.real > 0.0 and initial[j, 1].real == 0.0:
+            state[j, DEFLECTION] = clamped((pull - weights[j]) / level, 1.0 + 0.0 * pull)
+        if flags[j] & at.HAS_FLEXIBILITY:
+            give = joints[j, at.COMPLIANCE] + joints[j, at.CONTACT_COMPLIANCE]
+            slack = 0.5 * joints[j, at.GAP]
+            state[j, ROTOR_POSITION] += give * pull + (slack if pull.real >= 0.0 else -slack)
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"}, parallel=True)
-def many_closed_form(
-    set_points: NDArray[Any], recorded: NDArray[Any], noise: NDArray[Any], initial: NDArray[Any],
-    first_drive: NDArray[Any], lengths: NDArray[Any], traces: NDArray[Any], vectors: NDArray[Any],
-    gains: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any], step: float, out: NDArray[Any],
+@entry
+def run_closed_form(
+    first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
+    initial: Array, first_drive: Array, vectors: Array, gains: Array, flags: Array, settings: Array, step: float,
+    out: Array,
 ) -> None:  # fmt: skip
-    """Many runs on all cores: run r takes trace `traces[r]` (padded to a common length) and row r of `vectors`."""
-    for r in numba.prange(vectors.shape[0]):
-        t = traces[r]
-        n = lengths[t]
-        run_closed_form(
-            set_points[t, :n], recorded[t, :n], noise[t, :n], initial[r], first_drive[t], vectors[r], gains[t],
-            flags, settings[t], step, out[r, :, :n],
-        )  # fmt: skip
+    """The waist-shoulder-elbow arm of rods with rigid transmissions."""
+    batch(
+        NoUserEffect(0), ClosedForm(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
+        vectors, gains, flags, settings, step, out,
+    )  # fmt: skip
+
+
+@entry
+def run_flexible(
+    first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
+    initial: Array, first_drive: Array, vectors: Array, gains: Array, flags: Array, settings: Array, step: float,
+    out: Array,
+) -> None:  # fmt: skip
+    """The same arm where a transmission gives or has play."""
+    batch(
+        NoUserEffect(0), Flexible(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
+        vectors, gains, flags, settings, step, out,
+    )  # fmt: skip
+
+
+@entry
+def run_chain(
+    first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
+    initial: Array, first_drive: Array, vectors: Array, gains: Array, flags: Array, settings: Array, step: float,
+    out: Array,
+) -> None:  # fmt: skip
+    """Any machine."""
+    batch(
+        NoUserEffect(0), AnyChain(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
+        vectors, gains, flags, settings, step, out,
+    )  # fmt: skip

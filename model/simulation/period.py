@@ -12,7 +12,7 @@ from model.drives.controller import LAST_READING, board_pid, cascade, sampled_pi
 from model.drives.sensor import reading
 from model.dynamics.compilation import compiled
 from model.machine_model import layout as at
-from model.simulation.closed_form_motion import POSITION, RISE, SPEED
+from model.simulation.joint_torques import POSITION, RISE, SPEED
 
 QUEUE = 16
 """Commands kept: the drive may act up to 14 periods late."""

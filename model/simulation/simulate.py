@@ -15,7 +15,7 @@ from daq.contracts.trace import Trace
 from model.dynamics.dual import DUAL_STEP
 from model.machine_model import layout as at
 from model.machine_model.model import Model
-from model.simulation.engines import engine_for
+from model.simulation.engines import engine_for, is_rod_arm
 from model.simulation.inputs import RunInputs, inputs_of
 from model.simulation.period import (
     OUT_DRIVE, OUT_ERROR, OUT_POSITION, OUT_POWER, OUT_READING, OUT_SPEED, OUTPUTS,
@@ -38,6 +38,7 @@ class Options:
         step: longest step of integration, s.
         noise: (k, n) added to the readings before rounding, in counts of the sensor; None for none.
         initial: (n, 2) position (rad) and speed (rad/s) at the start; None: as estimated from the record.
+        general: use the recursive dynamics even where there is a closed form.
     """
 
     loop: Literal["closed", "open"] = "closed"
@@ -45,6 +46,7 @@ class Options:
     step: float = LONGEST_STEP
     noise: Floats | None = None
     initial: Floats | None = None
+    general: bool = False
 
 
 @dataclass(frozen=True)
@@ -90,10 +92,19 @@ def simulate(model: Model, trace: Trace | RunInputs, options: Options | None = N
     options = options or Options()
     inputs = inputs_of(trace, model.machine) if isinstance(trace, Trace) else trace
     prepared = prepare(model, inputs, options)
-    out = np.zeros((OUTPUTS, len(inputs), model.joint_count))
-    engine_for(model).run(prepared, model.vector, prepared.initial, model.flags, options.step, out)
+    out = np.zeros((1, OUTPUTS, len(inputs), model.joint_count))
+    engine = engine_for(model, general=options.general)
+    engine.run(
+        [prepared],
+        np.zeros(1, np.int64),
+        model.vector[None].copy(),
+        prepared.initial[None],
+        model.flags,
+        options.step,
+        out,
+    )
     _check_finite(out, inputs)
-    return _simulation(inputs, out)
+    return _simulation(inputs, out[0])
 
 
 @dataclass(frozen=True)
@@ -129,8 +140,8 @@ def sensitivities(
     for row, name in enumerate(names):
         _perturb(model, name, vectors[row], initials[row])
     out = np.zeros((len(names), OUTPUTS, len(inputs), model.joint_count), dtype=np.complex128)
-    engine_for(model).run_many(
-        [prepared], np.zeros(len(names), dtype=np.int64), vectors, initials, model.flags, options.step, out
+    engine_for(model, general=options.general).run(
+        [prepared], np.zeros(len(names), np.int64), vectors, initials, model.flags, options.step, out
     )
     _check_finite(out.real, inputs)
     return Sensitivities(tuple(names), _simulation(inputs, np.ascontiguousarray(out[0].real)), out.imag / DUAL_STEP)
@@ -155,7 +166,8 @@ def simulate_many(
     out = np.zeros((len(which), OUTPUTS, longest, model.joint_count), dtype=vectors.dtype)
     initials = np.concatenate([np.tile(p.initial.astype(vectors.dtype), (count, 1, 1)) for p in prepared])
     every = np.ascontiguousarray(np.tile(vectors, (len(inputs), 1)))
-    engine_for(model).run_many(prepared, which, every, initials, model.flags, options.step, out)
+    engine = engine_for(model, general=options.general)
+    engine.run(prepared, which, every, initials, model.flags, options.step, out)
     return [out[t * count : (t + 1) * count, :, : len(i)] for t, i in enumerate(inputs)]
 
 
@@ -189,7 +201,7 @@ def prepare(model: Model, inputs: RunInputs, options: Options) -> Prepared:
     settings = np.zeros(at.SETTINGS, dtype=np.int64)
     controller = machine.controller
     settings[at.QUANTISE] = int(options.quantise)
-    settings[at.PUBLISHED_LOADS] = int(engine_for(model).published_loads)
+    settings[at.PUBLISHED_LOADS] = int(is_rod_arm(machine))
     set_points = inputs.set_points
     if options.loop == "closed" and isinstance(controller, BoardPid):
         settings[at.CONTROLLER] = at.BOARD_PID

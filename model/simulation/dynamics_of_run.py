@@ -1,0 +1,186 @@
+"""The two kinds of dynamics behind one face: bodies, accelerations, friction levels, gravity. Compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from model.dynamics import effective_inertia as lumped
+from model.dynamics import recursive, three_joint
+from model.dynamics.compilation import compiled
+from model.dynamics.dual import sin_cos
+from model.dynamics.three_joint_motion import accelerations
+from model.kinematics.chain import ChainArrays
+from model.machine_model import layout as at
+from model.simulation.bodies import chain_body, rod_arm_body
+from model.simulation.closed_form_motion import friction_levels
+from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible
+
+
+@compiled
+def rod_arm_accelerations(
+    q: NDArray[Any], v: NDArray[Any], torque: NDArray[Any], joints: NDArray[Any], body: NDArray[Any], a: NDArray[Any]
+) -> None:
+    """Closed form, tilted base included."""
+    theta_1, theta_2, theta_3 = q[0] + joints[0, at.THETA], q[1] + joints[1, at.THETA], q[2] + joints[2, at.THETA]
+    b1, b2, b3 = three_joint.horizontal_gravity_torques(theta_1, theta_2, theta_3, body)
+    a[0], a[1], a[2] = accelerations(
+        theta_2, theta_3, v[0], v[1], v[2], torque[0] - b1, torque[1] - b2, torque[2] - b3, body
+    )
+
+
+@compiled
+def rod_arm_levels(
+    q: NDArray[Any], joints: NDArray[Any], body: NDArray[Any], _settings: NDArray[Any], out: NDArray[Any]
+) -> None:
+    """(7.32) to (7.34) from the closed form's parameters."""
+    _published_levels(q, joints, body[lumped.SIZE], body[lumped.SIZE + 1], out)
+
+
+@compiled
+def rod_arm_gravity(q: NDArray[Any], joints: NDArray[Any], body: NDArray[Any]) -> NDArray[Any]:
+    """Gravity torques (3), N·m."""
+    result = np.empty_like(q)
+    result[0], result[1], result[2] = three_joint.gravity_torques(
+        q[0] + joints[0, at.THETA], q[1] + joints[1, at.THETA], q[2] + joints[2, at.THETA], body
+    )
+    return result
+
+
+@compiled
+def chain_accelerations(
+    q: NDArray[Any], v: NDArray[Any], torque: NDArray[Any], _joints: NDArray[Any], body: ChainArrays, a: NDArray[Any]
+) -> None:
+    """Recursive Newton-Euler for any chain."""
+    found = recursive.forward_dynamics(body, q, v, torque)
+    for j in range(q.shape[0]):
+        a[j] = found[j]
+
+
+@compiled
+def chain_levels(
+    q: NDArray[Any], joints: NDArray[Any], body: ChainArrays, settings: NDArray[Any], out: NDArray[Any]
+) -> None:
+    """Levels of Coulomb friction, N·m: (7.32) to (7.34) where set, else an arm times the weight across each axis."""
+    n = joints.shape[0]
+    if settings[at.PUBLISHED_LOADS] != 0:
+        _published_levels(
+            q, joints, -body.gravity[2] * body.inertial[1, 0], -body.gravity[2] * body.inertial[2, 0], out
+        )
+        return
+    x, y, z = body.gravity[0], body.gravity[1], body.gravity[2]
+    beyond = 0.0 * x
+    for j in range(n):
+        beyond += body.inertial[j, 0]
+    for j in range(n):
+        across = np.sqrt(x * x + y * y + 1e-30)  # gravity across the axis of joint j, in the frame before it
+        out[j] = joints[j, at.COULOMB] + joints[j, at.COULOMB_ARM] * beyond * across
+        beyond -= body.inertial[j, 0]
+        theta = body.geometry[j, 0] + (0.0 * q[j] if body.prismatic[j] else q[j])
+        s, c = sin_cos(theta)
+        sa, ca = sin_cos(body.geometry[j, 3])
+        x, y = c * x + s * y, c * y - s * x
+        y, z = ca * y + sa * z, ca * z - sa * y
+
+
+@compiled
+def chain_gravity(q: NDArray[Any], _joints: NDArray[Any], body: ChainArrays) -> NDArray[Any]:
+    """Gravity torques (n,), N·m or N."""
+    return recursive.gravity_torques(body, q)
+
+
+@compiled
+def _published_levels(
+    q: NDArray[Any], joints: NDArray[Any], weight_2: complex, weight_3: complex, out: NDArray[Any]
+) -> None:
+    arms = (joints[0, at.COULOMB_ARM], joints[1, at.COULOMB_ARM], joints[2, at.COULOMB_ARM])
+    plain = (joints[0, at.COULOMB], joints[1, at.COULOMB], joints[2, at.COULOMB])
+    theta_2, theta_3 = q[1] + joints[1, at.THETA], q[2] + joints[2, at.THETA]
+    out[0], out[1], out[2] = friction_levels(theta_2, theta_3, arms, plain, weight_2, weight_3)
+
+
+def _of(kind: Any, *tags: type) -> bool:
+    return getattr(kind, "instance_class", None) in tags
+
+
+def body_of(kind: Any, shared: Any, joints: Any, flags: Any) -> Any:
+    """What the equations of motion read, from the parameters."""
+    raise NotImplementedError("for compiled code")
+
+
+@overload(body_of, jit_options=OPTIONS)
+def _body_of(kind: Any, shared: Any, joints: Any, flags: Any) -> Any:
+    if _of(kind, AnyChain):
+
+        def of_chain(kind: Any, shared: Any, joints: Any, flags: Any) -> Any:
+            return chain_body(shared, joints, flags)
+
+        return of_chain
+
+    def of_rods(kind: Any, shared: Any, joints: Any, flags: Any) -> Any:
+        return rod_arm_body(shared, joints, flags)
+
+    return of_rods if _of(kind, ClosedForm, Flexible) else None
+
+
+def accelerate(kind: Any, q: Any, v: Any, torque: Any, joints: Any, body: Any, a: Any) -> Any:
+    """Fills `a` with accelerations for joint torques."""
+    raise NotImplementedError("for compiled code")
+
+
+@overload(accelerate, jit_options=OPTIONS)
+def _accelerate(kind: Any, q: Any, v: Any, torque: Any, joints: Any, body: Any, a: Any) -> Any:
+    if _of(kind, AnyChain):
+
+        def of_chain(kind: Any, q: Any, v: Any, torque: Any, joints: Any, body: Any, a: Any) -> Any:
+            return chain_accelerations(q, v, torque, joints, body, a)
+
+        return of_chain
+
+    def of_rods(kind: Any, q: Any, v: Any, torque: Any, joints: Any, body: Any, a: Any) -> Any:
+        return rod_arm_accelerations(q, v, torque, joints, body, a)
+
+    return of_rods if _of(kind, ClosedForm, Flexible) else None
+
+
+def friction_levels_of(kind: Any, q: Any, joints: Any, body: Any, settings: Any, out: Any) -> Any:
+    """Fills `out` with the levels of Coulomb friction, N·m."""
+    raise NotImplementedError("for compiled code")
+
+
+@overload(friction_levels_of, jit_options=OPTIONS)
+def _friction_levels_of(kind: Any, q: Any, joints: Any, body: Any, settings: Any, out: Any) -> Any:
+    if _of(kind, AnyChain):
+
+        def of_chain(kind: Any, q: Any, joints: Any, body: Any, settings: Any, out: Any) -> Any:
+            return chain_levels(q, joints, body, settings, out)
+
+        return of_chain
+
+    def of_rods(kind: Any, q: Any, joints: Any, body: Any, settings: Any, out: Any) -> Any:
+        return rod_arm_levels(q, joints, body, settings, out)
+
+    return of_rods if _of(kind, ClosedForm, Flexible) else None
+
+
+def gravity_of(kind: Any, q: Any, joints: Any, body: Any) -> Any:
+    """Gravity torques, N·m."""
+    raise NotImplementedError("for compiled code")
+
+
+@overload(gravity_of, jit_options=OPTIONS)
+def _gravity_of(kind: Any, q: Any, joints: Any, body: Any) -> Any:
+    if _of(kind, AnyChain):
+
+        def of_chain(kind: Any, q: Any, joints: Any, body: Any) -> Any:
+            return chain_gravity(q, joints, body)
+
+        return of_chain
+
+    def of_rods(kind: Any, q: Any, joints: Any, body: Any) -> Any:
+        return rod_arm_gravity(q, joints, body)
+
+    return of_rods if _of(kind, ClosedForm, Flexible) else None

@@ -1,0 +1,120 @@
+"""Motion over a stretch of constant drive for any dynamics, joints whose transmission gives included: RK4. Compiled.
+
+A joint with a flexible transmission has a rotor of its own: the motor, its viscous friction and its inertia act on the
+rotor; the link feels what the transmission carries, and friction, and everything from outside.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import NDArray
+
+from model.dynamics.compilation import compiled
+from model.machine_model import layout as at
+from model.simulation.joint_torques import (
+    DEFLECTION,
+    POSITION,
+    RISE,
+    ROTOR_POSITION,
+    ROTOR_SPEED,
+    SPEED,
+    after_step,
+    deflection,
+    motor_damping,
+    motor_gain,
+    special_torque,
+    transmitted,
+)
+from model.simulation.dynamics_of_run import accelerate, friction_levels_of
+
+# Rows of the work array (WORK, n): stage values, accelerations, weighted sums.
+Q, V, M, W, TORQUE, A, B, LEVEL, SUM_V, SUM_A, SUM_W, SUM_B = range(12)
+WORK = 12
+
+
+@compiled
+def advance(
+    user: Any, kind: Any, state: NDArray[Any], volts: NDArray[Any], start: complex,
+    duration: complex, steps: int, joints: NDArray[Any], body: Any, flags: NDArray[Any], settings: NDArray[Any],
+    work: NDArray[Any],
+) -> None:  # fmt: skip
+    """Advance the state (n, STATE) by `duration` s in equal steps at constant motor volts.
+
+    `user` and `kind` are tags that choose the torque of the user's effects and the dynamics.
+    """
+    n = joints.shape[0]
+    h = duration / steps
+    for step in range(steps):
+        _begin(state, work)
+        for stage in range(4):
+            reach = 0.0 * h if stage == 0 else (h if stage == 3 else 0.5 * h)
+            _to_stage(state, work, reach)
+            friction_levels_of(kind, work[Q], joints, body, settings, work[LEVEL])
+            now = start + step * h + reach
+            for j in range(n):
+                joint, moved = joints[j], work[Q, j] - state[j, POSITION]
+                z = deflection(state[j, DEFLECTION], moved, 1.0 / joint[at.PRESLIDING])
+                gives = flags[j] & at.HAS_FLEXIBILITY != 0
+                turning = work[W, j] if gives else work[V, j]
+                motor = motor_gain(joint, state[j, RISE]) * volts[j] - motor_damping(joint, state[j, RISE]) * turning
+                link = -z * work[LEVEL, j]
+                if flags[j] != 0:
+                    link += special_torque(
+                        user, joint, flags[j], now, reach, work[Q, j], work[V, j], turning, z, state[j], volts[j]
+                    )
+                if gives:
+                    through = transmitted(joint, work[M, j] - work[Q, j], work[W, j] - work[V, j])
+                    rotor = joint[at.ROTOR_INERTIA] * joint[at.GEAR] * joint[at.GEAR]
+                    work[B, j] = (motor - through) / rotor
+                    motor = through
+                work[TORQUE, j] = link + motor
+            accelerate(kind, work[Q], work[V], work[TORQUE], joints, body, work[A])
+            _add_stage(work, 2.0 if stage in (1, 2) else 1.0)
+        _end(state, work, h / 6.0, joints)
+        for j in range(n):
+            if flags[j] != 0:
+                turning = state[j, ROTOR_SPEED] if flags[j] & at.HAS_FLEXIBILITY else state[j, SPEED]
+                after_step(state[j], joints[j], flags[j], work[LEVEL, j], turning, volts[j], h)
+
+
+@compiled
+def _begin(state: NDArray[Any], work: NDArray[Any]) -> None:
+    """A step begins: stage values are those of the state, accelerations and sums are zero."""
+    for j in range(state.shape[0]):
+        work[V, j], work[W, j] = state[j, SPEED], state[j, ROTOR_SPEED]
+        work[A, j], work[B, j] = 0.0 * state[j, SPEED], 0.0 * state[j, SPEED]
+        for row in (SUM_V, SUM_A, SUM_W, SUM_B):
+            work[row, j] = 0.0 * state[j, SPEED]
+
+
+@compiled
+def _to_stage(state: NDArray[Any], work: NDArray[Any], reach: complex) -> None:
+    """Stage values from the state and the rates of the stage before."""
+    for j in range(state.shape[0]):
+        work[Q, j] = state[j, POSITION] + reach * work[V, j]
+        work[M, j] = state[j, ROTOR_POSITION] + reach * work[W, j]
+        work[V, j] = state[j, SPEED] + reach * work[A, j]
+        work[W, j] = state[j, ROTOR_SPEED] + reach * work[B, j]
+
+
+@compiled
+def _add_stage(work: NDArray[Any], weight: float) -> None:
+    """The stage's rates, weighted, into the sums."""
+    for j in range(work.shape[1]):
+        work[SUM_V, j] += weight * work[V, j]
+        work[SUM_A, j] += weight * work[A, j]
+        work[SUM_W, j] += weight * work[W, j]
+        work[SUM_B, j] += weight * work[B, j]
+
+
+@compiled
+def _end(state: NDArray[Any], work: NDArray[Any], sixth: complex, joints: NDArray[Any]) -> None:
+    """The state after the step."""
+    for j in range(state.shape[0]):
+        moved = sixth * work[SUM_V, j]
+        state[j, DEFLECTION] = deflection(state[j, DEFLECTION], moved, 1.0 / joints[j, at.PRESLIDING])
+        state[j, POSITION] += moved
+        state[j, SPEED] += sixth * work[SUM_A, j]
+        state[j, ROTOR_POSITION] += sixth * work[SUM_W, j]
+        state[j, ROTOR_SPEED] += sixth * work[SUM_B, j]
