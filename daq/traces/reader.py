@@ -24,23 +24,25 @@ def read_trace(path: Path) -> Trace:
     """
     path = Path(path)
     try:
-        data = path.read_bytes()
+        if path.name.endswith(layout.PART_SUFFIX) or path.stat().st_size < cache.WORTH_IT:
+            return _decoded(path)
+        key = cache.key_of(path)
+        trace = cache.load(path, key)
+        if trace is None:
+            trace = _decoded(path)
+            cache.store(path, key, trace)
     except OSError as error:
         raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
-    if path.name.endswith(layout.PART_SUFFIX):
-        return trace_of(scan(data, str(path)), str(path))
-    worth_it = len(data) >= cache.WORTH_IT
-    key = cache.key_of(data) if worth_it else ""
-    cached = cache.load(path, key) if worth_it else None
-    if cached is not None:
-        return cached
-    found = scan(data, str(path))
-    if found.damage:
-        raise TraceError(f"{path}: is damaged after byte {found.good_bytes} of {len(data)}: {found.damage}")
-    trace = trace_of(found, str(path))
-    if worth_it:
-        cache.store(path, key, trace)
     return trace
+
+
+def _decoded(path: Path) -> Trace:
+    """The trace from the file itself. Raises TraceError, OSError."""
+    data = path.read_bytes()
+    found = scan(data, str(path))
+    if found.damage and not path.name.endswith(layout.PART_SUFFIX):
+        raise TraceError(f"{path}: is damaged after byte {found.good_bytes} of {len(data)}: {found.damage}")
+    return trace_of(found, str(path))
 
 
 def trace_of(found: Scan, origin: str) -> Trace:
