@@ -130,9 +130,9 @@ def rig_on(mock: MockProcess, folder: Path) -> Iterator[Rig]:
             arm.ask("fault_off", fault=fault["label"])
         controller.stop()  # set points where the arm is, whatever a test has done to it
         controller.release()
-        rest = ExperimentSpec(
-            trajectory=Pause(duration=0.1), settle=0, hold=0, gains=dict.fromkeys(range(1, 7), (2, 0, 0))
-        )
+        for joint in range(1, 7):
+            controller.set_gains(joint, 2, 0, 0)
+        rest = ExperimentSpec(trajectory=Pause(duration=0.1), settle=0, hold=0)
         arm.run(rest).trace.unlink()
         arm.ears = Ears()
         yield arm

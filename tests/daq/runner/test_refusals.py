@@ -30,7 +30,7 @@ def refused(arm: Rig, error: type[DaqError], match: str, spec: ExperimentSpec = 
     [
         ({"trajectory": Ramp(amplitude=math.radians(200))}, r"experiment refused: joint \d: .* allowed are"),
         ({"trajectory": Ramp(amplitude=math.radians(40), duration=0.2)}, r"experiment refused: joint \d: .*°/s"),
-        ({"start": {1: math.radians(20)}}, r"move to start refused: joint 1: .* allowed are"),
+        ({"start": {2: math.radians(-44), 3: math.radians(-80)}}, r"move to start refused: .*allowed are"),
     ],
     ids=["range", "speed", "start"],
 )
