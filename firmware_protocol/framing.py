@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from firmware_protocol.errors import ProtocolError
 
-DELIMITER = 0
+DELIMITER = b"\0"
 MAX_PAYLOAD = 48
 """Bytes of payload in one frame; six joints' full snapshot fits exactly."""
 HEADER = 4
@@ -69,23 +69,22 @@ def unstuff(encoded: bytes) -> bytes:
         raise ProtocolError(f"{len(encoded)} bytes between delimiters: allowed are 1 to {MAX_ENCODED}")
     if 0 in encoded:
         raise ProtocolError("a zero between delimiters")
-    body = bytearray()
+    body = bytearray(encoded)
+    size = len(body)
     position = 0
-    while position < len(encoded):
-        end = position + encoded[position]
-        if end > len(encoded):
-            raise ProtocolError(f"byte stuffing broken at byte {position}")
-        body += encoded[position + 1 : end]
-        if end < len(encoded):
-            body.append(0)
-        position = end
-    return bytes(body)
+    while position < size:
+        code = body[position]
+        body[position] = 0  # each code byte but the first stands for a zero
+        position += code
+    if position > size:
+        raise ProtocolError(f"byte stuffing broken: it ends {position - size} bytes after the frame")
+    return bytes(body[1:])
 
 
 def encode_frame(frame: Frame) -> bytes:
     """The frame as it travels, delimiters included."""
     body = bytes((len(frame.payload), frame.sequence & 0xFF, frame.sequence >> 8, frame.opcode)) + frame.payload
-    return b"\0" + stuff(body + crc16(body).to_bytes(2, "big")) + b"\0"
+    return DELIMITER + stuff(body + crc16(body).to_bytes(2, "big")) + DELIMITER
 
 
 def decode_body(encoded: bytes) -> Frame:
@@ -117,14 +116,13 @@ class FrameDecoder:
     def feed(self, data: bytes) -> list[Frame]:
         """The frames that `data` completes, in order. Damage is counted, never raised."""
         frames: list[Frame] = []
-        start = 0
-        while (end := data.find(DELIMITER, start)) >= 0:
-            self._take(data, start, end)
+        *ended, begun = data.split(DELIMITER)
+        for piece in ended:
+            self._take(piece)
             frame = self._finish()
             if frame is not None:
                 frames.append(frame)
-            start = end + 1
-        self._take(data, start, len(data))
+        self._take(begun)
         return frames
 
     @property
@@ -137,12 +135,12 @@ class FrameDecoder:
         self._partial.clear()
         self._overrun = False
 
-    def _take(self, data: bytes, start: int, end: int) -> None:
-        if self._overrun or len(self._partial) + end - start > MAX_ENCODED:
+    def _take(self, piece: bytes) -> None:
+        if self._overrun or len(self._partial) + len(piece) > MAX_ENCODED:
             self._overrun = True
             self._partial.clear()
-        else:
-            self._partial += data[start:end]
+        elif piece:
+            self._partial += piece
 
     def _finish(self) -> Frame | None:
         if self._overrun:

@@ -69,6 +69,14 @@ class JointReading:
     power: int
 
     def __post_init__(self) -> None:
+        # Six are made on either side in every period: what is in range is found so at once.
+        if (
+            0 <= self.set_point <= SET_POINT_REGISTER_MAX
+            and 0 <= self.position < ADC_COUNTS
+            and -0x8000 <= self.error <= 0x7FFF
+            and -0x80 <= self.power <= 0x7F
+        ):
+            return
         check_range("set point", self.set_point, 0, SET_POINT_REGISTER_MAX)
         check_range("position", self.position, 0, ADC_COUNTS - 1)
         check_range("error", self.error, -0x8000, 0x7FFF)

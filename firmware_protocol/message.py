@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass, fields
+from functools import cache
 from typing import ClassVar, Self
 
 from firmware_protocol.errors import PayloadLengthError, ProtocolError
@@ -49,17 +50,29 @@ class Message:
     LAYOUT: ClassVar[str] = "<"
 
     def __post_init__(self) -> None:
-        for letter, field in zip(self.LAYOUT[1:], fields(self), strict=True):
-            check_range(f"{type(self).__name__}: {field.name}", getattr(self, field.name), *_RANGES[letter])
+        for name, lowest, highest in self._ranges():
+            value = getattr(self, name)
+            if not lowest <= value <= highest:
+                check_range(f"{type(self).__name__}: {name}", value, lowest, highest)
 
     def pack(self) -> bytes:
         """Payload bytes."""
-        return struct.pack(self.LAYOUT, *(getattr(self, field.name) for field in fields(self)))
+        return struct.pack(self.LAYOUT, *[getattr(self, name) for name, _, _ in self._ranges()])
+
+    @classmethod
+    def _ranges(cls) -> tuple[tuple[str, int, int], ...]:
+        return _ranges_of(cls)  # type: ignore[arg-type]  # mypy takes the classes of dataclasses for unhashable
 
     @classmethod
     def parse(cls, payload: bytes) -> Self:
         """The message of a payload. Raises ProtocolError for any payload that `pack` cannot have made."""
         return cls(*unpack(cls.LAYOUT, payload, cls.__name__))
+
+
+@cache
+def _ranges_of(kind: type[Message]) -> tuple[tuple[str, int, int], ...]:
+    """Name and range of each field of a message with plain integer fields."""
+    return tuple((field.name, *_RANGES[letter]) for letter, field in zip(kind.LAYOUT[1:], fields(kind), strict=True))
 
 
 class Request(Message):

@@ -48,6 +48,8 @@ class BoardCounters:
 class Board:
     """Controller and arm, switched on at time 0 with the arm where `plant` has it.
 
+    `arm_seed` draws what belongs to this very arm, its potentiometers' curves; without it `seed` does.
+
     Raises BoardError when the plant's step does not divide the period and the computing delay.
     """
 
@@ -58,6 +60,7 @@ class Board:
         plant: Plant,
         seed: int,
         modifications: Iterable[Modification] = (),
+        arm_seed: int | None = None,
     ) -> None:
         modifications = tuple(modifications)
         for change in of_kind(modifications, ChangesBoard):
@@ -65,7 +68,7 @@ class Board:
         self.parameters = parameters
         self.plant = plant
         self.memory = SharedMemory(memory_map)
-        self.sensors = PositionSensors(parameters, seed, modifications)
+        self.sensors = PositionSensors(parameters, seed, modifications, arm_seed)
         self.snapshots = SnapshotRing()
         self.counters = BoardCounters()
         self._timing = parameters.timing
@@ -73,7 +76,7 @@ class Board:
             if value % plant.step_us:
                 raise BoardError(f"{name} of {value} µs: must be a multiple of the plant's step, {plant.step_us} µs")
         self._set_point_effects: list[ChangesSetPoint] = of_kind(modifications, ChangesSetPoint)
-        self._pids = [IntegerPid(parameters.integral_shift) for _ in range(JOINTS)]
+        self._pids = [IntegerPid(parameters.integral_shift, scale) for scale in parameters.controller_scales]
         self._volts_per_count = [
             calibration.direction * parameters.dac_full_scale / DAC_MAX for calibration in parameters.calibrations
         ]

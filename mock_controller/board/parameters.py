@@ -33,6 +33,7 @@ class BoardParameters:
 
     `linearity` is the potentiometers' largest error as a fraction of the range, `noise` the converter's rms in
     counts before rounding, `dac_full_scale` the volts of 127 DAC counts, `default_gains` (P, I, D) those in EPROM.
+    `controller_scales` multiply the controllers' outputs before their limit; 1 is what a gain stands for.
     """
 
     timing: BoardTiming
@@ -42,6 +43,7 @@ class BoardParameters:
     integral_shift: int
     default_gains: tuple[tuple[int, int, int], ...]
     calibrations: tuple[JointCalibration, ...]
+    controller_scales: tuple[float, ...] = (1.0,) * JOINTS
 
 
 def parse_board(text: str, origin: str = "board file") -> tuple[BoardParameters, tuple[Provenance, ...]]:

@@ -10,16 +10,19 @@ of these scales: they are assumptions, except that gains run from 0 to 20 and th
 
 from __future__ import annotations
 
+from math import floor
+
 from firmware_protocol.units import DAC_MAX
 
 
 class IntegerPid:
-    """State of one joint's controller."""
+    """State of one joint's controller. A `scale` other than 1 multiplies its output before the limit."""
 
-    __slots__ = ("_integral_limit", "_last_power", "_previous", "_shift", "_sum")
+    __slots__ = ("_integral_limit", "_last_power", "_previous", "_scale", "_shift", "_sum")
 
-    def __init__(self, integral_shift: int) -> None:
+    def __init__(self, integral_shift: int, scale: float = 1.0) -> None:
         self._shift = integral_shift
+        self._scale = scale
         self._integral_limit = DAC_MAX << integral_shift
         self.reset()
 
@@ -40,5 +43,7 @@ class IntegerPid:
         change = 0 if self._previous is None else error - self._previous
         self._previous = error
         power = p * error + (self._sum >> self._shift) + d * change
+        if self._scale != 1.0:
+            power = floor(self._scale * power + 0.5)
         self._last_power = min(max(power, -DAC_MAX), DAC_MAX)
         return self._last_power

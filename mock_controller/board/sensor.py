@@ -13,7 +13,7 @@ from random import Random
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.units import ADC_COUNTS, JointCalibration
 from mock_controller.board.parameters import BoardParameters
-from mock_controller.modifications.interface import ChangesSensor, Modification, of_kind
+from mock_controller.modifications.interface import ChangesReading, ChangesSensor, KnowsBoard, Modification, of_kind
 
 _CELLS = 256
 """Cells of a linearity curve's table, interpolated linearly: good to a hundredth of a count."""
@@ -43,27 +43,55 @@ class LinearityCurve:
 
 
 class PositionSensors:
-    """The six potentiometers and their converter; every draw comes from `seed`, joint by joint."""
+    """The six potentiometers and their converter; noise is drawn from `seed`, joint by joint.
 
-    def __init__(self, parameters: BoardParameters, seed: int, modifications: Iterable[Modification] = ()) -> None:
+    The curves are drawn from `arm_seed`, by default the same: another day's noise on the same potentiometers.
+    """
+
+    def __init__(
+        self,
+        parameters: BoardParameters,
+        seed: int,
+        modifications: Iterable[Modification] = (),
+        arm_seed: int | None = None,
+    ) -> None:
+        arm_seed = seed if arm_seed is None else arm_seed
         limit = parameters.linearity * ADC_COUNTS
         self._calibrations: tuple[JointCalibration, ...] = parameters.calibrations
-        self._curves = [LinearityCurve(Random(f"linearity {seed} {j}"), limit) for j in range(1, JOINTS + 1)]
+        self._curves = [LinearityCurve(Random(f"linearity {arm_seed} {j}"), limit) for j in range(1, JOINTS + 1)]
         self._noise_source = [Random(f"noise {seed} {j}") for j in range(1, JOINTS + 1)]
         self._noise = [parameters.noise] * JOINTS
         self._usual_noise = parameters.noise
         self._stuck: dict[int, int] = {}
         self._last = [0] * JOINTS
+        modifications = tuple(modifications)
         self._effects: list[ChangesSensor] = of_kind(modifications, ChangesSensor)
+        self._converter_effects: list[ChangesReading] = of_kind(modifications, ChangesReading)
+        for curious in of_kind(modifications, KnowsBoard):
+            curious.know_board(parameters)
 
     def read(self, angles: Sequence[float]) -> tuple[int, ...]:
         """ADC counts (0–4095) of six joint angles (rad)."""
-        if self._effects:
-            angles = list(angles)
-            for effect in self._effects:
-                angles[effect.joint - 1] = effect.sensed_angle(angles[effect.joint - 1])
-        self._last = [self._convert(index, angle) for index, angle in enumerate(angles)]
-        return tuple(self._last)
+        # The noise is drawn whatever happens, so that a fault of one moment leaves later noise as it was.
+        noise = [rms * source.gauss(0.0, 1.0) for rms, source in zip(self._noise, self._noise_source, strict=True)]
+        counts = [min(max(math.floor(value + 0.5), 0), ADC_COUNTS - 1) for value in self.unrounded(angles, noise)]
+        for index, stuck in self._stuck.items():
+            counts[index] = stuck
+        self._last = counts
+        return tuple(counts)
+
+    def unrounded(self, angles: Sequence[float], noise: Sequence[float]) -> list[float]:
+        """What the converter would show of six joint angles (rad) if it did not round, with `noise` (counts) on it."""
+        angles = list(angles)
+        for effect in self._effects:
+            angles[effect.joint - 1] = effect.sensed_angle(angles[effect.joint - 1])
+        ideal = [scale.rad_to_counts(angle) for scale, angle in zip(self._calibrations, angles, strict=True)]
+        counts = [
+            value + curve.at(value) + extra for value, curve, extra in zip(ideal, self._curves, noise, strict=True)
+        ]
+        for converter in self._converter_effects:
+            counts[converter.joint - 1] = converter.reading(counts[converter.joint - 1])
+        return counts
 
     def stick(self, joint: int) -> None:
         """The wiper of `joint` (from 1) stays where it is: the reading no longer follows the arm."""
@@ -77,13 +105,3 @@ class PositionSensors:
         """`joint` (from 1) neither sticks nor crackles any more."""
         self._stuck.pop(joint - 1, None)
         self._noise[joint - 1] = self._usual_noise
-
-    def _convert(self, index: int, angle: float) -> int:
-        # The noise is drawn whatever happens, so that a fault of one moment leaves later noise as it was.
-        noise = self._noise[index] * self._noise_source[index].gauss(0.0, 1.0)
-        stuck = self._stuck.get(index)
-        if stuck is not None:
-            return stuck
-        ideal = self._calibrations[index].rad_to_counts(angle)
-        counts = math.floor(ideal + self._curves[index].at(ideal) + noise + 0.5)
-        return min(max(counts, 0), ADC_COUNTS - 1)

@@ -60,6 +60,11 @@ from mock_controller.timeline import Timeline
 WAIT_LIMIT_PERIODS = 25
 """A sample that has waited for so many periods is refused: the controller does not run."""
 
+# Plain integers: combining the flags themselves costs more than all else about an answer.
+_FROZEN, _RESTARTED, _SET_POINT_MISSED = (
+    int(flag) for flag in (StatusFlag.FROZEN, StatusFlag.RESTARTED, StatusFlag.SET_POINT_MISSED)
+)
+
 
 @dataclass
 class _WaitingSample:
@@ -127,14 +132,12 @@ class Bridge:
     @property
     def wake_us(self) -> int | None:
         """When a waiting request may be answered; None when none waits."""
-        if self._sample is None and self._advance is None:
-            return None
-        times = []
-        if self._sample is not None:
-            times.append(min(self._board.next_event_us, max(self._sample.until_us, self.time_us)))
-        if self._advance is not None:
-            times.append(max(self._advance.until_us, self.time_us))
-        return min(times)
+        sample, advance = self._sample, self._advance
+        if sample is None:
+            return None if advance is None else max(advance.until_us, self._board.time_us)
+        now = self._board.time_us
+        wake = min(self._board.next_event_us, max(sample.until_us, now))
+        return wake if advance is None else min(wake, max(advance.until_us, now))
 
     def hang_up(self) -> None:
         """Nobody waits any more. What the host has said before it went still counts."""
@@ -182,14 +185,8 @@ class Bridge:
     # --- at once
 
     def _flags(self, frozen: bool, missed: bool = False) -> int:
-        flags = StatusFlag(0)
-        if frozen:
-            flags |= StatusFlag.FROZEN
-        if self._board.counters.boots != self._boots_greeted:
-            flags |= StatusFlag.RESTARTED
-        if missed:
-            flags |= StatusFlag.SET_POINT_MISSED
-        return flags
+        restarted = self._board.counters.boots != self._boots_greeted
+        return frozen * _FROZEN | restarted * _RESTARTED | missed * _SET_POINT_MISSED
 
     def _hello(self, _: Hello) -> Reply:
         board = self._board
@@ -261,12 +258,11 @@ class Bridge:
         return []
 
     def _snapshot(self, found: PeriodSnapshot, joints: tuple[int, ...]) -> Reply:
-        rows = zip(found.set_points, found.positions, found.errors, found.powers, strict=True)
-        readings = [JointReading(*row) for row in rows]
+        registers = (found.set_points, found.positions, found.errors, found.powers)
         return Snapshot(
             found.tick,
             self._flags(found.frozen, found.set_point_missed),
-            tuple((joint, readings[joint - 1]) for joint in joints),
+            tuple((joint, JointReading(*(values[joint - 1] for values in registers))) for joint in joints),
         )
 
     def _begin_advance(self, sequence: int, request: Advance, *, again: bool) -> list[Frame]:

@@ -115,8 +115,11 @@ class Link:
     @property
     def owes(self) -> bool:
         """Whether bytes are on the line, or a request waits for its moment."""
-        on_line = bool(self._arriving) and self._arriving[0][0] <= max(self.time_us, self._last_bit_us)
-        return on_line or bool(self._outbox) or self._bridge.wake_us is not None
+        if self._outbox:
+            return True
+        if self._arriving and self._arriving[0][0] <= max(self.time_us, self._last_bit_us):
+            return True
+        return self._bridge.wake_us is not None
 
     @property
     def delayed(self) -> bool:
@@ -125,11 +128,11 @@ class Link:
 
     def next_event_us(self) -> int | None:
         """When something happens next; None when nothing will without the host."""
-        times = [queue[0][0] for queue in (self._arriving, self._leaving, self._outbox) if queue]
-        wake = self._bridge.wake_us
-        if wake is not None:
-            times.append(wake)
-        return min(times, default=None)
+        event = self._bridge.wake_us
+        for queue in (self._arriving, self._leaving, self._outbox):
+            if queue and (event is None or queue[0][0] < event):
+                event = queue[0][0]
+        return event
 
     # --- bytes
 
@@ -150,10 +153,10 @@ class Link:
 
     def take_output(self) -> bytes:
         """Bytes that have reached the host's end of the line by now."""
-        output = bytearray()
+        output = b""
         while self._outbox and self._outbox[0][0] <= self.time_us:
             output += self._outbox.popleft()[2]
-        return bytes(output)
+        return output
 
     def run_until(self, time_us: int) -> None:
         """Lets everything happen that happens up to a time (µs); the bridge's own work may end a little later."""

@@ -32,6 +32,27 @@ class ChangesPlant(Modification, Protocol):
 
 
 @runtime_checkable
+class KnowsPlant(Modification, Protocol):
+    """Is told the arm's constants and the length of a step (s), once, before anything moves."""
+
+    def know_plant(self, parameters: PlantParameters, step_s: float) -> None: ...
+
+
+@runtime_checkable
+class KnowsBoard(Modification, Protocol):
+    """Is told the board's constants, once, before the first reading."""
+
+    def know_board(self, parameters: BoardParameters) -> None: ...
+
+
+@runtime_checkable
+class CouplesDrives(Modification, Protocol):
+    """Volts at all six amplifiers' outputs, before anything else acts on them. Asked once per new voltages."""
+
+    def coupled_volts(self, volts: Sequence[float]) -> list[float]: ...
+
+
+@runtime_checkable
 class ChangesDriveVoltage(Modification, Protocol):
     """Volts at one joint's motor, between the amplifier's gain and its supply limit. Asked once per new voltage."""
 
@@ -41,17 +62,26 @@ class ChangesDriveVoltage(Modification, Protocol):
 
 
 @runtime_checkable
-class ChangesMotorTorque(Modification, Protocol):
-    """Motor torque at one joint (after gear and viscous friction). Asked every step."""
+class ChangesMotorVolts(Modification, Protocol):
+    """Volts at one joint's motor, after the supply limit. Asked every step, with what the amplifier means to give."""
 
     joint: int
 
-    def motor_torque(self, torque: float, time_s: float, angle: float, rate: float) -> float: ...
+    def motor_volts(self, volts: float) -> float: ...
+
+
+@runtime_checkable
+class ChangesMotorTorque(Modification, Protocol):
+    """What is added to one joint's motor torque (`torque`: after gear and viscous friction). Asked every step."""
+
+    joint: int
+
+    def torque_change(self, torque: float, time_s: float, angle: float, rate: float) -> float: ...
 
 
 @runtime_checkable
 class ChangesFriction(Modification, Protocol):
-    """Level (≥ 0) that one joint's Coulomb friction may reach. Asked every step."""
+    """Level (≥ 0) that one joint's Coulomb friction may reach. Asked every step, after `torque_change`."""
 
     joint: int
 
@@ -68,6 +98,15 @@ class ChangesTransmission(Modification, Protocol):
 
 
 @runtime_checkable
+class AddsJointTorque(Modification, Protocol):
+    """Torque on one joint's link, a function of time and the joint's own motion. Asked every step."""
+
+    joint: int
+
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float: ...
+
+
+@runtime_checkable
 class AddsTorque(Modification, Protocol):
     """Torque from outside on all joints, a function of time and state (six values). Asked every step."""
 
@@ -81,6 +120,15 @@ class ChangesSensor(Modification, Protocol):
     joint: int
 
     def sensed_angle(self, angle: float) -> float: ...
+
+
+@runtime_checkable
+class ChangesReading(Modification, Protocol):
+    """Reading (ADC counts, not yet rounded) of one joint's converter. Asked every control period."""
+
+    joint: int
+
+    def reading(self, counts: float) -> float: ...
 
 
 @runtime_checkable

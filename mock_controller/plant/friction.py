@@ -23,9 +23,9 @@ class CoulombLevel:
     def __init__(self, parameters: PlantParameters) -> None:
         body = parameters.rigid_body
         g = hypot(*body.gravity)
-        arm = parameters.friction.effective_arm
-        self._link2 = arm * body.m2 * g
-        self._link3 = arm * (body.m3 + body.m_load) * g
+        arms = [parameters.friction.effective_arm + extra for extra in parameters.friction.extra_arms]
+        self._link2 = [arm * body.m2 * g for arm in arms]
+        self._link3 = [arm * (body.m3 + body.m_load) * g for arm in arms]
         constant = [joint.constant_friction for joint in parameters.joints]
         self._c1, self._c2, self._c3 = constant[:3]
         self._wrist = constant[3:]
@@ -36,9 +36,9 @@ class CoulombLevel:
         s23 = sin(q[1] + q[2])
         link2, link3 = self._link2, self._link3
         return [
-            self._c1 + abs(link2 * s2 * cos(q[1]) + link3 * s23 * cos(q[1] + q[2])),
-            self._c2 + abs(link2 * s2 + link3 * s23 * cos(q[2])),
-            self._c3 + abs(link3 * s23),
+            self._c1 + abs(link2[0] * s2 * cos(q[1]) + link3[0] * s23 * cos(q[1] + q[2])),
+            self._c2 + abs(link2[1] * s2 + link3[1] * s23 * cos(q[2])),
+            self._c3 + abs(link3[2] * s23),
             *self._wrist,
         ]
 

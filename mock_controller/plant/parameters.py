@@ -15,7 +15,8 @@ JOINTS = 6
 class RigidBodyParameters:
     """The arm of chapter 7: a cylinder, two thin uniform rods and a load at the end of the last one.
 
-    `gravity` is a vector (m/s²) in base axes; z is up. `load_offset` moves the load's centre (m) along the hand.
+    `gravity` is a vector (m/s²) in base axes; z is up. `load_offset` moves the load's centre (m) along the hand,
+    `centre_shift_2` and `centre_shift_3` those of links 2 and 3 (m) along the link.
     """
 
     m1: float
@@ -30,6 +31,8 @@ class RigidBodyParameters:
     gravity: tuple[float, float, float]
     wrist_inertia: float
     load_offset: float = 0.0
+    centre_shift_2: float = 0.0
+    centre_shift_3: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -60,10 +63,14 @@ class JointParameters:
 
 @dataclass(frozen=True)
 class FrictionParameters:
-    """Coulomb friction: effective arm μ̃ (m) of (7.32)–(7.34) and the displacement (rad) over which it builds up."""
+    """Coulomb friction: effective arm μ̃ (m) of (7.32)–(7.34) and the displacement (rad) over which it builds up.
+
+    `extra_arms` (m) come on top of the common arm at joints 1 to 3, each at its own joint.
+    """
 
     effective_arm: float
     presliding: float
+    extra_arms: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,16 @@ import mujoco
 import numpy as np
 
 from mock_controller.modifications.interface import (
+    AddsJointTorque,
     AddsTorque,
     ChangesDriveVoltage,
     ChangesFriction,
     ChangesMotorTorque,
+    ChangesMotorVolts,
     ChangesPlant,
     ChangesTransmission,
+    CouplesDrives,
+    KnowsPlant,
     Modification,
     Restartable,
     of_kind,
@@ -73,12 +77,25 @@ class Plant:
         """Joint rate (rad/s) that is the presliding displacement a step."""
         self._with_current = [i for i, joint in enumerate(parameters.joints) if joint.inductance > 0.0]
         self._half_damping = [0.0 if i in self._rotors else 0.5 * drive.damping for i, drive in enumerate(self._drives)]
+        for curious in of_kind(self._modifications, KnowsPlant):
+            curious.know_plant(parameters, self._step_s)
+        self._coupling_effects: list[CouplesDrives] = of_kind(self._modifications, CouplesDrives)
+        self._supply_effects: list[ChangesMotorVolts] = of_kind(self._modifications, ChangesMotorVolts)
         self._voltage_effects: list[ChangesDriveVoltage] = of_kind(self._modifications, ChangesDriveVoltage)
         self._torque_effects: list[ChangesMotorTorque] = of_kind(self._modifications, ChangesMotorTorque)
         self._friction_effects: list[ChangesFriction] = of_kind(self._modifications, ChangesFriction)
+        self._joint_effects: list[AddsJointTorque] = of_kind(self._modifications, AddsJointTorque)
         self._outside_effects: list[AddsTorque] = of_kind(self._modifications, AddsTorque)
         self._is_modified = any(
-            (self._with_current, self._rotors, self._torque_effects, self._friction_effects, self._outside_effects)
+            (
+                self._with_current,
+                self._rotors,
+                self._supply_effects,
+                self._torque_effects,
+                self._friction_effects,
+                self._joint_effects,
+                self._outside_effects,
+            )
         )
         self._model.dof_damping[:] = self._half_damping
         self._stalled: set[int] = set()
@@ -163,15 +180,24 @@ class Plant:
             raise PlantError(f"duration of {duration_us} µs: must be a whole number of {self.step_us} µs steps")
         if len(volts_in) != JOINTS or not all(map(math.isfinite, volts_in)):
             raise PlantError(f"voltages {list(volts_in)}: must be {JOINTS} finite numbers")
-        self._motor_volts = self._amplify(volts_in)
-        pushed = [drive.torque_per_volt * volts for drive, volts in zip(self._drives, self._motor_volts, strict=True)]
-        step = self._step_modified if self._is_modified else self._step
+        volts = self._motor_volts = self._amplify(volts_in)
+        if self._is_modified:
+            for _ in range(steps):
+                self._step_modified(volts)
+            return
+        pushed = self._pushed_by(volts)
         for _ in range(steps):
-            step(pushed)
+            self._step(pushed)
+
+    def _pushed_by(self, volts: list[float]) -> list[float]:
+        """Joint torques (N·m) that volts at the motors give within a step, before any damping."""
+        return [drive.torque_per_volt * value for drive, value in zip(self._drives, volts, strict=True)]
 
     def _amplify(self, volts_in: Sequence[float]) -> list[float]:
         amplifier = self.parameters.amplifier
         volts = [amplifier.gain * value for value in volts_in]
+        for coupling in self._coupling_effects:
+            volts = coupling.coupled_volts(volts)
         for effect in self._voltage_effects:
             index = effect.joint - 1
             volts[index] = effect.drive_voltage(volts[index], self.time_us * 1e-6)
@@ -190,24 +216,29 @@ class Plant:
         mujoco.mj_step(self._model, self._data)
         self._steps += 1
 
-    def _step_modified(self, pushed: list[float]) -> None:
-        """One step with everything that a modification or an inductance may add."""
+    def _step_modified(self, asked: list[float]) -> None:
+        """One step at the volts that the amplifiers mean to give, with everything that a modification or an inductance may add."""
         v: list[float] = self._v.tolist()
         q: list[float] = self._q.tolist()
         time_s = self.time_us * 1e-6
         bristle = self._deflect(v)
-        level = self._coulomb.at(q)
-        for friction in self._friction_effects:
-            i = friction.joint - 1
-            level[i] = friction.friction_level(level[i], q[i], v[i])
+        if self._supply_effects:
+            volts = list(asked)
+            for supply in self._supply_effects:
+                volts[supply.joint - 1] = supply.motor_volts(volts[supply.joint - 1])
+            self._motor_volts = volts
         # The motor's torque without the damping that depends on the motor's own speed.
-        motor = list(pushed)
+        motor = self._pushed_by(self._motor_volts)
         for i in self._with_current:
             motor[i] += self._drives[i].torque_per_held_ampere * self._current[i]
         for effect in self._torque_effects:
             i = effect.joint - 1
             damping = self._drives[i].damping * (self._rotors[i].rate if i in self._rotors else v[i])
-            motor[i] = effect.motor_torque(motor[i] - damping, time_s, q[i], v[i]) + damping
+            motor[i] += effect.torque_change(motor[i] - damping, time_s, q[i], v[i])
+        level = self._coulomb.at(q)
+        for friction in self._friction_effects:
+            i = friction.joint - 1
+            level[i] = friction.friction_level(level[i], q[i], v[i])
         speed_before = [self._rotors[i].rate if i in self._rotors else v[i] for i in self._with_current]
         torque = [
             self._rotors[i].advance(motor[i], q[i], v[i], self._step_s)
@@ -215,9 +246,11 @@ class Plant:
             else motor[i] - self._half_damping[i] * v[i]
             for i in range(JOINTS)
         ]
+        for own in self._joint_effects:
+            torque[own.joint - 1] += own.joint_torque(time_s, q[own.joint - 1], v[own.joint - 1])
         for outside in self._outside_effects:
             added = outside.external_torque(time_s, q, v)
-            torque = [own + extra for own, extra in zip(torque, added, strict=True)]
+            torque = [inside + extra for inside, extra in zip(torque, added, strict=True)]
         self._applied[:] = [torque[i] - level[i] * bristle[i] for i in range(JOINTS)]
         mujoco.mj_step(self._model, self._data)
         self._advance_currents(speed_before)

@@ -46,8 +46,8 @@ def _mjcf(parameters: PlantParameters, step_s: float, free_rotors: Collection[in
     waist = _inertial(0.0, 0.0, max(body.m1, 1e-6), (about_waist, about_waist, about_waist))
     rod2 = body.m2 * body.a2**2 / 12
     rod3 = body.m3 * body.a3**2 / 12
-    upper_arm = _inertial(body.a2 / 2, body.b2, body.m2, (0.0, rod2, rod2))
-    forearm = _inertial(body.a3 / 2, -body.b3, body.m3, (0.0, rod3, rod3))
+    upper_arm = _inertial(body.a2 / 2 + body.centre_shift_2, body.b2, body.m2, (0.0, rod2, rod2))
+    forearm = _inertial(body.a3 / 2 + body.centre_shift_3, -body.b3, body.m3, (0.0, rod3, rod3))
     own = (body.wrist_inertia,) * 3
     # Only the last body carries weight, so that a hand at any angle is the published point load.
     massless = _inertial(0.0, 0.0, 1e-6, own)
