@@ -1,0 +1,164 @@
+"""Accelerations that a model expects along a measured motion, and their exact derivatives by its parameters.
+
+The right-hand side of the equations of motion, f of (4.1), evaluated at the measured state and the recorded drive. With
+positions as outputs C·J_a of (4.19) is zero, since rates of position contain no parameters; accelerations contain them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError
+from model.drives.amplifier import motor_volts
+from model.dynamics.compilation import compiled
+from model.dynamics.dual import DUAL_STEP
+from model.machine_model import layout as at
+from model.machine_model.model import Model
+from model.simulation.dynamics_of_run import accelerate, body_of, friction_levels_of
+from model.simulation.engines import is_rod_arm
+from model.simulation.joint_torques import extra_torque, motor_damping, motor_gain
+from model.simulation.period import extra_flags
+from model.simulation.specialised import AnyChain, ClosedForm, entry
+from model.validation.differentiation import smoothed
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MeasuredMotion:
+    """A motion on a grid of control periods, smoothed: time (k,) s; position, speed, friction (k, n).
+
+    `friction` is the contact's deflection in [−1, 1] that goes with the motion; `drive` (k, n) the recorded commanded
+    volts, not smoothed; `width` the smoothing in samples.
+    """
+
+    time: Floats
+    position: Floats
+    speed: Floats
+    friction: Floats
+    drive: Floats
+    period: float
+    width: float
+
+
+def expected_accelerations(model: Model, motion: MeasuredMotion, names: Sequence[str]) -> tuple[Floats, Floats]:
+    """Accelerations f (k, n) and their derivatives (p, k, n) by the named parameters.
+
+    Raises:
+        SpecError: for a model with a flexible transmission, whose rotor is not measured, or an unknown parameter.
+    """
+    if (model.flags & at.HAS_FLEXIBILITY).any():
+        raise SpecError("the time-domain form needs rigid transmissions: a rotor's own motion is not measured")
+    plain = _accelerations(model, motion, model.vector)
+    derivatives = np.zeros((len(names), *plain.shape))
+    for row, name in enumerate(names):
+        vector = model.vector.astype(np.complex128)
+        vector[list(model.parameter(name).slots)] += 1j * DUAL_STEP
+        derivatives[row] = _accelerations(model, motion, vector).imag / DUAL_STEP
+    return plain, derivatives
+
+
+def damping_rates(model: Model, motion: MeasuredMotion) -> Floats:
+    """How fast accelerations answer to speed (n,), 1/s: −∂f/∂q̇ of each joint, its mean along the motion."""
+    rates = np.empty(model.joint_count)
+    for j in range(model.joint_count):
+        speed = motion.speed.astype(np.complex128)
+        speed[:, j] += 1j * DUAL_STEP
+        stepped = MeasuredMotion(**{**vars(motion), "speed": speed})
+        rates[j] = -(_accelerations(model, stepped, model.vector.astype(np.complex128)).imag[:, j] / DUAL_STEP).mean()
+    return rates
+
+
+def _accelerations(model: Model, motion: MeasuredMotion, vector: NDArray[Any]) -> NDArray[Any]:
+    settings = np.zeros(at.SETTINGS, dtype=np.int64)
+    rods = is_rod_arm(model.machine)
+    settings[at.PUBLISHED_LOADS] = int(rods)
+    volts = smoothed(averaged_volts(motion.drive, motion.period, vector), motion.width)
+    out = np.zeros(motion.position.shape, dtype=vector.dtype)
+    run = _along_rods if rods else _along_chain
+    signals = (np.ascontiguousarray(s, dtype=vector.dtype) for s in (motion.position, motion.speed, motion.friction, volts))
+    run(*signals, motion.time, np.ascontiguousarray(vector), model.flags, settings, out)
+    return out
+
+
+def averaged_volts(drive: Floats, period: float, vector: NDArray[Any]) -> NDArray[Any]:
+    """Motor volts (k, n) averaged over ±period about each sample with triangular weights, real or dual.
+
+    The drive computed in period k acts from its delay on until the next one does.
+    """
+    joints = vector[at.SHARED :].reshape(drive.shape[1], at.PER_JOINT)
+    volts = np.empty(drive.shape, dtype=vector.dtype)
+    _after_amplifier(drive.astype(vector.dtype), joints, volts)
+    result = np.zeros_like(volts)
+    for j in range(drive.shape[1]):
+        delay = vector[at.DELAY] + joints[j, at.EXTRA_DELAY]
+        whole = int(np.floor(delay.real / period + 1e-12))
+        for shift in range(-whole - 2, 1 - whole):
+            weight = _weight_below((shift + 1) * period + delay, period) - _weight_below(shift * period + delay, period)
+            rows = np.clip(np.arange(len(drive)) + shift, 0, len(drive) - 1)
+            result[:, j] += weight * volts[rows, j]
+    return result
+
+
+def _weight_below(s: Any, period: float) -> Any:
+    """Share of the triangular weights over ±period that lies before s."""
+    if s.real <= -period:
+        return 0.0 * s
+    if s.real >= period:
+        return 1.0 + 0.0 * s
+    if s.real <= 0:
+        return 0.5 * (1 + s / period) * (1 + s / period)
+    return 1.0 - 0.5 * (1 - s / period) * (1 - s / period)
+
+
+@compiled
+def _after_amplifier(drive: NDArray[Any], joints: NDArray[Any], volts: NDArray[Any]) -> None:
+    for k in range(drive.shape[0]):
+        for j in range(drive.shape[1]):
+            volts[k, j] = motor_volts(drive[k, j], joints[j])
+
+
+@compiled
+def _along(
+    kind: Any, position: NDArray[Any], speed: NDArray[Any], friction: NDArray[Any], volts: NDArray[Any],
+    time: NDArray[Any], vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any], out: NDArray[Any],
+) -> None:  # fmt: skip
+    n = position.shape[1]
+    shared = vector[: at.SHARED]
+    joints = vector[at.SHARED :].reshape(n, at.PER_JOINT)
+    body = body_of(kind, shared, joints, flags)
+    modes = extra_flags(joints, flags)
+    level = np.empty(n, dtype=vector.dtype)
+    torque = np.empty(n, dtype=vector.dtype)
+    cold = 0.0 * shared[0]
+    for k in range(position.shape[0]):
+        friction_levels_of(kind, position[k], joints, body, settings, level)
+        for j in range(n):
+            q, v, z, u = position[k, j], speed[k, j], friction[k, j], volts[k, j]
+            pull = motor_gain(joints[j], cold) * u
+            torque[j] = pull - motor_damping(joints[j], cold) * v - z * level[j]
+            if modes[j] & at.HAS_EXTRA_TORQUE:
+                motor = pull - (motor_damping(joints[j], cold) - joints[j, at.VISCOUS] * joints[j, at.GEAR] ** 2) * v
+                torque[j] += extra_torque(joints[j], modes[j], time[k] + cold, q, v, z, cold, motor)
+        accelerate(kind, position[k], speed[k], torque, joints, body, out[k])
+
+
+@entry
+def _along_rods(
+    position: NDArray[Any], speed: NDArray[Any], friction: NDArray[Any], volts: NDArray[Any], time: NDArray[Any],
+    vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any], out: NDArray[Any],
+) -> None:  # fmt: skip
+    _along(ClosedForm(0), position, speed, friction, volts, time, vector, flags, settings, out)
+
+
+@entry
+def _along_chain(
+    position: NDArray[Any], speed: NDArray[Any], friction: NDArray[Any], volts: NDArray[Any], time: NDArray[Any],
+    vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any], out: NDArray[Any],
+) -> None:  # fmt: skip
+    _along(AnyChain(0), position, speed, friction, volts, time, vector, flags, settings, out)

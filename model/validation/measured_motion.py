@@ -1,0 +1,103 @@
+"""What a trace says about the motion: positions on the grid of periods, smoothed, with speeds and their noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import TraceError
+from daq.contracts.trace import Trace
+from model.machine_model import layout as at
+from model.machine_model.model import Model
+from model.simulation.inputs import inputs_of
+from model.validation import differentiation as d
+from model.validation.acceleration_model import MeasuredMotion, damping_rates
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+NOISE_SHARE = 0.05
+"""Smoothing is chosen so that noise stays below this share of the acceleration."""
+MOVING = 4.0
+"""A joint moves where its speed exceeds so many standard deviations of its noise."""
+SHORTEST = 12
+"""Samples that a trace needs at least."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """A trace as the time-domain form uses it.
+
+    motion: smoothed. acceleration: (k, n) rad/s², with the same smoothing. noise: (n,) standard deviation of the
+    difference between measured and expected acceleration. usable: (k, n) where a joint moves and nothing is missing.
+    """
+
+    motion: MeasuredMotion
+    acceleration: Floats
+    noise: Floats
+    usable: Mask
+
+
+def observe(model: Model, trace: Trace, smoothing: float | None = None) -> Observation:
+    """Smoothed motion of a trace; `smoothing` is the kernel's standard deviation in s, chosen from the noise if None.
+
+    Raises:
+        TraceError: for a trace without recorded drive, or too short.
+        SpecError: for a trace without motion.
+    """
+    if trace.drive is None:
+        raise TraceError(f"trace {trace.record.trace_id}: has no recorded drive, which the time-domain form needs")
+    if len(trace) < SHORTEST:
+        raise TraceError(f"trace {trace.record.trace_id}: {len(trace)} samples; at least {SHORTEST} are needed")
+    inputs = inputs_of(trace, model.machine)
+    columns = [trace.column(j) for j in inputs.joints]
+    grid = np.arange(len(inputs), dtype=np.float64)
+    measured = np.stack([np.interp(grid, inputs.rows, trace.position[:, c]) for c in columns], axis=1)
+    present = np.isin(np.arange(len(grid)), np.round(inputs.rows).astype(np.int64))
+    deviation = position_noise(model)
+    width = (
+        d.chosen_width(measured, deviation, inputs.period, NOISE_SHARE) if smoothing is None
+        else max(d.WIDTHS[0], smoothing / inputs.period)
+    )  # fmt: skip
+    position = d.smoothed(measured, width)
+    speed = d.speeds(position, inputs.period)
+    friction = d.smoothed(_friction_deflection(model, d.smoothed(measured, 1.0)), width)
+    motion = MeasuredMotion(inputs.time, position, speed, friction, inputs.drive, inputs.period, width)
+    gain = d.noise_gain(width, inputs.period)
+    noise = deviation * np.hypot(gain.acceleration, damping_rates(model, motion) * gain.speed)
+    reach = int(np.ceil(2 * width)) + 2
+    complete = ~_spread(~present, reach)
+    complete[:reach] = complete[len(complete) - reach :] = False
+    moving = np.abs(speed) > MOVING * deviation * gain.speed
+    return Observation(motion, d.accelerations(position, inputs.period), noise, moving & complete[:, None])
+
+
+def position_noise(model: Model) -> Floats:
+    """Standard deviation (n,) of a reading, rad: rounding to counts and the sensor's own noise."""
+    deviations = []
+    for number in model.machine.modelled_joints:
+        sensor = model.machine.joint(number).sensor
+        if sensor is None:
+            deviations.append(1e-9)
+            continue
+        count = sensor.range.value / 2**sensor.bits
+        own = 0.0 if sensor.noise is None else sensor.noise.value
+        deviations.append(count * float(np.hypot(own, 1 / np.sqrt(12))))
+    return np.array(deviations)
+
+
+def _friction_deflection(model: Model, position: Floats) -> Floats:
+    """Deflection of the friction contact (k, n) that follows the motion, from rest."""
+    joints = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
+    result = np.zeros_like(position)
+    for k in range(1, len(position)):
+        step = (position[k] - position[k - 1]) / joints[:, at.PRESLIDING]
+        result[k] = np.clip(result[k - 1] + step, -1.0, 1.0)
+    return result
+
+
+def _spread(mask: Mask, reach: int) -> Mask:
+    """True within `reach` samples of any True."""
+    return np.asarray(np.convolve(mask, np.ones(2 * reach + 1), mode="same") > 0.5)

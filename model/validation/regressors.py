@@ -1,0 +1,78 @@
+"""What a variation may go with: position, speed, direction, load and so on of a joint, and how strongly it does."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from model.machine_model.model import Model
+from model.validation.gravity_load import gravity_loads
+from model.validation.measured_motion import Observation
+
+Floats = NDArray[np.float64]
+
+REGRESSORS = ("position", "speed", "magnitude of speed", "direction", "load", "acceleration", "drive", "time")
+"""Names of the regressors; load is the gravity torque on the joint (N·m, or N)."""
+
+FEWEST = 6
+"""Independent samples below which no correlation is given."""
+
+
+class Correlation(BaseModel):
+    """Pearson's correlation with one regressor of one joint. `noise` is what independent signals would show (1σ)."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    regressor: str
+    joint: int
+    value: float
+    noise: float
+
+    @property
+    def significant(self) -> bool:
+        """Beyond three standard deviations of what independent signals would show."""
+        return abs(self.value) > 3 * self.noise
+
+
+def regressors(model: Model, observation: Observation) -> dict[str, Floats]:
+    """Every regressor (k, n) of the modelled joints along a motion."""
+    motion = observation.motion
+    return {
+        "position": motion.position,
+        "speed": motion.speed,
+        "magnitude of speed": np.abs(motion.speed),
+        "direction": np.sign(motion.speed),
+        "load": gravity_loads(model, motion.position),
+        "acceleration": observation.acceleration,
+        "drive": motion.drive,
+        "time": np.repeat(motion.time[:, None], motion.position.shape[1], axis=1),
+    }
+
+
+def correlations(
+    signal: Floats, present: NDArray[np.bool_], known: dict[str, Floats], joints: list[int], width: float
+) -> tuple[Correlation, ...]:
+    """Correlations of a signal (k,) with the regressors of some joints (indices from 0), strongest first.
+
+    Smoothing over `width` samples makes neighbours alike; samples are counted as independent every 2√π·width.
+    """
+    count = present.sum() / max(1.0, 2 * np.sqrt(np.pi) * width)
+    if count < FEWEST:
+        return ()
+    found = []
+    for name, values in known.items():
+        for j in joints:
+            value = _pearson(signal[present], values[present, j])
+            if value is not None:
+                found.append(Correlation(regressor=name, joint=j + 1, value=value, noise=float(1 / np.sqrt(count))))
+    return tuple(sorted(found, key=lambda c: -abs(c.value)))
+
+
+def _pearson(x: Floats, y: Floats) -> float | None:
+    x, y = x - x.mean(), y - y.mean()
+    size = float(np.sqrt((x**2).sum() * (y**2).sum()))
+    # a constant regressor (one direction only, one posture) goes with nothing
+    if size <= 1e-9 * len(x) * max(1e-300, float(np.abs(x).max() * np.abs(y).max())):
+        return None
+    return float((x * y).sum() / size)
