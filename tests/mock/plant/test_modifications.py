@@ -86,8 +86,8 @@ class WeakMotor:
     joint: int
     factor: float
 
-    def motor_torque(self, torque: float, time_s: float, angle: float, rate: float) -> float:
-        return self.factor * torque
+    def torque_change(self, torque: float, time_s: float, angle: float, rate: float) -> float:
+        return (self.factor - 1.0) * torque
 
 
 @dataclass
