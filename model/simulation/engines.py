@@ -38,10 +38,12 @@ class Engine:
 
         Threads share the work; the compiled code holds no lock of Python's. Results do not depend on their number.
         """
+        shares = np.ascontiguousarray(vectors[:, : at.SHARED])
+        parts = np.ascontiguousarray(vectors[:, at.SHARED :]).reshape(len(vectors), -1, at.PER_JOINT)
         arguments = (
             which, np.array([len(p.set_points) for p in prepared]), _padded([p.set_points for p in prepared]),
             _padded([p.recorded for p in prepared]), _padded([p.noise for p in prepared]), initials,
-            np.array([p.first_drive for p in prepared]), vectors, np.array([p.gains for p in prepared]), flags,
+            np.array([p.first_drive for p in prepared]), shares, parts, np.array([p.gains for p in prepared]), flags,
             np.array([p.settings for p in prepared]), step, out,
         )  # fmt: skip
         cores = available_cores() if cores is None else cores

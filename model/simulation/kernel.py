@@ -8,7 +8,7 @@ Every entry takes a batch of runs:
     lengths: (t,) periods of each record. set_points: (t, k, n) counts for the board's PID, rad else.
     recorded: (t, k, n) motor volts where nothing controls. noise: (t, k, n) added to the readings before rounding.
     initial: (r, n, 2) position and speed. first_drive: (t, n) commanded volts before the record.
-    vectors: (r, layout size). gains: (t, n, GAINS). flags: (n,). settings: (t, SETTINGS).
+    shares: (r, SHARED) and parts: (r, n, PER_JOINT), the flat vectors. gains: (t, n, GAINS). flags: (n,). settings: (t, SETTINGS).
     step: longest step of integration, s. out: (r, OUTPUTS, k, n), filled.
 """
 
@@ -80,33 +80,37 @@ def _advance_of(
 @compiled
 def batch(
     user: Any, kind: Any, first: int, last: int, which: Array, lengths: Array,
-    set_points: Array, recorded: Array, noise: Array, initial: Array, first_drive: Array, vectors: Array, gains: Array,
+    set_points: Array, recorded: Array, noise: Array, initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array,
     flags: Array, settings: Array, step: float, out: Array,
 ) -> None:  # fmt: skip
     """Runs first … last − 1; `user` and `kind` are tags that choose the user's effects and the dynamics."""
     n = initial.shape[1]
-    state = np.zeros((n, STATE), dtype=vectors.dtype)
-    memory = np.zeros((n, MEMORY), dtype=vectors.dtype)
-    queue = np.zeros((QUEUE, n), dtype=vectors.dtype)
-    volts = np.zeros(n, dtype=vectors.dtype)
+    state = np.zeros((n, STATE), dtype=parts.dtype)
+    memory = np.zeros((n, MEMORY), dtype=parts.dtype)
+    queue = np.zeros((QUEUE, n), dtype=parts.dtype)
+    volts = np.zeros(n, dtype=parts.dtype)
     order = np.zeros(n, dtype=np.int64)
-    times = np.zeros(n, dtype=vectors.dtype)
-    work = np.zeros((general_motion.WORK, n), dtype=vectors.dtype)
+    times = np.zeros(n, dtype=parts.dtype)
+    work = np.zeros((general_motion.WORK, n), dtype=parts.dtype)
     for r in range(first, last):
         t = which[r]
-        shared = vectors[r, : at.SHARED]
-        joints = vectors[r, at.SHARED :].reshape(n, at.PER_JOINT)
+        shared, joints = shares[r], parts[r]
         modes = extra_flags(joints, flags)
         body = body_of(kind, shared, joints, modes)
         period = shared[at.PERIOD]
         late = switching_times(shared, joints, order, times)
-        state[:], memory[:] = 0.0, 0.0
+        posture = work[general_motion.Q]
         for j in range(n):
+            posture[j] = initial[r, j, 0]
+            for i in range(MEMORY):
+                memory[j, i] = 0.0 * posture[j]
+            for i in range(STATE):
+                state[j, i] = 0.0 * posture[j]
             for i in range(QUEUE):
                 queue[i, j] = first_drive[t, j]
             volts[j] = motor_volts(queue[0, j], joints[j])
-        friction_levels_of(kind, initial[r, :, 0].copy(), joints, body, settings[t], work[general_motion.LEVEL])
-        at_rest(state, initial[r], volts, joints, gravity_of(kind, initial[r, :, 0].copy(), joints, body), modes, work)
+        friction_levels_of(kind, posture, joints, body, settings[t], work[general_motion.LEVEL])
+        at_rest(state, initial[r], volts, joints, gravity_of(kind, posture, joints, body), modes, work)
         for k in range(lengths[t]):
             for j in range(n):
                 queue[k % QUEUE, j] = sample(
@@ -162,37 +166,37 @@ def at_rest(
 @entry
 def run_closed_form(
     first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
-    initial: Array, first_drive: Array, vectors: Array, gains: Array, flags: Array, settings: Array, step: float,
+    initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array, settings: Array, step: float,
     out: Array,
 ) -> None:  # fmt: skip
     """The waist-shoulder-elbow arm of rods with rigid transmissions."""
     batch(
         NoUserEffect(0), ClosedForm(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
-        vectors, gains, flags, settings, step, out,
+        shares, parts, gains, flags, settings, step, out,
     )  # fmt: skip
 
 
 @entry
 def run_flexible(
     first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
-    initial: Array, first_drive: Array, vectors: Array, gains: Array, flags: Array, settings: Array, step: float,
+    initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array, settings: Array, step: float,
     out: Array,
 ) -> None:  # fmt: skip
     """The same arm where a transmission gives or has play."""
     batch(
         NoUserEffect(0), Flexible(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
-        vectors, gains, flags, settings, step, out,
+        shares, parts, gains, flags, settings, step, out,
     )  # fmt: skip
 
 
 @entry
 def run_chain(
     first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
-    initial: Array, first_drive: Array, vectors: Array, gains: Array, flags: Array, settings: Array, step: float,
+    initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array, settings: Array, step: float,
     out: Array,
 ) -> None:  # fmt: skip
     """Any machine."""
     batch(
         NoUserEffect(0), AnyChain(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
-        vectors, gains, flags, settings, step, out,
+        shares, parts, gains, flags, settings, step, out,
     )  # fmt: skip

@@ -104,12 +104,14 @@ def warm_up(state: NDArray[Any], volts: NDArray[Any], shared: NDArray[Any], join
 @compiled
 def extra_flags(joints: NDArray[Any], flags: NDArray[Any]) -> NDArray[Any]:
     """The joints' mode flags with the bit of every added torque that is not at its null value."""
-    result = flags.copy()
+    result = np.empty(flags.shape[0], dtype=np.int64)
     for j in range(joints.shape[0]):
-        for column in (
-            at.STRIBECK, at.DIRECTION, at.GEAR_LOSS, at.RIPPLE_SINE, at.RIPPLE_COSINE, at.SPRING,
-            at.DISTURBANCE_SINE, at.DISTURBANCE_COSINE,
+        joint = joints[j]
+        result[j] = flags[j]
+        if (
+            joint[at.STRIBECK] != 0.0 or joint[at.DIRECTION] != 0.0 or joint[at.GEAR_LOSS] != 0.0
+            or joint[at.RIPPLE_SINE] != 0.0 or joint[at.RIPPLE_COSINE] != 0.0 or joint[at.SPRING] != 0.0
+            or joint[at.DISTURBANCE_SINE] != 0.0 or joint[at.DISTURBANCE_COSINE] != 0.0
         ):  # fmt: skip
-            if joints[j, column] != 0.0:
-                result[j] |= at.HAS_EXTRA_TORQUE
+            result[j] |= at.HAS_EXTRA_TORQUE
     return result
