@@ -1,0 +1,118 @@
+"""An arm of the mock with hidden parameters, and its traces: what the benchmarks of the model are made on.
+
+Everything goes the way of a real arm: a mock process behind a port, experiments run by `daq`, trace files read back.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from urllib.parse import urlencode
+
+import numpy as np
+
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.machine import Machine
+from daq.contracts.sample import SampleRow
+from daq.contracts.trace import Trace, TraceEvent
+from daq.driver import Controller
+from daq.runner import Arrangement, Consent, Outside, run_experiment
+from daq.runner.arm_control import ArmControl
+from daq.traces.reader import read_trace
+from model.machine_model.model import base_model
+
+PLANT_NAMES: dict[str, tuple[str, ...]] = {
+    "link1.mass": ("rigid_body.m1",),
+    "link2.mass": ("rigid_body.m2",),
+    "link3.mass": ("rigid_body.m3",),
+    "load.mass": ("rigid_body.m_load",),
+    "link1.radius": ("rigid_body.r1",),
+    "link2.length": ("rigid_body.a2",),
+    "link3.length": ("rigid_body.a3",),
+    "friction.arm": ("friction.effective_arm",),
+    **{f"joint{j}.motor.back_emf_constant": (f"joint_{j}.back_emf_constant",) for j in (1, 2, 3)},
+    **{f"joint{j}.motor.rotor_inertia": (f"joint_{j}.rotor_inertia",) for j in (1, 2, 3)},
+    **{f"joint{j}.viscous_friction.coefficient": (f"joint_{j}.viscous_friction",) for j in (1, 2, 3)},
+}
+"""Names of the model's parameters and where the mock's plant file has them. The plant has one arm of friction for all."""
+
+FRICTION_ARMS = tuple(f"joint{j}.load_dependent_friction.arm" for j in (1, 2, 3))
+
+
+class Unheard:
+    """Nobody listens to the runs."""
+
+    def progress(self, fraction: float, text: str) -> None:
+        """How far the run is."""
+
+    def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
+        """A recorded control period."""
+
+    def happened(self, event: TraceEvent) -> None:
+        """An event."""
+
+
+def hidden_parameters(machine: Machine, seed: int) -> dict[str, float]:
+    """True values of an arm, drawn from what the machine file expects: value ± deviation, Gaussian, kept positive."""
+    rng = np.random.default_rng([1991, seed])
+    model = base_model(machine)
+    found = {}
+    for name in PLANT_NAMES:
+        p = model.parameter(FRICTION_ARMS[0] if name == "friction.arm" else name)
+        deviation = 0.0 if p.deviation is None else p.deviation
+        found[name] = max(p.value + deviation * rng.standard_normal(), 0.05 * p.value)
+    return found
+
+
+def plant_text(hidden: Mapping[str, float]) -> str:
+    """The mock's own plant file with these values in it."""
+    text = _shipped("mock_controller.plant", "ma2000_plant.toml")
+    for name, value in hidden.items():
+        for place in PLANT_NAMES[name]:
+            text = _replaced(text, place, value)
+    return text
+
+
+def board_text(linearity: float) -> str:
+    """The mock's own board file with potentiometers of this linearity."""
+    return _replaced(_shipped("mock_controller.board", "ma2000_board.toml"), "converter.linearity", linearity)
+
+
+def recorded(
+    specs: Sequence[ExperimentSpec], machine: Machine, seed: int, plant: str | None = None, board: str | None = None
+) -> list[Trace]:
+    """Traces of experiments, one after the other on one mock in lock-step."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        options: dict[str, str] = {"lock_step": "1", "seed": str(seed)}
+        for kind, text in (("plant", plant), ("board", board)):
+            if text is not None:
+                (folder / f"{kind}.toml").write_text(text, "utf-8")
+                options[kind] = str(folder / f"{kind}.toml")
+        with Controller.connect(f"mock://?{urlencode(options)}") as controller:
+            return [_recorded(controller, spec, machine, folder) for spec in specs]
+
+
+def _recorded(controller: Controller, spec: ExperimentSpec, machine: Machine, folder: Path) -> Trace:
+    control = ArmControl(controller)
+    run = Arrangement(controller, control, spec, machine, machine.limits, folder, Unheard(), Outside())
+    result = run_experiment(run, Consent())
+    if result.outcome != "complete":
+        raise RuntimeError(f"{spec.name or spec.trajectory.kind} ended {result.outcome}: {result.reason}")
+    return read_trace(result.trace)
+
+
+def _shipped(package: str, file: str) -> str:
+    return resources.files(package).joinpath(file).read_text("utf-8")
+
+
+def _replaced(text: str, place: str, value: float) -> str:
+    table, _, key = place.partition(".")
+    pattern = rf"(?ms)(^\[{re.escape(table)}\].*?^{re.escape(key)} = \{{ value = )[^,]+"
+    changed, count = re.subn(pattern, lambda m: f"{m.group(1)}{value!r}", text, count=1)
+    if count != 1:
+        raise RuntimeError(f"{place} is not in the file")
+    return changed

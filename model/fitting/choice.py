@@ -1,0 +1,104 @@
+"""Which numbers of a model a fit changes, with bounds and priors, and the nuisances that go with them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import Machine
+from model.fitting.options import HELD_BY_DEFAULT, FitOptions, Prior
+from model.fitting.records import Record, Signal, resolution, sensor_deviation
+from model.fitting.simulated import initial_name
+from model.fitting.unknowns import Unknown, torque_power
+from model.machine_model.model import Model
+from model.machine_model.parameter import Parameter
+
+BEND = "potentiometer_nonlinearity"
+BEND_SHARE = 0.5
+"""Standard deviation of a bend's first term as a share of the stated linearity; later terms fall as one over their number,
+which makes the whole curve stay within the linearity in about nine of ten cases."""
+
+
+def chosen_unknowns(model: Model, options: FitOptions) -> tuple[Unknown, ...]:
+    """The parameters that the options ask for. Raises SpecError for a pattern that matches none, or a wrong bound."""
+    for name in (*options.bounds, *options.priors):
+        model.parameter(name)
+    expected = {p.name: p.value for p in Model(machine=model.machine, effects=model.effects, ties=model.ties).parameters}
+    wanted = [p for p in model.parameters if _chosen(p, options)]
+    for pattern in (*(options.parameters or ()), *options.held):
+        if not any(fnmatchcase(p.name, pattern) for p in model.parameters):
+            model.parameter(pattern)
+    if not wanted:
+        raise SpecError("nothing to fit: no parameter is left; name some, or give them expected deviations")
+    return tuple(_unknown(p, expected[p.name], options) for p in wanted)
+
+
+def with_bends(model: Model, options: FitOptions, signal: Signal) -> tuple[Model, tuple[Unknown, ...]]:
+    """The model with potentiometers that may bend, and the bends as nuisances; both unchanged where not wanted."""
+    if options.sensor_bend is False or signal != "position":
+        return model, ()
+    taken = {j for use in model.effects if use.name == BEND for j in use.joints}
+    joints = tuple(
+        j for j in model.machine.modelled_joints if j not in taken and (options.sensor_bend or _linearity(model.machine, j))
+    )
+    if not joints:
+        return model, ()
+    wider = model.with_effect(BEND, joints)
+    unknowns = []
+    for p in wider.parameters:
+        if p.effect == BEND and p.joints[0] in joints:
+            number = int(p.name.rpartition("_")[2])
+            size = _linearity(model.machine, p.joints[0]) or 0.0025
+            sensor = model.machine.joint(p.joints[0]).sensor
+            range_ = 2 * math.pi if sensor is None else sensor.range.value
+            deviation = BEND_SHARE * size * range_ / number
+            unknowns.append(Unknown(p.name, p.unit, 0.0, p.low, p.high, 0.0, deviation, nuisance=True))
+    return wider, tuple(unknowns)
+
+
+def start_postures(machine: Machine, records: Sequence[Record], bends: bool) -> tuple[Unknown, ...]:
+    """One unknown a record and joint: how far the arm starts off the posture it was read at."""
+    found = []
+    for t in range(len(records)):
+        for joint in machine.modelled_joints:
+            sensor = machine.joint(joint).sensor
+            if sensor is None:
+                continue
+            bend = (_linearity(machine, joint) or 0.0) * sensor.range.value if bends else 0.0
+            deviation = float(np.hypot(max(sensor_deviation(sensor), resolution(sensor)), bend))
+            limit = 20 * deviation
+            name = initial_name(t + 1, joint)
+            found.append(Unknown(name, "rad", 0.0, -limit, limit, 0.0, deviation, nuisance=True, trace=t))
+    return tuple(found)
+
+
+def _linearity(machine: Machine, joint: int) -> float | None:
+    sensor = machine.joint(joint).sensor
+    return None if sensor is None or sensor.linearity is None else sensor.linearity.value
+
+
+def _chosen(p: Parameter, options: FitOptions) -> bool:
+    if any(fnmatchcase(p.name, pattern) for pattern in options.held):
+        return False
+    if options.parameters is not None:
+        return any(fnmatchcase(p.name, pattern) for pattern in options.parameters)
+    return p.deviation is not None and p.deviation > 0 and not any(fnmatchcase(p.name, h) for h in HELD_BY_DEFAULT)
+
+
+def _unknown(p: Parameter, expected: float, options: FitOptions) -> Unknown:
+    low, high = options.bounds.get(p.name, (p.low, p.high))
+    low, high = -math.inf if low is None else low, math.inf if high is None else high
+    if not low < high:
+        raise SpecError(f"{p.name}: lower bound {low:g} {p.unit} is not below the upper bound {high:g} {p.unit}")
+    if low < p.low or high > p.high:
+        raise SpecError(f"{p.name}: bounds {low:g} to {high:g} {p.unit} leave what is possible, {p.low:g} to {p.high:g}")
+    prior = Prior(expected=expected, deviation=p.deviation) if p.deviation else None
+    prior = options.priors.get(p.name, prior if options.use_priors else None)
+    return Unknown(
+        p.name, p.unit, p.value, low, high, p.value if prior is None else prior.expected,
+        None if prior is None else prior.deviation, torque=torque_power(p.unit),
+    )  # fmt: skip

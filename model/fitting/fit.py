@@ -1,0 +1,262 @@
+"""A model's parameters from traces."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError, TraceError
+from daq.contracts.machine import NoController
+from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
+from daq.contracts.trace import Trace
+from model.fitting.choice import chosen_unknowns, start_postures, with_bends
+from model.fitting.covariance import sandwich
+from model.fitting.least_squares import Search, Solution, solve
+from model.fitting.nelder_mead import climb
+from model.fitting.noise import noise_of
+from model.fitting.options import FitOptions
+from model.fitting.problem import Evaluation, whitened
+from model.fitting.records import Signal, noise_floor, records_of
+from model.fitting.result import FitResult, FittedParameter, JointError
+from model.fitting.robust import influence
+from model.fitting.simulated import SimulatedProblem
+from model.fitting.unknowns import Unknown, prior_precision, scales
+from model.fitting.whitening import Whitener, fitted_whitener, white
+from model.identifiability.report import IdentifiabilityReport, ParameterVerdict, judged
+from model.machine_model.model import Lineage, Model
+
+Floats = NDArray[np.float64]
+
+INTERVAL = 1.959964
+"""Standard deviations on either side that hold 95 % of a Gaussian."""
+SETTLED = 0.1
+"""Rounds end when no value moves by more than this share of its deviation."""
+LEAST_SQUARES_EVALUATIONS = 60
+SIMPLEX_EVALUATIONS = 400
+"""A parameter."""
+
+
+def fit(
+    model: Model, traces: Sequence[Trace], options: FitOptions | None = None, progress: Progress = silent,
+    cancel: Cancel | None = None,
+) -> FitResult:  # fmt: skip
+    """The parameters with which the model best repeats the traces, and how far each can be trusted.
+
+    Output error: the model's own loop follows the recorded set points, and its readings are compared with the recorded
+    ones. A first search weighs every sample by the sensor's noise. Then, in rounds, the noise that the residual shows is
+    given to the simulated controller, residual and Jacobian are whitened, and the search goes on from where it was.
+
+    Raises:
+        TraceError, SpecError: for traces or options that cannot give a result; one line says why.
+        CancelledError: when asked to end.
+    """
+    options, cancel, begun = options or FitOptions(), cancel or Never(), time.perf_counter()
+    problem = fit_problem(model, traces, options)
+    before = problem.evaluate(_starts(problem), derivatives=False)
+    solution = _first_search(problem, options, progress, cancel)
+    evaluations = solution.evaluations
+    whiteners: list[Whitener] = [white(d) for d in problem.floor]
+    for number in range(options.rounds):
+        last = solution
+        progress(0.5 + 0.4 * number / options.rounds, f"round {number + 1}: noise and whitening")
+        problem, whiteners = _with_noise(problem, solution.values, options)
+        if options.method == "nelder_mead":
+            break
+        solution = solve(problem, whiteners, solution.values, cancel, _search(options))
+        evaluations += solution.evaluations
+        if _settled(problem, whiteners, last.values, solution.values):
+            break
+    progress(0.95, "intervals and identifiability")
+    estimate = _estimate(problem, whiteners, solution.values, options)
+    progress(1.0, "done")
+    solution = replace(solution, evaluations=evaluations)
+    return _result(model, problem, solution, estimate, before, options, time.perf_counter() - begun)
+
+
+def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> SimulatedProblem:
+    """Residuals and unknowns of a fit, before any search. Raises TraceError and SpecError as `fit` does."""
+    signal = _signal(model, options)
+    unknowns = chosen_unknowns(model, options)
+    records = records_of(traces, model.machine, signal)
+    samples = sum(r.measured.size for r in records)
+    if samples <= len(unknowns):
+        raise TraceError(f"{samples} samples for {len(unknowns)} parameters: there must be more samples than parameters")
+    simple = options.method == "nelder_mead"
+    wider, bends = (model, ()) if simple else with_bends(model, options, signal)
+    postures = ()
+    if options.start_posture and signal == "position" and not simple:
+        postures = start_postures(model.machine, records, bool(bends))
+    loop = options.loop or ("open" if isinstance(model.machine.controller, NoController) else "closed")
+    return SimulatedProblem(
+        wider, records, (*unknowns, *bends, *postures), noise_floor(records, model.machine, signal), signal, loop,
+        options.step,
+    )  # fmt: skip
+
+
+def _signal(model: Model, options: FitOptions) -> Signal:
+    if options.signal is not None:
+        return options.signal
+    kinds = {s.measures for j in model.machine.modelled_joints if (s := model.machine.joint(j).sensor) is not None}
+    if len(kinds) > 1:
+        raise SpecError("some joints measure position and some velocity: say with `signal` which is to be fitted")
+    return "velocity" if kinds == {"velocity"} else "position"
+
+
+def _starts(problem: SimulatedProblem) -> Floats:
+    return np.array([u.start for u in problem.unknowns])
+
+
+def _search(options: FitOptions, robust: bool | None = None, tell: Search | None = None) -> Search:
+    return Search(
+        robust=options.robust if robust is None else robust, tolerance=options.tolerance,
+        most_evaluations=options.most_evaluations or LEAST_SQUARES_EVALUATIONS,
+        tell=None if tell is None else tell.tell,
+    )  # fmt: skip
+
+
+def _first_search(problem: SimulatedProblem, options: FitOptions, progress: Progress, cancel: Cancel) -> Solution:
+    """The best of the searches from the model's own values and from seeded draws, every sample weighed alike."""
+    whiteners = [white(d) for d in problem.floor]
+    found: list[Solution] = []
+    failure: SpecError | None = None
+    for number, begin in enumerate(_beginnings(problem, options)):
+        share = 0.5 / options.starts
+
+        def tell(count: int, rms: float, number: int = number, share: float = share) -> None:
+            done = share * (number + 1 - np.exp(-count / 20))
+            progress(done, f"start {number + 1} of {options.starts}: {count} evaluations, residual {rms:.3g} noises")
+
+        try:
+            if options.method == "nelder_mead":
+                most = options.most_evaluations or SIMPLEX_EVALUATIONS * len(problem.unknowns)
+                found.append(climb(problem, begin, cancel, most, options.tolerance, tell))
+            else:
+                search = Search(False, options.tolerance, options.most_evaluations or LEAST_SQUARES_EVALUATIONS, tell)
+                found.append(solve(problem, whiteners, begin, cancel, search))
+        except SpecError as error:
+            failure = failure or error
+    if not found:
+        raise failure or SpecError("no search could begin")
+    return min(found, key=lambda s: s.cost)
+
+
+def _beginnings(problem: SimulatedProblem, options: FitOptions) -> list[Floats]:
+    rng = np.random.default_rng(options.seed)
+    own = _starts(problem)
+    found = [own]
+    for _ in range(options.starts - 1):
+        spread = np.array([0.0 if u.nuisance else u.scale for u in problem.unknowns])
+        draw = own + spread * rng.normal(size=len(own))
+        low, high = (np.array([getattr(u, side) for u in problem.unknowns]) for side in ("low", "high"))
+        found.append(np.clip(draw, low, high))
+    return found
+
+
+def _with_noise(
+    problem: SimulatedProblem, values: Floats, options: FitOptions
+) -> tuple[SimulatedProblem, list[Whitener]]:
+    """The problem with the noise that its residual shows, and the whitening that its residual then asks for."""
+    evaluations = problem.evaluate(values, derivatives=False)
+    if options.noise_feedback and problem.loop == "closed" and problem.signal == "position":
+        problem = problem.with_noise(noise_of(evaluations, problem.records))
+        evaluations = problem.evaluate(values, derivatives=False)
+    whiteners = []
+    for column, floor in enumerate(problem.floor):
+        runs = [e.residual[run, column] for e, runs in zip(evaluations, problem.runs, strict=True) for run in runs]
+        if options.whiten:
+            whiteners.append(fitted_whitener(runs, options.longest_memory, floor))
+        else:
+            whiteners.append(white(max(floor, float(np.sqrt(np.mean(np.concatenate(runs) ** 2))))))
+    return problem, whiteners
+
+
+@dataclass(frozen=True)
+class _Estimate:
+    covariance: Floats
+    report: IdentifiabilityReport
+    evaluations: list[Evaluation]
+    mean_square: float
+
+
+def _estimate(
+    problem: SimulatedProblem, whiteners: Sequence[Whitener], values: Floats, options: FitOptions
+) -> _Estimate:
+    """Covariance and identifiability at the solution."""
+    evaluations = problem.evaluate(values, derivatives=True)
+    data = whitened(problem, evaluations, whiteners)
+    scale = scales(problem.unknowns)
+    scaled = replace(data, jacobian=data.jacobian * scale)
+    cut = influence(data.residual) if options.robust else data.residual
+    prior = np.maximum(prior_precision(problem.unknowns) * scale**2, 1e-12)
+    covariance = sandwich(scaled.information, scaled.scores(cut), prior) * np.outer(scale, scale)
+    report = judged(data.jacobian.reshape(data.residual.size, -1), values, problem.unknowns)
+    return _Estimate(covariance, report, evaluations, float(np.mean(data.residual**2)))
+
+
+def _settled(problem: SimulatedProblem, whiteners: Sequence[Whitener], last: Floats, now: Floats) -> bool:
+    data = whitened(problem, problem.evaluate(now, derivatives=True), whiteners)
+    precision = np.diag(data.information) + prior_precision(problem.unknowns)
+    return bool((np.abs(now - last) * np.sqrt(precision) < SETTLED).all())
+
+
+def _result(
+    model: Model, problem: SimulatedProblem, solution: Solution, estimate: _Estimate, before: Sequence[Evaluation],
+    options: FitOptions, seconds: float,
+) -> FitResult:  # fmt: skip
+    names = tuple(u.name for u in problem.unknowns)
+    own = {u.name: float(v) for u, v in zip(problem.unknowns, solution.values, strict=True) if not u.nuisance}
+    identities = tuple(record.name for record in problem.records)
+    errors = _errors(model, problem, before, estimate.evaluations)
+    summary = {
+        "rmse": [e.after for e in errors], "whitened_mean_square": estimate.mean_square,
+        "converged": solution.converged, "fitted": list(own), "known": list(estimate.report.known),
+    }  # fmt: skip
+    fitted = model.with_values(own).with_lineage(Lineage(parent=model.identity, traces=identities, fit=summary))
+    deviations = np.sqrt(np.diag(estimate.covariance))
+    parameters = tuple(
+        _parameter(u, float(v), float(d), estimate.report.verdict(u.name))
+        for u, v, d in zip(problem.unknowns, solution.values, deviations, strict=True)
+        if not u.nuisance
+    )
+    return FitResult(
+        model=fitted, parameters=parameters, identifiability=estimate.report, errors=errors,
+        whitened_mean_square=estimate.mean_square, names=names, values=tuple(map(float, solution.values)),
+        covariance=tuple(tuple(map(float, row)) for row in estimate.covariance), traces=identities,
+        samples=sum(r.samples for r in problem.records), options=options, evaluations=solution.evaluations,
+        seconds=seconds, converged=solution.converged, message=solution.message,
+    )  # fmt: skip
+
+
+def _parameter(u: Unknown, value: float, deviation: float, verdict: ParameterVerdict) -> FittedParameter:
+    near = 1e-6 * u.scale
+    at_bound = "low" if value - u.low < near else "high" if u.high - value < near else None
+    known = verdict.verdict == "known"
+    return FittedParameter(
+        name=u.name, unit=u.unit, verdict=verdict.verdict, reason=verdict.reason, value=value if known else None,
+        deviation=deviation if known else None, low=max(u.low, value - INTERVAL * deviation) if known else None,
+        high=min(u.high, value + INTERVAL * deviation) if known else None, model_value=value, before=u.start,
+        expected=None if u.deviation is None else u.expected, expected_deviation=u.deviation, at_bound=at_bound,
+    )  # fmt: skip
+
+
+def _errors(
+    model: Model, problem: SimulatedProblem, before: Sequence[Evaluation], after: Sequence[Evaluation]
+) -> tuple[JointError, ...]:
+    found = []
+    for column, joint in enumerate(model.machine.modelled_joints):
+        first, last = (
+            float(np.sqrt(np.mean(np.concatenate([e.residual[:, column] for e in es]) ** 2))) for es in (before, after)
+        )
+        unit = "rad" if model.machine.joint(joint).kind == "revolute" else "m"
+        unit += "/s" if problem.signal == "velocity" else ""
+        found.append(
+            JointError(joint=joint, unit=unit, before=first, after=last, floor=float(problem.floor[column]))
+        )
+    return tuple(found)
+
+
+__all__ = ["CancelledError", "FitOptions", "FitResult", "fit", "fit_problem"]

@@ -1,0 +1,76 @@
+"""Nelder and Mead's simplex within bounds: the hill climbing of the source (section 7.2), as one choice of method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from daq.contracts.errors import SpecError
+from daq.contracts.progress import Cancel, CancelledError
+from model.fitting.least_squares import Solution
+from model.fitting.problem import Problem
+from model.fitting.unknowns import scales
+
+Floats = NDArray[np.float64]
+
+
+def climb(
+    problem: Problem, begin: Floats, cancel: Cancel, most_evaluations: int, tolerance: float = 1e-6,
+    tell: Callable[[int, float], None] | None = None, goal: float | None = None,
+) -> Solution:  # fmt: skip
+    """Values that minimise the mean squared error summed over the joints, without priors, weights or derivatives.
+
+    `goal`: end as soon as that mean squared error is reached. A simulation that diverges counts as infinitely bad.
+
+    Raises CancelledError.
+    """
+    scale = scales(problem.unknowns)
+    bounds = [((u.low - b) / s, (u.high - b) / s) for u, b, s in zip(problem.unknowns, begin, scale, strict=True)]
+    count = 0
+    best = (np.inf, begin)
+
+    def error(x: Floats) -> float:
+        nonlocal count, best
+        if cancel.is_set():
+            raise CancelledError("the fit was cancelled")
+        count += 1
+        values = begin + scale * x
+        try:
+            evaluations = problem.evaluate(values, derivatives=False)
+        except SpecError:
+            return 1e9
+        squares = sum(float((e.residual**2).sum()) for e in evaluations)
+        mean = squares / sum(len(e.residual) for e in evaluations)
+        if mean < best[0]:
+            best = (mean, values)
+        if tell is not None:
+            tell(count, mean**0.5)
+        if goal is not None and mean <= goal:
+            raise _Reached
+        return mean
+
+    simplex = _first_simplex(np.array([b[0] for b in bounds]), np.array([b[1] for b in bounds]))
+    options = {"maxfev": most_evaluations, "fatol": tolerance * problem.floor.max() ** 2, "xatol": tolerance,
+               "initial_simplex": simplex, "adaptive": True}  # fmt: skip
+    try:
+        found = minimize(error, np.zeros(len(begin)), method="Nelder-Mead", bounds=bounds, options=options)
+        message, converged = str(found.message), bool(found.success)
+    except _Reached:
+        message, converged = "the error asked for is reached", True
+    return Solution(best[1], best[0], count, converged, message)
+
+
+class _Reached(Exception):
+    """The goal is met."""
+
+
+def _first_simplex(low: Floats, high: Floats) -> Floats:
+    """The beginning and one natural size along every axis, towards the side with more room."""
+    size = len(low)
+    simplex = np.zeros((size + 1, size))
+    for k in range(size):
+        simplex[k + 1, k] = min(1.0, high[k]) if high[k] >= -low[k] else max(-1.0, low[k])
+    return simplex

@@ -1,0 +1,67 @@
+"""How a fit is to be done."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+HELD_BY_DEFAULT = ("*.motor.torque_constant", "*.motor.resistance", "*.drive.gain")
+"""Data-sheet numbers that stay as they are unless named: they fix the scale of torque, which motion alone cannot."""
+
+Bound = FiniteFloat | None
+
+
+class Prior(BaseModel):
+    """What is expected of a parameter before any data: Gaussian, in its unit."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    expected: FiniteFloat
+    deviation: Annotated[FiniteFloat, Field(gt=0)]
+
+
+class FitOptions(BaseModel):
+    """How a fit is to be done; the defaults suit traces of a known machine.
+
+    parameters: names or patterns (`joint2.*`, `*.mass`) of what to find; None: every number with an expected deviation
+        but the motor's torque constants and resistances, which fix the scale of torque.
+    held: names or patterns taken out of these again.
+    bounds, priors: instead of the model's own, by full name; a bound or prior of None is no bound, no prior.
+    use_priors: False leaves the expected deviations out altogether (nuisances keep theirs).
+    method: `nelder_mead` is the source's hill climbing: plain squared error summed over the joints, no priors.
+    starts: searches from different beginnings, the model's own values and seeded draws from the priors.
+    start_posture: let the arm start off the posture it was read at, by the sensor's error.
+    sensor_bend: let the potentiometers bend within their stated linearity; None: where the machine states one.
+    noise_feedback: give the simulated controller the noise that the record shows. whiten: take out the correlation
+        of the residual before weighing it.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    parameters: tuple[str, ...] | None = None
+    held: tuple[str, ...] = ()
+    bounds: dict[str, tuple[Bound, Bound]] = {}
+    priors: dict[str, Prior | None] = {}
+    use_priors: bool = True
+    method: Literal["least_squares", "nelder_mead"] = "least_squares"
+    robust: bool = True
+    starts: Annotated[int, Field(ge=1, le=100)] = 1
+    seed: Annotated[int, Field(ge=0)] = 0
+    start_posture: bool = True
+    sensor_bend: bool | None = None
+    noise_feedback: bool = True
+    whiten: bool = True
+    longest_memory: Annotated[int, Field(ge=0, le=100)] = 12
+    """Samples that the whitening looks back, at most."""
+    rounds: Annotated[int, Field(ge=1, le=20)] = 4
+    """Of noise, whitening and search, at most."""
+    tolerance: Annotated[FiniteFloat, Field(gt=0)] = 1e-6
+    most_evaluations: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
+    """Of one search; None: 60 for least squares, 400 a parameter for Nelder and Mead."""
+    loop: Literal["closed", "open"] | None = None
+    """None: closed where the machine has a controller."""
+    signal: Literal["position", "velocity"] | None = None
+    """What is compared; None: what the machine's sensors measure."""
+    step: Annotated[FiniteFloat, Field(gt=0, le=0.01)] = 1e-3
+    """Longest step of integration, s."""

@@ -1,0 +1,138 @@
+"""Traces prepared for a fit: checked, put on the grid of control periods, cut where samples are missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import TraceError
+from daq.contracts.machine import Machine, Sensor
+from daq.contracts.trace import Trace
+from model.simulation.inputs import RunInputs, inputs_of
+
+Floats = NDArray[np.float64]
+Signal = Literal["position", "velocity"]
+
+LEAST_SAMPLES = 10
+"""A trace shorter than this says nothing about motion."""
+LEAST_MOTION_COUNTS = 4.0
+"""Counts of the sensor that at least one joint of at least one trace must move: less is rounding and noise."""
+WILD_COUNTS = 400.0
+"""Distance between set point and position (counts) that no controller within ±127 leaves for a whole record."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """One trace as a fit reads it.
+
+    Args:
+        inputs: what drives the simulation. measured: (m, n) rad (or rad/s), one column a modelled joint.
+        runs: stretches of samples without a gap.
+    """
+
+    inputs: RunInputs
+    measured: Floats
+    runs: tuple[slice, ...]
+    name: str
+
+    @property
+    def samples(self) -> int:
+        """Samples in the record."""
+        return len(self.measured)
+
+
+def records_of(traces: Sequence[Trace], machine: Machine, signal: Signal) -> tuple[Record, ...]:
+    """Traces prepared for a fit of `machine`.
+
+    Raises:
+        TraceError: no traces, the same one twice, a joint missing, degrees for radians, fewer than ten samples, no
+            motion anywhere, a constant offset between set points and positions, or no velocity where it is fitted.
+    """
+    if not traces:
+        raise TraceError("no traces: a fit needs at least one")
+    names = [t.record.trace_id for t in traces]
+    if repeated := sorted({n for n in names if names.count(n) > 1}):
+        raise TraceError(f"trace {repeated[0]}: given more than once; it would count double")
+    records = tuple(_record(trace, machine, signal) for trace in traces)
+    if not any(_moves(record, machine, signal) for record in records):
+        raise TraceError(
+            f"no motion: no joint of {', '.join(names)} moves by {LEAST_MOTION_COUNTS:g} counts of its sensor or more"
+        )
+    return records
+
+
+def noise_floor(records: Sequence[Record], machine: Machine, signal: Signal) -> Floats:
+    """(n,) standard deviation of a measurement: rounding (1/12 count²) and the sensor's noise; from the record where
+    the machine says nothing, by the median second difference (a straight line has none)."""
+    floor = []
+    for column, joint in enumerate(machine.modelled_joints):
+        sensor = machine.joint(joint).sensor
+        if sensor is not None and signal == "position":
+            floor.append(sensor_deviation(sensor))
+            continue
+        second = np.concatenate([np.diff(r.measured[run, column], 2) for r in records for run in r.runs])
+        spread = 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0)
+        size = max(float(np.abs(r.measured[:, column]).max()) for r in records)
+        floor.append(max(spread, 1e-6 * size, 1e-12))
+    return np.array(floor)
+
+
+def sensor_deviation(sensor: Sensor) -> float:
+    """Standard deviation (rad, m) of one reading: √(1/12 + noise²) counts."""
+    noise = 0.0 if sensor.noise is None else sensor.noise.value
+    return float(np.sqrt(1.0 / 12.0 + noise**2)) * resolution(sensor)
+
+
+def resolution(sensor: Sensor) -> float:
+    """One count, rad or m."""
+    return sensor.range.value / 2**sensor.bits
+
+
+def _record(trace: Trace, machine: Machine, signal: Signal) -> Record:
+    name = trace.record.trace_id
+    if len(trace) < LEAST_SAMPLES:
+        raise TraceError(f"trace {name}: {len(trace)} samples; a fit needs at least {LEAST_SAMPLES}")
+    if trace.record.machine is not None and trace.record.machine.name != machine.name:
+        raise TraceError(f"trace {name}: made on {trace.record.machine.name}, the model describes {machine.name}")
+    inputs = inputs_of(trace, machine)
+    columns = [trace.column(j) for j in machine.modelled_joints]
+    if signal == "velocity" and trace.velocity is None:
+        raise TraceError(f"trace {name}: has no velocity, which is what is to be fitted")
+    source = trace.velocity if signal == "velocity" and trace.velocity is not None else trace.position
+    _check_same_unit(trace, machine)
+    breaks = np.flatnonzero(np.diff(inputs.rows) > 1.5) + 1
+    edges = [0, *(int(b) for b in breaks), len(trace)]
+    runs = tuple(slice(a, b) for a, b in zip(edges, edges[1:], strict=False))
+    return Record(inputs, np.ascontiguousarray(source[:, columns]), runs, name)
+
+
+def _check_same_unit(trace: Trace, machine: Machine) -> None:
+    """Set points and positions that differ by a factor or an offset throughout are in different units."""
+    if trace.set_point is None:
+        return
+    for joint in machine.modelled_joints:
+        sensor = machine.joint(joint).sensor
+        if sensor is None or sensor.measures != "position":
+            continue
+        column = trace.column(joint)
+        apart = float(np.median(np.abs(trace.set_point[:, column] - trace.position[:, column])))
+        if apart > WILD_COUNTS * resolution(sensor):
+            larger = float(np.abs(trace.set_point[:, column]).max()), float(np.abs(trace.position[:, column]).max())
+            raise TraceError(
+                f"trace {trace.record.trace_id}: joint {joint}: set points (to {larger[0]:.4g}) and positions "
+                f"(to {larger[1]:.4g}) are {apart:.3g} rad apart throughout; both must be in rad from the same zero"
+            )
+
+
+def _moves(record: Record, machine: Machine, signal: Signal) -> bool:
+    for column, joint in enumerate(machine.modelled_joints):
+        sensor = machine.joint(joint).sensor
+        spread = float(np.ptp(record.measured[:, column]))
+        least = LEAST_MOTION_COUNTS * resolution(sensor) if sensor is not None and signal == "position" else 0.0
+        if spread > least:
+            return True
+    return False

@@ -1,0 +1,116 @@
+"""What a fit found: typed, saved as JSON, with lineage back to the traces."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from daq.contracts.errors import SpecError
+from model.fitting.options import FitOptions
+from model.identifiability.report import IdentifiabilityReport, Verdict
+from model.machine_model.model import Model
+
+RESULT_FORMAT = 1
+"""Version of the file; a reader refuses newer ones."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class FittedParameter(_Part):
+    """One parameter after a fit.
+
+    `value`, `deviation` and the 95 % interval `low` to `high` are None unless the data determine the parameter;
+    `model_value` is what the fitted model carries all the same, since a model needs a number.
+    """
+
+    name: str
+    unit: str
+    verdict: Verdict
+    reason: str
+    value: float | None
+    deviation: float | None
+    low: float | None
+    high: float | None
+    model_value: float
+    before: float
+    expected: float | None
+    expected_deviation: float | None
+    at_bound: Literal["low", "high"] | None
+
+
+class JointError(_Part):
+    """Root mean square of simulated − measured on one joint over all traces, and the noise of the measurement itself."""
+
+    joint: int
+    unit: str
+    before: float
+    after: float
+    floor: float
+
+
+class FitResult(_Part):
+    """What a fit found. `names` and `covariance` are of everything that was free, nuisances included."""
+
+    format: Annotated[int, Field(ge=1)] = RESULT_FORMAT
+    model: Model
+    """The fitted model, its lineage naming parent and traces. Nuisances are not part of it."""
+    parameters: tuple[FittedParameter, ...]
+    identifiability: IdentifiabilityReport
+    errors: tuple[JointError, ...]
+    whitened_mean_square: float
+    """Mean square of the whitened residual: 1 where the noise model describes what is left."""
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    covariance: tuple[tuple[float, ...], ...]
+    traces: tuple[str, ...]
+    samples: int
+    options: FitOptions
+    evaluations: int
+    seconds: float
+    converged: bool
+    message: str
+
+    def parameter(self, name: str) -> FittedParameter:
+        """Of that name. Raises SpecError when it was not fitted."""
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        raise SpecError(f"parameter {name!r}: was not fitted; fitted were {', '.join(p.name for p in self.parameters)}")
+
+    @property
+    def covariance_matrix(self) -> NDArray[np.float64]:
+        """(p, p), in the order of `names`."""
+        return np.array(self.covariance)
+
+    def save(self, path: Path) -> None:
+        """Writes the result as JSON. Raises SpecError when the file cannot be written."""
+        try:
+            path.write_text(self.model_dump_json(indent=1) + "\n", "utf-8")
+        except OSError as error:
+            raise SpecError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def load_result(path: Path) -> FitResult:
+    """A saved fit. Raises SpecError for no such file, another kind of file, or one of a newer version."""
+    try:
+        data = json.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise SpecError(f"{path}: cannot be read: {error.strerror}") from error
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise SpecError(f"{path}: not JSON, so not the result of a fit") from error
+    version = data.get("format") if isinstance(data, dict) else None
+    if isinstance(version, int) and version > RESULT_FORMAT:
+        raise SpecError(f"{path}: format {version} is newer than this program reads ({RESULT_FORMAT}); update it")
+    try:
+        return FitResult.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "file"
+        raise SpecError(f"{path}: {where}: {first['msg']}; not the result of a fit") from error

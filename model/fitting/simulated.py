@@ -1,0 +1,148 @@
+"""The residuals of a model: recorded set points in, simulated readings out, with exact derivatives, on all cores."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError
+from model.dynamics.dual import DUAL_STEP
+from model.fitting.problem import Evaluation
+from model.fitting.records import Record, Signal
+from model.fitting.unknowns import Unknown
+from model.machine_model.model import Model
+from model.simulation.engines import engine_for
+from model.simulation.period import OUT_READING, OUT_SPEED, OUTPUTS
+from model.simulation.simulate import LONGEST_STEP, Options, Prepared, at_rows, prepare
+
+Floats = NDArray[np.float64]
+INITIAL = "initial"
+
+
+@dataclass(frozen=True)
+class SimulatedProblem:
+    """Simulated − measured for records of one machine.
+
+    Args:
+        noise: per record (k, n) noise of the readings, rad, that the simulated controller is given; None for none.
+            It is taken out again of the simulated readings, so that a residual is always against the arm itself.
+    """
+
+    model: Model
+    records: tuple[Record, ...]
+    unknowns: tuple[Unknown, ...]
+    floor: Floats
+    signal: Signal = "position"
+    loop: Literal["closed", "open"] = "closed"
+    step: float = LONGEST_STEP
+    noise: tuple[Floats, ...] | None = None
+
+    @property
+    def runs(self) -> Sequence[Sequence[slice]]:
+        """Per trace, the stretches of samples without a gap."""
+        return [record.runs for record in self.records]
+
+    def with_noise(self, noise: Sequence[Floats] | None) -> SimulatedProblem:
+        """The problem with other noise in the simulated controllers' readings."""
+        return replace(self, noise=None if noise is None else tuple(noise))
+
+    @cached_property
+    def _counts(self) -> Floats:
+        """(n,) rad a count of the noise that a simulation takes, signed; 1 where a joint has no converter."""
+        sensors = [self.model.machine.joint(j).sensor for j in self.model.machine.modelled_joints]
+        return np.array([1.0 if s is None else s.direction * s.range.value / 2**s.bits for s in sensors])
+
+    @cached_property
+    def _prepared(self) -> list[Prepared]:
+        options = Options(loop=self.loop, quantise=False, step=self.step)
+        prepared = [prepare(self.model, record.inputs, options) for record in self.records]
+        if self.noise is None:
+            return prepared
+        return [replace(p, noise=np.ascontiguousarray(n / self._counts)) for p, n in zip(prepared, self.noise, strict=True)]
+
+    @cached_property
+    def _places(self) -> list[tuple[NDArray[np.int64], tuple[int, int] | None]]:
+        """Per unknown, its slots in the flat vector, or its place (joint index, 0 or 1) in the initial state."""
+        return [_place(self.model, u.name) for u in self.unknowns]
+
+    def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
+        """Residuals of every record. Raises SpecError when a simulation does not stay finite."""
+        vector, initials = self._state(values)
+        which, seeds = self._rows(derivatives)
+        dtype = np.complex128 if derivatives else np.float64
+        vectors = np.tile(vector.astype(dtype), (len(which), 1))
+        starts = np.array([initials[t] for t in which], dtype=dtype)
+        for row, unknown in enumerate(seeds):
+            if unknown >= 0:
+                slots, place = self._places[unknown]
+                vectors[row, slots] += 1j * DUAL_STEP
+                if place is not None:
+                    starts[row][place] += 1j * DUAL_STEP
+        longest = max(len(r.inputs) for r in self.records)
+        out: NDArray[Any] = np.zeros((len(which), OUTPUTS, longest, self.model.joint_count), dtype=dtype)
+        engine = engine_for(self.model)
+        engine.run(self._prepared, np.array(which, dtype=np.int64), vectors, starts, self.model.flags, self.step, out)
+        column = OUT_SPEED if self.signal == "velocity" else OUT_READING
+        return self._evaluations(out[:, column], which, seeds, derivatives)
+
+    def _evaluations(
+        self, signal: NDArray[Any], which: list[int], seeds: list[int], derivatives: bool
+    ) -> list[Evaluation]:
+        found = []
+        for t, record in enumerate(self.records):
+            own = [row for row, trace in enumerate(which) if trace == t]
+            simulated = signal[own[0], : len(record.inputs)].real
+            if not np.isfinite(simulated).all():
+                raise SpecError(f"the simulation of {record.name} does not stay finite: the loop is unstable")
+            if self.noise is not None and self.signal == "position":
+                simulated = simulated - self.noise[t]
+            residual = at_rows(simulated, record.inputs.rows) - record.measured
+            jacobian = None
+            if derivatives:
+                jacobian = np.zeros((len(self.unknowns), *residual.shape))
+                for row in own:
+                    if seeds[row] >= 0:
+                        tangent = signal[row, : len(record.inputs)].imag / DUAL_STEP
+                        jacobian[seeds[row]] = at_rows(tangent, record.inputs.rows)
+            found.append(Evaluation(residual, jacobian))
+        return found
+
+    def _rows(self, derivatives: bool) -> tuple[list[int], list[int]]:
+        """Record and perturbed unknown (−1: none) of every run."""
+        if not derivatives:
+            return list(range(len(self.records))), [-1] * len(self.records)
+        which, seeds = [], []
+        for t in range(len(self.records)):
+            own = [k for k, u in enumerate(self.unknowns) if u.trace is None or u.trace == t] or [-1]
+            which += [t] * len(own)
+            seeds += own
+        return which, seeds
+
+    def _state(self, values: Floats) -> tuple[Floats, list[Floats]]:
+        """Flat vector and initial states for values of the unknowns."""
+        vector = self.model.vector.copy()
+        initials = [record.inputs.initial.copy() for record in self.records]
+        for value, unknown, (slots, place) in zip(values, self.unknowns, self._places, strict=True):
+            if place is None:
+                vector[slots] = value
+            else:
+                for t in range(len(initials)) if unknown.trace is None else (unknown.trace,):
+                    initials[t][place] += value
+        return vector, initials
+
+
+def initial_name(trace: int, joint: int) -> str:
+    """Name of the unknown by which joint `joint` starts trace number `trace` (from 1) off the posture it was read at."""
+    return f"{INITIAL}.trace{trace}.joint{joint}.position"
+
+
+def _place(model: Model, name: str) -> tuple[NDArray[np.int64], tuple[int, int] | None]:
+    if name.startswith(INITIAL + "."):
+        joint = int(name.split(".")[2].removeprefix("joint"))
+        return np.zeros(0, dtype=np.int64), (joint - 1, 0)
+    return np.array(model.parameter(name).slots, dtype=np.int64), None

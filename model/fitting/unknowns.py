@@ -1,0 +1,74 @@
+"""What a fit may change: names, starting values, bounds, and how far from its expected value each is likely to be."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number to be found.
+
+    Args:
+        name: full name. unit: as in reports.
+        start: where the search begins. low, high: physical bounds, ±inf for none.
+        expected, deviation: Gaussian prior; deviation None where nothing is claimed.
+        nuisance: found only so that the others are not biased by it (start posture, bend of a potentiometer).
+        trace: index of the only trace it belongs to; None for all.
+        torque: power of torque in its unit: 1 for a mass, −1 for a compliance, 0 for a length.
+    """
+
+    name: str
+    unit: str
+    start: float
+    low: float = -math.inf
+    high: float = math.inf
+    expected: float = 0.0
+    deviation: float | None = None
+    nuisance: bool = False
+    trace: int | None = None
+    torque: int = 0
+
+    def __post_init__(self) -> None:
+        if not self.low < self.high:
+            raise SpecError(f"{self.name}: lower bound {self.low:g} {self.unit} is not below the upper {self.high:g}")
+        if not self.low <= self.start <= self.high:
+            raise SpecError(
+                f"{self.name}: starting value {self.start:g} {self.unit} is outside {self.low:g} to {self.high:g}"
+            )
+        if self.deviation is not None and not (self.deviation > 0 and math.isfinite(self.deviation)):
+            raise SpecError(f"{self.name}: expected deviation {self.deviation:g} {self.unit} must be above 0")
+
+    @property
+    def scale(self) -> float:
+        """Natural size of a change: the expected deviation, else the value, else the bounds' distance, else 1."""
+        if self.deviation is not None:
+            return self.deviation
+        if self.start != 0.0:
+            return abs(self.start)
+        width = self.high - self.low
+        return width if math.isfinite(width) else 1.0
+
+
+def torque_power(unit: str) -> int:
+    """Power with which a unit contains torque (or mass): what scales when all torques are scaled together."""
+    above, _, below = unit.replace("(", "").replace(")", "").partition("/")
+    return int("kg" in above or "N" in above) - int("kg" in below or "N" in below)
+
+
+def scales(unknowns: tuple[Unknown, ...]) -> Floats:
+    """(p,) natural sizes."""
+    return np.array([u.scale for u in unknowns])
+
+
+def prior_precision(unknowns: tuple[Unknown, ...]) -> Floats:
+    """(p,) one over the prior variance; 0 where nothing is claimed."""
+    return np.array([0.0 if u.deviation is None else u.deviation**-2 for u in unknowns])
