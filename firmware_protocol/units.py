@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 from firmware_protocol.errors import UnitsError
 
@@ -65,12 +66,12 @@ class JointCalibration:
         if self.direction not in (-1, 1):
             raise UnitsError(f"joint {self.joint}: direction {self.direction}: allowed are 1 and -1")
 
-    @property
+    @cached_property
     def rad_per_count(self) -> float:
         """Radians per ADC count, with the sign of the joint's direction."""
         return self.direction * self.range_rad / ADC_COUNTS
 
-    @property
+    @cached_property
     def rad_per_posture_unit(self) -> float:
         """Radians per posture unit, with the sign of the joint's direction."""
         return self.direction * self.range_rad / POSTURE_UNITS

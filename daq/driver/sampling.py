@@ -73,7 +73,7 @@ class Deliveries:
 
     def check_restart(self, status: int) -> None:
         """Raises ControllerRestartedError when the status says that the board has been reset."""
-        if status & StatusFlag.RESTARTED:
+        if status & StatusFlag.RESTARTED.value:
             self.watch.forget()
             raise ControllerRestartedError(
                 "the controller has restarted (a dip of its supply?): its set points and gains are those of power-up; "
@@ -91,16 +91,15 @@ class Deliveries:
     ) -> BoardSnapshot:
         """A snapshot, with everything counted that it shows. `times` are host time and tick time (s)."""
         missing = 0 if after is None else tick - after - 1
-        missed = self.watch.missed(tick, joints) or StatusFlag.SET_POINT_MISSED in flags
+        missed = self.watch.missed(tick, joints) or bool(flags.value & StatusFlag.SET_POINT_MISSED.value)
         snapshot = BoardSnapshot(tick, *times, joints, flags, by, missing, missed)
         tally = self.link.tally
-        for name, amount in (
-            ("missing_samples", missing),
-            ("missed_set_points", missed),
-            ("late", snapshot.jitter > self.period_s),
-        ):
-            if amount:
-                tally.count(name, amount)
+        if missing:
+            tally.count("missing_samples", missing)
+        if missed:
+            tally.count("missed_set_points")
+        if snapshot.jitter > self.period_s:
+            tally.count("late")
         return snapshot
 
 

@@ -132,8 +132,8 @@ class Follower:
                 return Ending("finished")
 
     def _set_points(self, plan: Plan, index: int) -> dict[int, int]:
-        postures = plan.postures[min(index, len(plan) - 1)]
-        return {joint: int(postures[joint - 1]) for joint in plan.moving}
+        postures: list[int] = plan.postures[min(index, len(plan) - 1)].tolist()
+        return {joint: postures[joint - 1] for joint in plan.moving}
 
     def _next(self, sending: dict[int, int]) -> tuple[SampleRow, BoardSnapshot]:
         after = self.last.tick if self._every_period and self.last is not None else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from daq.safety import Verdict
-from daq.safety.findings import Finding
+from daq.safety.findings import NOTHING, Finding
 
 OLDEST_TO_ACT_ON = 0.06
 """Age (s) of a sample beyond which set points wait: an assumption, three control periods. A host that was kept from its
@@ -26,7 +26,7 @@ class Lag:
         if age <= OLDEST_TO_ACT_ON:
             was, self.since = self.since, None
             if was is None:
-                return Verdict()
+                return NOTHING
             line = f"samples are up to date again after {(tick - was) * self.period:.2f} s: set points go on"
             return Verdict(findings=(Finding("resume", line),))
         line = f"the sample of tick {tick} came {age * 1e3:.0f} ms late"

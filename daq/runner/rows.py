@@ -26,7 +26,8 @@ class RowMaker:
         """One period, angles in rad, drive in volts at the motor before any supply limit."""
         if self._first is None:
             self._first = snapshot.tick
-        readings = [snapshot[joint] for joint in self.joints]
+        by_joint = dict(snapshot.joints)
+        readings = [by_joint[joint] for joint in self.joints]
         both = list(zip(self._calibrations, readings, strict=True))
         return SampleRow(
             tick=snapshot.tick,

@@ -36,9 +36,18 @@ class Verdict:
     findings: tuple[Finding, ...] = ()
 
     def __or__(self, other: Verdict) -> Verdict:
+        # Nearly every verdict of a period is the one that finds nothing.
+        if other is NOTHING:
+            return self
+        if self is NOTHING:
+            return other
         return Verdict(
             self.hold or other.hold, self.stop or other.stop, self.trips + other.trips, self.findings + other.findings
         )
+
+
+NOTHING = Verdict()
+"""Go on."""
 
 
 @dataclass(frozen=True)

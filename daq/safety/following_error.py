@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from daq.contracts.sample import SampleRow
-from daq.safety.findings import Finding, Verdict, Watched
+from daq.safety.findings import NOTHING, Finding, Verdict, Watched
 
 
 @dataclass
@@ -22,12 +22,12 @@ class FollowingError:
         """`planned` are the postures (by joint) that would be sent next."""
         limit = self.watched.limits.following_error_counts
         if limit is None:
-            return Verdict()
+            return NOTHING
         reason = self._outside(row, limit) or self._ahead(row, planned, limit)
         if reason is None:
             was_held, self.held_since = self.held_since, None
             if was_held is None:
-                return Verdict()
+                return NOTHING
             waited = (row.tick - was_held) * self.watched.period
             return Verdict(findings=(Finding("resume", f"set points go on after {waited:.2f} s"),))
         findings: tuple[Finding, ...] = ()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from daq.contracts.sample import SampleRow
-from daq.safety.findings import Finding, Verdict, Watched
+from daq.safety.findings import NOTHING, Finding, Verdict, Watched
 from firmware_protocol.commands import StatusFlag
 
 LONGEST_SILENCE = 0.2
@@ -23,11 +23,11 @@ class Freshness:
     def check(self, row: SampleRow) -> Verdict:
         """A sample has come."""
         last, self.tick, self.host_time = self.tick, row.tick, row.host_time
-        if row.status & StatusFlag.RESTARTED or (last is not None and row.tick < last):
+        if row.status & StatusFlag.RESTARTED.value or (last is not None and row.tick < last):
             line = f"the board has restarted: tick {row.tick}" + ("" if last is None else f" after {last}")
             return Verdict(trips=(line,), findings=(Finding("restart", line),))
         if last is None or row.tick == last + 1:
-            return Verdict()
+            return NOTHING
         if row.tick == last:
             return Verdict(trips=(f"stale sample: tick {row.tick} came twice",))
         lost = row.tick - last - 1

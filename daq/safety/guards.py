@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
-from daq.safety.findings import Verdict, Watched
+from daq.safety.findings import NOTHING, Verdict, Watched
 from daq.safety.following_error import FollowingError
 from daq.safety.freshness import Freshness
 from daq.safety.missed_set_points import MissedSetPoints
@@ -58,4 +58,4 @@ class RestGuards:
 
 
 def _frozen(row: SampleRow) -> Verdict:
-    return Verdict(stop=f"stopped on the board at tick {row.tick}") if row.status & StatusFlag.FROZEN else Verdict()
+    return Verdict(stop=f"stopped on the board at tick {row.tick}") if row.status & StatusFlag.FROZEN.value else NOTHING

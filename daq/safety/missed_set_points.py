@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from daq.contracts.sample import SampleRow
-from daq.safety.findings import Finding, Verdict, Watched
+from daq.safety.findings import NOTHING, Finding, Verdict, Watched
 from firmware_protocol.commands import StatusFlag
 
 LONGEST_RUN = 10
@@ -24,11 +24,11 @@ class MissedSetPoints:
     def check(self, row: SampleRow, expected: Mapping[int, int] | None) -> Verdict:
         """`expected` are the postures (by joint) that this period should have taken; None when nobody can say."""
         line = self._difference(row, expected or {})
-        if row.status & StatusFlag.SET_POINT_MISSED:
+        if row.status & StatusFlag.SET_POINT_MISSED.value:
             line = line or f"tick {row.tick}: the controller wanted the memory while the host had it"
         if line is None:
             self.run = 0
-            return Verdict()
+            return NOTHING
         self.missed += 1
         self.run += 1
         trips = (f"{self.run} set points missed in a row, allowed are {LONGEST_RUN}",) if self.run > LONGEST_RUN else ()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from daq.contracts.sample import SampleRow
-from daq.safety.findings import Verdict, Watched
+from daq.safety.findings import NOTHING, Verdict, Watched
 
 STILL_WITHIN = 40
 """ADC counts that a joint at rest may stray: an assumption. Gravity and the motion of other joints deflect the arm by a
@@ -33,7 +33,7 @@ class UnexpectedMotion:
                 what = "its set point" if self.from_set_point else "where it was"
                 strayed = f"unexpected motion, {counts:.0f} ADC counts from {what}"
                 trips.append(f"joint {joint}: {strayed}, allowed are ±{STILL_WITHIN}")
-        return Verdict(trips=tuple(trips))
+        return Verdict(trips=tuple(trips)) if trips else NOTHING
 
     def _strayed(self, row: SampleRow) -> Mapping[int, float]:
         if self.from_set_point:
