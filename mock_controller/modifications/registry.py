@@ -1,6 +1,7 @@
 """Modifications by name, with their parameters checked.
 
-A modification class is a dataclass; its fields are its parameters. Each field's metadata may give `low` and `high`.
+A modification class is a dataclass; its fields are its parameters, made by `parameter` with unit and bounds. A class
+also tells its `name`, whether that name is `shared` with those who diagnose, one `line` of physics, and its `source`.
 """
 
 from __future__ import annotations
@@ -18,12 +19,19 @@ class ModificationError(ValueError):
     """A modification that does not exist, or a parameter it cannot have."""
 
 
-def parameter(low: float, high: float, default: float | int | None = None) -> Any:
-    """A dataclass field whose value must lie in [low, high]."""
-    metadata = {"low": low, "high": high}
+def parameter(
+    low: float, high: float, default: float | int | None = None, unit: str = "1", null: float | None = None
+) -> Any:
+    """A dataclass field whose value (in `unit`) must lie in [low, high]; at `null` the effect is absent."""
+    metadata = {"low": low, "high": high, "unit": unit, "null": null}
     if default is None:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)
+
+
+def joint_parameter(high: int = 6, low: int = 1) -> Any:
+    """The field for the joint (or the link of that number) on which an effect acts."""
+    return parameter(low, high)
 
 
 @cache
@@ -34,13 +42,18 @@ def known_modifications() -> Mapping[str, type[Any]]:
     return {kind.name: kind for kind in LIBRARY}
 
 
+def fields_of(kind: type[Any]) -> dict[str, dataclasses.Field[Any]]:
+    """The parameters of a modification class, by name."""
+    return {field.name: field for field in dataclasses.fields(kind) if field.init}
+
+
 def build_modification(name: str, values: Mapping[str, object]) -> Modification:
     """The modification `name` with its parameters. Raises ModificationError with what is allowed."""
     known = known_modifications()
     if name not in known:
         raise ModificationError(f"modification {name!r}: not known; there are {', '.join(sorted(known))}")
     kind = known[name]
-    fields = {field.name: field for field in dataclasses.fields(kind) if field.init}
+    fields = fields_of(kind)
     for key, value in values.items():
         if key not in fields:
             raise ModificationError(f"modification {name}: no parameter {key!r}; there are {', '.join(fields)}")
@@ -53,8 +66,29 @@ def build_modification(name: str, values: Mapping[str, object]) -> Modification:
 
 
 def build_modifications(requests: Iterable[tuple[str, Mapping[str, object]]]) -> tuple[Modification, ...]:
-    """Several modifications, in the order given."""
-    return tuple(build_modification(name, values) for name, values in requests)
+    """Several modifications, in the order given; those of no size are left out, and so cost nothing."""
+    built = (build_modification(name, values) for name, values in requests)
+    return tuple(modification for modification in built if not is_null(modification))
+
+
+def is_null(modification: Modification) -> bool:
+    """Whether all sizes of a modification are those at which it is absent."""
+    sizes = [field for field in fields_of(type(modification)).values() if field.metadata.get("null") is not None]
+    return bool(sizes) and all(getattr(modification, field.name) == field.metadata["null"] for field in sizes)
+
+
+def table() -> str:
+    """All modifications with their parameters, for people."""
+    lines = []
+    for name, kind in known_modifications().items():
+        lines.append(f"{name}{'' if kind.shared else '  (not in the shared list)'}: {kind.line}")
+        for key, field in fields_of(kind).items():
+            facts = field.metadata
+            null = "" if facts["null"] is None else f", absent at {facts['null']:g}"
+            unit = "" if facts["unit"] == "1" else f" {facts['unit']}"
+            default = "" if field.default is dataclasses.MISSING else f", {field.default:g} if not given"
+            lines.append(f"    {key}: {facts['low']:g} to {facts['high']:g}{unit}{null}{default}")
+    return "\n".join(lines)
 
 
 def _check(name: str, field: dataclasses.Field[Any], value: object) -> None:

@@ -217,7 +217,7 @@ class Plant:
         self._steps += 1
 
     def _step_modified(self, asked: list[float]) -> None:
-        """One step at the volts that the amplifiers mean to give, with everything that a modification or an inductance may add."""
+        """One step with everything that a modification or an inductance may add, the amplifiers asked for volts."""
         v: list[float] = self._v.tolist()
         q: list[float] = self._q.tolist()
         time_s = self.time_us * 1e-6

@@ -71,5 +71,5 @@ def test_plant_effects_reach_the_arm_through_the_board(make_board: MakeBoard) ->
         assert snapshot is not None
         return snapshot.errors[1]
 
-    weak = make_board(modifications=build_modifications([("amplifier_dead_zone", {"joint": 2, "width": 8.0})]))
+    weak = make_board(modifications=build_modifications([("dead_zone", {"joint": 2, "width": 8.0})]))
     assert error_during_motion(weak) > error_during_motion(make_board()) + 10

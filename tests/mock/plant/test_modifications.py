@@ -35,9 +35,10 @@ def test_payload_of_nothing_changes_nothing() -> None:
     assert moved(build_modifications([("payload", {"mass": 0.0})])) == moved()
 
 
-def test_soft_gear_tends_to_the_rigid_one_as_it_hardens() -> None:
+def test_compliant_gear_tends_to_the_rigid_one_as_it_hardens() -> None:
     def difference(stiffness: float) -> float:
-        soft = moved(build_modifications([("soft_gear", {"joint": 1, "stiffness": stiffness, "damping": 2.0})]))
+        spring = {"joint": 1, "compliance": 1 / stiffness, "damping": 2.0}
+        soft = moved(build_modifications([("joint_compliance", spring)]))
         return abs(soft[0] - moved()[0])
 
     soft, hard = difference(300.0), difference(20_000.0)
@@ -48,7 +49,7 @@ def test_soft_gear_tends_to_the_rigid_one_as_it_hardens() -> None:
 def test_backlash_shows_as_lost_motion_on_reversal() -> None:
     play = 0.03
     rigid = Plant(default_plant(), angles=LOW)
-    loose = Plant(default_plant(), build_modifications([("soft_gear", {"joint": 1, "backlash": play})]), angles=LOW)
+    loose = Plant(default_plant(), build_modifications([("backlash", {"joint": 1, "play": play})]), angles=LOW)
     ranges = []
     for plant in (rigid, loose):
         plant.advance([0.4, 0, 0, 0, 0, 0], 600_000)
@@ -60,11 +61,11 @@ def test_backlash_shows_as_lost_motion_on_reversal() -> None:
 
 def test_coupling_too_hard_for_the_step_is_refused() -> None:
     with pytest.raises(PlantError, match=r"joint 6: coupling .* too hard"):
-        Plant(default_plant(), build_modifications([("soft_gear", {"joint": 6, "stiffness": 1000.0})]))
+        Plant(default_plant(), build_modifications([("joint_compliance", {"joint": 6, "compliance": 1e-3})]))
 
 
 def test_dead_zone_swallows_small_voltages_and_shortens_large_ones() -> None:
-    plant = Plant(default_plant(), build_modifications([("amplifier_dead_zone", {"joint": 2, "width": 2.0})]))
+    plant = Plant(default_plant(), build_modifications([("dead_zone", {"joint": 2, "width": 2.0})]))
     plant.advance([0.05, 0.05, 0, 0, 0, 0], 1000)
     assert plant.motor_volts[:2] == pytest.approx((1.4, 0.0))
     plant.advance([0.5, -0.5, 0, 0, 0, 0], 1000)
@@ -126,8 +127,8 @@ def test_friction_and_motor_effects_act_on_their_joint() -> None:
         ("payload", {"mas": 1.0}, "no parameter 'mas'"),
         ("payload", {}, "'mass' is missing"),
         ("payload", {"mass": math.nan}, "allowed are -1.0 to 5.0"),
-        ("soft_gear", {"joint": 7}, "allowed are 1 to 6"),
-        ("soft_gear", {"joint": 1.5}, "must be a whole number"),
+        ("backlash", {"joint": 7}, "allowed are 1 to 6"),
+        ("backlash", {"joint": 1.5}, "must be a whole number"),
         ("payload", {"mass": "heavy"}, "must be a number"),
     ],
 )

@@ -1,0 +1,88 @@
+"""A motor controller that is not the one assumed."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, replace
+from random import Random
+from typing import ClassVar
+
+from mock_controller.board.parameters import BoardParameters
+from mock_controller.modifications.registry import joint_parameter, parameter
+from mock_controller.plant.parameters import PlantParameters
+
+
+@dataclass
+class InputDelay:
+    """The drive reaches `joint`'s motor `delay` later than the controller has computed it.
+
+    A delay line in steps; a part of a step is shared between the two neighbours, which keeps the volt-seconds.
+    """
+
+    name: ClassVar[str] = "input_delay"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "u(t) → u(t − τ)"
+    source: ClassVar[str] = "computing time, or a buffered output"
+    joint: int = joint_parameter()
+    delay: float = parameter(0.0, 0.2, unit="s", null=0.0)
+
+    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:  # noqa: ARG002  (the place's signature)
+        steps = self.delay / step_s
+        self._whole = int(steps + 1e-9)
+        self._part = max(steps - self._whole, 0.0)
+        self.restart()
+
+    def restart(self) -> None:
+        length = self._whole + 2
+        self._line = deque([0.0] * length, maxlen=length)
+
+    def motor_volts(self, volts: float) -> float:
+        self._line.append(volts)
+        earlier, later = self._line[0], self._line[1]
+        return later + self._part * (earlier - later)
+
+
+@dataclass
+class WrongGain:
+    """`joint`'s controller gives `factor` times the power that its gains stand for, before the limit of the DAC."""
+
+    name: ClassVar[str] = "wrong_gain"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "power → limit(f · PID)"
+    source: ClassVar[str] = "section 6.4: adjustable gains are not the physical ones"
+    joint: int = joint_parameter()
+    factor: float = parameter(0.0, 5.0, null=1.0)
+
+    def change_board(self, parameters: BoardParameters) -> BoardParameters:
+        scales = list(parameters.controller_scales)
+        scales[self.joint - 1] *= self.factor
+        return replace(parameters, controller_scales=tuple(scales))
+
+
+@dataclass
+class LostSetPoints:
+    """In a `share` of all periods `joint`'s controller goes on with the set point it had. `seed` draws the periods.
+
+    Effects of one seed lose the same periods, as when a whole fetch is missed.
+    """
+
+    name: ClassVar[str] = "lost_set_points"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "set point of the period before, in a share of periods"
+    source: ClassVar[str] = "section 6.3: the controller does not wait"
+    joint: int = joint_parameter()
+    share: float = parameter(0.0, 0.99, null=0.0)
+    seed: int = parameter(0, 2**63, default=0)
+
+    def __post_init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        self._random = Random(f"lost set points {self.seed}")
+        self._taken: int | None = None
+
+    def set_point(self, counts: int, tick: int) -> int:  # noqa: ARG002  (the place's signature)
+        lost = self._random.random() < self.share
+        if self._taken is None or not lost:
+            self._taken = counts
+        return self._taken

@@ -1,0 +1,105 @@
+"""Gears that give, waste torque, or turn unevenly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sin
+from typing import ClassVar
+
+from mock_controller.modifications.registry import joint_parameter, parameter
+from mock_controller.plant.transmission import Transmission
+
+
+@dataclass
+class Backlash:
+    """`joint`'s gear has free `play` (full width) between teeth of `stiffness` and `damping`."""
+
+    name: ClassVar[str] = "backlash"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "rotor and link apart; torque only beyond ± half the play, and teeth only push"
+    source: ClassVar[str] = "dead-band spring with contact damping (Nordin and Gutman 2002, Automatica 38)"
+    joint: int = joint_parameter()
+    play: float = parameter(0.0, 0.2, unit="rad", null=0.0)
+    stiffness: float = parameter(1.0, 1e6, default=5000.0, unit="N·m/rad")
+    damping: float = parameter(0.0, 1e3, default=2.0, unit="N·m·s/rad")
+
+    def transmission(self) -> Transmission:
+        return Transmission(self.stiffness, self.damping, self.play)
+
+
+@dataclass
+class JointCompliance:
+    """A spring of 1/`compliance` between `joint`'s rotor and link, with `damping`."""
+
+    name: ClassVar[str] = "joint_compliance"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "torque = (θ_rotor − θ_link)/κ + d (rates)"
+    source: ClassVar[str] = "elastic joint, Spong (1987), J. Dyn. Sys. Meas. Control 109"
+    joint: int = joint_parameter()
+    compliance: float = parameter(0.0, 0.1, unit="rad/(N·m)", null=0.0)
+    damping: float = parameter(0.0, 1e3, default=1.0, unit="N·m·s/rad")
+
+    def transmission(self) -> Transmission:
+        return Transmission(1.0 / self.compliance, self.damping, 0.0)
+
+
+@dataclass
+class TorqueRipple:
+    """At `joint` a torque of `amplitude`, `periods` times a joint turn."""
+
+    name: ClassVar[str] = "torque_ripple"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "torque + A sin(N q + φ)"
+    source: ClassVar[str] = "meshing error of the last gear stages (6 to 12 pinion turns a joint turn)"
+    joint: int = joint_parameter()
+    amplitude: float = parameter(0.0, 50.0, unit="N·m", null=0.0)
+    periods: float = parameter(1.0, 400.0, default=12.0, unit="1/turn")
+    phase: float = parameter(-6.3, 6.3, default=0.0, unit="rad")
+
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+        return self.amplitude * sin(self.periods * angle + self.phase)
+
+
+@dataclass
+class DetentCogging:
+    """At `joint` a torque locked to the pinion, sharp like a detent: four harmonics of `periods` a joint turn."""
+
+    name: ClassVar[str] = "detent_cogging"
+    shared: ClassVar[bool] = False
+    line: ClassVar[str] = "torque + A Σ_{k=1..4} sin(k N q)/√k / 1.6"
+    source: ClassVar[str] = "slot harmonics of a cogging torque"
+    joint: int = joint_parameter()
+    amplitude: float = parameter(0.0, 50.0, unit="N·m", null=0.0)
+    periods: float = parameter(1.0, 100.0, default=10.0, unit="1/turn")
+
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+        turn = self.periods * angle
+        return self.amplitude / 1.6 * sum(sin(k * turn) / k**0.5 for k in (1, 2, 3, 4))
+
+
+@dataclass
+class GearLoss:
+    """`joint`'s gear loses a share `loss` of the torque it transmits, whichever way the power flows.
+
+    The loss is friction between teeth, so it rides on the arm's own bristle and opposes the motion.
+    """
+
+    name: ClassVar[str] = "gear_loss"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "level + η |torque through the gear|"
+    source: ClassVar[str] = "tooth friction in proportion to tooth load"
+    joint: int = joint_parameter()
+    loss: float = parameter(0.0, 0.95, null=0.0)
+
+    def __post_init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        self._through = 0.0
+
+    def torque_change(self, torque: float, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002
+        self._through = torque
+        return 0.0
+
+    def friction_level(self, level: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+        return level + self.loss * abs(self._through)

@@ -1,0 +1,113 @@
+"""Masses and springs that nobody told the model about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import cos, sin
+from typing import ClassVar
+
+from mock_controller.modifications.changes import change_body
+from mock_controller.modifications.registry import joint_parameter, parameter
+from mock_controller.plant.parameters import PlantParameters
+
+
+@dataclass
+class Payload:
+    """Adds `mass` to MLOAD, its centre `offset` beyond the wrist along the hand."""
+
+    name: ClassVar[str] = "payload"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "MLOAD → MLOAD + m, centre moved to the common one"
+    source: ClassVar[str] = "rigid body"
+    mass: float = parameter(-1.0, 5.0, unit="kg", null=0.0)
+    offset: float = parameter(-0.5, 0.5, default=0.0, unit="m")
+
+    def change_plant(self, parameters: PlantParameters) -> PlantParameters:
+        body = parameters.rigid_body
+        m_load = body.m_load + self.mass
+        moment = body.m_load * body.load_offset + self.mass * self.offset
+        return change_body(parameters, m_load=m_load, load_offset=moment / m_load)
+
+
+@dataclass
+class LinkMass:
+    """Link `joint` is heavier by `mass`, spread as its own mass is."""
+
+    name: ClassVar[str] = "link_mass"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "m_i → m_i + Δm"
+    source: ClassVar[str] = "rigid body"
+    joint: int = joint_parameter(3)
+    mass: float = parameter(-0.25, 5.0, unit="kg", null=0.0)
+
+    def change_plant(self, parameters: PlantParameters) -> PlantParameters:
+        key = f"m{self.joint}"
+        return change_body(parameters, **{key: getattr(parameters.rigid_body, key) + self.mass})
+
+
+@dataclass
+class CentreOfMass:
+    """The centre of mass of link `joint` (2 or 3) lies `shift` further out along the link."""
+
+    name: ClassVar[str] = "centre_of_mass"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "a/2 → a/2 + s, inertia about the centre unchanged"
+    source: ClassVar[str] = "rigid body, parallel axes"
+    joint: int = joint_parameter(3, low=2)
+    shift: float = parameter(-0.3, 0.3, unit="m", null=0.0)
+
+    def change_plant(self, parameters: PlantParameters) -> PlantParameters:
+        key = f"centre_shift_{self.joint}"
+        return change_body(parameters, **{key: getattr(parameters.rigid_body, key) + self.shift})
+
+
+@dataclass
+class BaseTilt:
+    """The base leans: gravity is turned by `about_x`, then by `about_y`, of the base's axes."""
+
+    name: ClassVar[str] = "base_tilt"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "g → R_y R_x g"
+    source: ClassVar[str] = "rotation of the base frame"
+    about_x: float = parameter(-0.5, 0.5, default=0.0, unit="rad", null=0.0)
+    about_y: float = parameter(-0.5, 0.5, default=0.0, unit="rad", null=0.0)
+
+    def change_plant(self, parameters: PlantParameters) -> PlantParameters:
+        x, y, z = parameters.rigid_body.gravity
+        cx, sx, cy, sy = cos(self.about_x), sin(self.about_x), cos(self.about_y), sin(self.about_y)
+        y, z = cx * y - sx * z, sx * y + cx * z
+        x, z = cy * x + sy * z, -sy * x + cy * z
+        return replace(parameters, rigid_body=replace(parameters.rigid_body, gravity=(x, y, z)))
+
+
+@dataclass
+class SpringTorque:
+    """A spring or cable of `stiffness` pulls `joint` towards `neutral`."""
+
+    name: ClassVar[str] = "spring_torque"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "torque = −k (q − q₀)"
+    source: ClassVar[str] = "linear spring"
+    joint: int = joint_parameter()
+    stiffness: float = parameter(0.0, 200.0, unit="N·m/rad", null=0.0)
+    neutral: float = parameter(-6.3, 6.3, default=0.0, unit="rad")
+
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+        return -self.stiffness * (angle - self.neutral)
+
+
+@dataclass
+class PeriodicDisturbance:
+    """Something outside pushes `joint` with `amplitude` at `frequency`, whatever the arm does."""
+
+    name: ClassVar[str] = "periodic_disturbance"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "torque + A sin(2π f t + φ)"
+    source: ClassVar[str] = "an unbalanced machine on the same bench"
+    joint: int = joint_parameter()
+    amplitude: float = parameter(0.0, 50.0, unit="N·m", null=0.0)
+    frequency: float = parameter(0.05, 20.0, default=2.0, unit="Hz")
+    phase: float = parameter(-6.3, 6.3, default=0.0, unit="rad")
+
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+        return self.amplitude * sin(6.283185307179586 * self.frequency * time_s + self.phase)

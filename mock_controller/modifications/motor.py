@@ -1,0 +1,87 @@
+"""Motors that are not what the data sheet says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp
+from typing import ClassVar
+
+from mock_controller.modifications.changes import change_joint
+from mock_controller.modifications.registry import joint_parameter, parameter
+from mock_controller.plant.parameters import PlantParameters
+
+_COPPER_PER_KELVIN = 0.0039
+"""Temperature coefficient of copper's resistance at 20 °C (1/K)."""
+
+
+@dataclass
+class BackEmfError:
+    """The back-EMF constant of `joint`'s motor is `factor` times what it is taken for; the torque constant is not."""
+
+    name: ClassVar[str] = "back_emf_error"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "K_b → f K_b"
+    source: ClassVar[str] = "table 7.5: K_b2 fitted to more than twice its data sheet"
+    joint: int = joint_parameter()
+    factor: float = parameter(0.0, 5.0, null=1.0)
+
+    def change_plant(self, parameters: PlantParameters) -> PlantParameters:
+        constant = parameters.joints[self.joint - 1].back_emf_constant
+        return change_joint(parameters, self.joint, back_emf_constant=self.factor * constant)
+
+
+@dataclass
+class MotorInductance:
+    """The winding of `joint`'s motor has `inductance`: the current follows the voltage with L/R."""
+
+    name: ClassVar[str] = "motor_inductance"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "L di/dt = u − R i − K_b ω, advanced by its exact exponential"
+    source: ClassVar[str] = "third-order motor, chapter 3"
+    joint: int = joint_parameter()
+    inductance: float = parameter(0.0, 1.0, unit="H", null=0.0)
+
+    def change_plant(self, parameters: PlantParameters) -> PlantParameters:
+        present = parameters.joints[self.joint - 1].inductance
+        return change_joint(parameters, self.joint, inductance=present + self.inductance)
+
+
+@dataclass
+class ResistanceDrift:
+    """The winding of `joint`'s motor warms by its own loss, and its resistance rises.
+
+    One thermal mass: τ dΔT/dt = θ R i² − ΔT, R = R₀ (1 + α ΔT), with copper's α. The current that the cold winding
+    would carry is reduced by R₀/R; what falls with it is the torque.
+    """
+
+    name: ClassVar[str] = "resistance_drift"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "τ dT/dt = θ R i² − T, R = R₀ (1 + α T)"
+    source: ClassVar[str] = "first-order thermal model of motor data sheets; α of copper"
+    joint: int = joint_parameter()
+    thermal_resistance: float = parameter(0.0, 1e4, unit="K/W", null=0.0)
+    time_constant: float = parameter(0.1, 1e4, default=20.0, unit="s")
+
+    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:
+        joint = parameters.joints[self.joint - 1]
+        self._torque_per_ampere = joint.gear_ratio * joint.torque_constant
+        self._viscous = joint.gear_ratio**2 * joint.viscous_friction
+        self._cold = joint.resistance
+        self._keep = exp(-step_s / self.time_constant)
+        self.restart()
+
+    def restart(self) -> None:
+        self._warmer = 0.0
+
+    @property
+    def resistance(self) -> float:
+        """Resistance now (Ω)."""
+        return self._cold * (1.0 + _COPPER_PER_KELVIN * self._warmer)
+
+    def torque_change(self, torque: float, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002
+        cold_current = (torque + self._viscous * rate) / self._torque_per_ampere
+        resistance = self.resistance
+        current = cold_current * self._cold / resistance
+        steady = self.thermal_resistance * resistance * current**2
+        self._warmer = steady + (self._warmer - steady) * self._keep
+        return self._torque_per_ampere * (current - cold_current)

@@ -1,0 +1,133 @@
+"""Potentiometers and converters that show something else than the angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp, floor
+from typing import ClassVar
+
+from mock_controller.board.parameters import BoardParameters
+from mock_controller.modifications.registry import joint_parameter, parameter
+
+
+@dataclass
+class PotentiometerGain:
+    """`joint`'s reading is too large by the share `error` of its distance from the middle of the range."""
+
+    name: ClassVar[str] = "potentiometer_gain"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "shown = mid + (1 + e)(q − mid)"
+    source: ClassVar[str] = "reference voltage, trimmed at posture 500"
+    joint: int = joint_parameter()
+    error: float = parameter(-0.5, 0.5, null=0.0)
+
+    def know_board(self, parameters: BoardParameters) -> None:
+        scale = parameters.calibrations[self.joint - 1]
+        self._middle = scale.angle_at_zero_rad + 0.5 * scale.direction * scale.range_rad
+
+    def sensed_angle(self, angle: float) -> float:
+        return angle + self.error * (angle - self._middle)
+
+
+@dataclass
+class PotentiometerOffset:
+    """`joint`'s reading is too large by `angle`."""
+
+    name: ClassVar[str] = "potentiometer_offset"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "shown = q + o"
+    source: ClassVar[str] = "wiper turned on its shaft"
+    joint: int = joint_parameter()
+    angle: float = parameter(-1.0, 1.0, unit="rad", null=0.0)
+
+    def sensed_angle(self, angle: float) -> float:
+        return angle + self.angle
+
+
+@dataclass
+class PotentiometerNonlinearity:
+    """`joint`'s reading bends as that of a potentiometer whose wiper is loaded.
+
+    With x the wiper's place (0 to 1) and k the potentiometer's resistance over the load's, it shows
+    x/(1 + k x (1 − x)).
+    A negative k is the same circuit fed from the other end.
+    """
+
+    name: ClassVar[str] = "potentiometer_nonlinearity"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "shown x/(1 + k x(1 − x)); fed from the other end where k < 0"
+    source: ClassVar[str] = "voltage divider with a loaded wiper"
+    joint: int = joint_parameter()
+    loading: float = parameter(-1.0, 1.0, unit="1", null=0.0)
+
+    def know_board(self, parameters: BoardParameters) -> None:
+        scale = parameters.calibrations[self.joint - 1]
+        self._start, self._span = scale.angle_at_zero_rad, scale.direction * scale.range_rad
+
+    def sensed_angle(self, angle: float) -> float:
+        x = (angle - self._start) / self._span
+        if self.loading < 0.0:
+            x = 1.0 - (1.0 - x) / (1.0 - self.loading * x * (1.0 - x))
+        else:
+            x /= 1.0 + self.loading * x * (1.0 - x)
+        return self._start + self._span * x
+
+
+@dataclass
+class PotentiometerZeroDrift:
+    """`joint`'s reading wanders by `drift` as the track warms, with `time_constant`, from power-up on."""
+
+    name: ClassVar[str] = "potentiometer_zero_drift"
+    shared: ClassVar[bool] = False
+    line: ClassVar[str] = "shown = q + d (1 − exp(−t/τ))"
+    source: ClassVar[str] = "warming of the electronics after power-up"
+    joint: int = joint_parameter()
+    drift: float = parameter(-0.5, 0.5, unit="rad", null=0.0)
+    time_constant: float = parameter(0.1, 1e4, default=20.0, unit="s")
+
+    def know_board(self, parameters: BoardParameters) -> None:
+        self._keep = exp(-1e-6 * parameters.timing.period / self.time_constant)
+        self._left = 1.0
+
+    def restart(self) -> None:
+        self._left = 1.0
+
+    def sensed_angle(self, angle: float) -> float:
+        shown = angle + self.drift * (1.0 - self._left)
+        self._left *= self._keep
+        return shown
+
+
+@dataclass
+class ConverterBitWeight:
+    """Bit `bit` of `joint`'s converter weighs `error` counts too much: the reading jumps at its edges."""
+
+    name: ClassVar[str] = "converter_bit_weight"
+    shared: ClassVar[bool] = False
+    line: ClassVar[str] = "reading + ε where bit b is set"
+    source: ClassVar[str] = "integral nonlinearity of a successive-approximation converter"
+    joint: int = joint_parameter()
+    error: float = parameter(-200.0, 200.0, unit="count", null=0.0)
+    bit: int = parameter(0, 11, default=8)
+
+    def reading(self, counts: float) -> float:
+        return counts + self.error if floor(counts + 0.5) & (1 << self.bit) else counts
+
+
+@dataclass
+class StuckConverterBit:
+    """Bit `bit` of `joint`'s converter always reads 0 (`level` 0) or 1 (`level` 1). There is no size to it."""
+
+    name: ClassVar[str] = "stuck_converter_bit"
+    shared: ClassVar[bool] = False
+    line: ClassVar[str] = "bit b of the reading is stuck"
+    source: ClassVar[str] = "a broken output latch"
+    joint: int = joint_parameter()
+    bit: int = parameter(-1, 11, null=-1)
+    level: int = parameter(0, 1, default=1)
+
+    def reading(self, counts: float) -> float:
+        whole = floor(counts + 0.5)
+        mask = 1 << self.bit
+        stuck = whole | mask if self.level else whole & ~mask
+        return counts + (stuck - whole)
