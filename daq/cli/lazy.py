@@ -21,7 +21,8 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "traces": ("daq.cli.traces", "List, show, plot, convert and verify traces."),
     "config": ("daq.cli.config", "Show and check the configuration."),
     "mock": ("daq.cli.mock", "Start a mock controller that others can connect to."),
-    "residual": ("daq.cli.residual", "Simulate a trace and show where it disagrees."),
+    "simulate": ("daq.cli.simulate", "What a model does where a trace was recorded."),
+    "compare": ("daq.cli.compare", "Several models beside the same traces."),
     "demo": ("daq.cli.demo", "The ramp step on the mock, from command to plot."),
 }
 

@@ -1,0 +1,49 @@
+"""Models beside measurements as a table on standard output."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from model.comparison.agreement import JointAgreement, ModelAgreement
+
+
+def print_agreement(models: Sequence[ModelAgreement]) -> None:
+    """Root mean square and largest residual by model, kind of trace and joint, beside the noise floor."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, header_style="bold", title_justify="left")
+    for name in ("model", "traces"):
+        table.add_column(name)
+    for name in ("joint", "rms", "in counts", "largest", "noise floor", "floor in counts"):
+        table.add_column(name, justify="right")
+    for model in models:
+        for kind, joints in (("fitted to", model.in_sample), ("held out", model.held_out)):
+            for one in joints or ():
+                table.add_row(model.label, "" if model.held_out is None else kind, *_figures(one))
+    Console(highlight=False, width=120).print(table)
+
+
+def agreement_data(models: Sequence[ModelAgreement]) -> list[dict[str, Any]]:
+    """The same as data, with the errors in counts."""
+    return [model.model_dump(mode="json") for model in models]
+
+
+def _figures(one: JointAgreement) -> tuple[str, ...]:
+    factor, unit = shown(one.unit)
+    counts, floor = one.counts, one.floor_counts
+    return (
+        str(one.joint), f"{one.rmse * factor:.4f}{unit}", "–" if counts is None else f"{counts:.2f}",
+        f"{one.largest * factor:.4f}{unit}", f"{one.floor * factor:.4f}{unit}",
+        "–" if floor is None else f"{floor:.2f}",
+    )  # fmt: skip
+
+
+def shown(unit: str) -> tuple[float, str]:
+    """Factor and name of the unit in which people read."""
+    return {"rad": (math.degrees(1.0), "°"), "m": (1e3, " mm"), "rad/s": (math.degrees(1.0), "°/s")}.get(
+        unit, (1.0, f" {unit}")
+    )

@@ -1,0 +1,79 @@
+"""Models, machines and traces as the command line names them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from daq.cli.context import Invocation
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import Machine, load_machine, shipped_machines
+
+if TYPE_CHECKING:
+    from daq.contracts.trace import Trace
+    from model.machine_model.model import Model
+
+TracesArgument = Annotated[
+    list[str], typer.Argument(help="Files (.mcap, .csv), beginnings of traces' numbers or names, or `last`.")
+]
+TraceFolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (default: the configured one).")]
+ReportOption = Annotated[Path | None, typer.Option("--report", help="Write a self-contained page, an .html file.")]
+
+MODEL_HELP = "A model (.json, as `daq fit` writes it), a machine file (.toml), or a machine that ships (ma2000)."
+
+
+def read_model(name: str) -> Model:
+    """The model that a .json file holds, or that a machine describes with the friction its file states.
+
+    Raises SpecError with one line.
+    """
+    from model.machine_model.model import base_model
+    from model.machine_model.model_file import load_model
+
+    if name not in shipped_machines() and Path(name).suffix != ".toml":
+        return load_model(Path(name))
+    return base_model(load_machine(name))
+
+
+def model_label(name: str) -> str:
+    """What a model is called in tables: its file's name, or the machine's."""
+    return Path(name).stem
+
+
+def model_labels(names: Sequence[str]) -> list[str]:
+    """Labels that differ: whole names where file names are alike."""
+    labels = [model_label(name) for name in names]
+    return labels if len(set(labels)) == len(labels) else list(names)
+
+
+def read_traces(call: Invocation, folder: Path | None, names: Sequence[str]) -> list[Trace]:
+    """Traces by file, number, name or `last`; CSV files are read as they are. Raises TraceError, SpecError."""
+    from daq.traces.catalogue import find_trace
+    from daq.traces.csv_table import import_csv
+    from daq.traces.reader import read_trace
+
+    place = folder or call.trace_folder
+    if not names:
+        raise SpecError("no traces named: at least one is needed")
+    found = []
+    for name in names:
+        if Path(name).suffix == ".csv" and Path(name).is_file():
+            trace = import_csv(Path(name))
+        else:
+            trace = read_trace(find_trace(place, name))
+        found.append(trace)
+    return found
+
+
+def machine_of(traces: Sequence[Trace], call: Invocation) -> Machine:
+    """The machine that the traces were made on; the configured one where they do not say.
+
+    Raises SpecError when they were made on different ones.
+    """
+    machines = {t.record.machine.name: t.record.machine for t in traces if t.record.machine is not None}
+    if len(machines) > 1:
+        raise SpecError(f"the traces were made on different machines: {', '.join(machines)}; one at a time")
+    return next(iter(machines.values()), None) or call.settings.machine()

@@ -1,0 +1,94 @@
+"""How far simulated motion is from measured motion, by model, trace and joint."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class JointAgreement(_Part):
+    """One joint over one or more traces.
+
+    `rmse` and `largest` of measured − simulated, `floor` the noise and rounding of the measurement alone, `count` one
+    count of the sensor (None where it has none), all in `unit`. `share` is the mean square of what is left over that of
+    the measured motion about its mean: 0 for a perfect model, 1 for one that says "it stays where it is on average".
+    """
+
+    joint: int
+    unit: str
+    rmse: float
+    largest: float
+    floor: float
+    count: float | None
+    share: float | None
+
+    @property
+    def counts(self) -> float | None:
+        """Root mean square error in counts of the sensor."""
+        return None if self.count is None else self.rmse / self.count
+
+    @property
+    def floor_counts(self) -> float | None:
+        """The measurement's own noise in counts of the sensor."""
+        return None if self.count is None else self.floor / self.count
+
+
+class TraceAgreement(_Part):
+    """One trace; `held_out` when the model was not fitted to it."""
+
+    trace: str
+    held_out: bool
+    samples: int
+    joints: tuple[JointAgreement, ...]
+
+    @property
+    def mean_squared_error(self) -> float:
+        """MSQE of the source: mean squared error summed over the joints, rad² (4.70)."""
+        return sum(j.rmse**2 for j in self.joints)
+
+
+class ModelAgreement(_Part):
+    """One model on all traces; `held_out` pools the traces that are marked so, `in_sample` the others, None where there are none."""
+
+    label: str
+    model: str
+    effects: tuple[str, ...]
+    traces: tuple[TraceAgreement, ...]
+    in_sample: tuple[JointAgreement, ...] | None
+    held_out: tuple[JointAgreement, ...] | None
+
+    def mean_squared_error(self, kind: Literal["in_sample", "held_out"]) -> float | None:
+        """MSQE pooled over traces of one kind, rad²; None where there are none."""
+        joints = self.in_sample if kind == "in_sample" else self.held_out
+        return None if joints is None else sum(j.rmse**2 for j in joints)
+
+
+def pooled(traces: Sequence[TraceAgreement]) -> tuple[JointAgreement, ...] | None:
+    """Every sample of all traces alike; None for no traces."""
+    if not traces:
+        return None
+    total = sum(t.samples for t in traces)
+    found = []
+    for column, first in enumerate(traces[0].joints):
+        own = [t.joints[column] for t in traces]
+        square = sum(j.rmse**2 * t.samples for j, t in zip(own, traces, strict=True)) / total
+        motion = sum(
+            j.rmse**2 / j.share * t.samples for j, t in zip(own, traces, strict=True) if j.share is not None and j.share > 0
+        )
+        found.append(
+            first.model_copy(
+                update={
+                    "rmse": math.sqrt(square),
+                    "largest": max(j.largest for j in own),
+                    "share": square * total / motion if motion > 0 else None,
+                }
+            )
+        )
+    return tuple(found)

@@ -1,0 +1,136 @@
+"""Simulate traces with one or more models and say how much of the motion is left."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError
+from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
+from daq.contracts.trace import Trace
+from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
+from model.fitting.records import Record, Signal, noise_floor, records_of, resolution
+from model.machine_model.model import Model
+from model.simulation.simulate import Options, simulate
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TraceSignals:
+    """One trace beside its simulations.
+
+    time (m,) s; measured (m, n) and each of `simulated` (m, n) in `units`, one column a joint; set_point (m, n) or None.
+    """
+
+    trace: str
+    held_out: bool
+    joints: tuple[int, ...]
+    units: tuple[str, ...]
+    time: Floats
+    measured: Floats
+    simulated: tuple[Floats, ...]
+    set_point: Floats | None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """`models` in numbers and `signals` trace by trace, both in the order they were given in."""
+
+    models: tuple[ModelAgreement, ...]
+    signals: tuple[TraceSignals, ...]
+
+
+def compare(
+    models: Sequence[tuple[str, Model]], traces: Sequence[Trace], held_out: Collection[str] = (), *,
+    signal: Signal = "position", options: Options | None = None, progress: Progress = silent,
+    cancel: Cancel | None = None,
+) -> Comparison:  # fmt: skip
+    """Every trace simulated with every model, each as the controller (or the recorded drive) drove the arm.
+
+    Args:
+        models: labels and models, all of the same machine's joints. held_out: identities of traces not fitted to.
+
+    Raises:
+        TraceError, SpecError: for traces that cannot be simulated, or models that move different joints.
+        CancelledError: when asked to end.
+    """
+    cancel = cancel or Never()
+    if not models:
+        raise SpecError("no model: at least one is needed")
+    machine = models[0][1].machine
+    for label, model in models:
+        if model.machine.modelled_joints != machine.modelled_joints:
+            raise SpecError(
+                f"{label} moves joints {list(model.machine.modelled_joints)}, {models[0][0]} moves "
+                f"{list(machine.modelled_joints)}: they cannot be compared"
+            )
+    records = records_of(traces, machine, signal)
+    floor = noise_floor(records, machine, signal)
+    simulated: list[list[Floats]] = []
+    for number, record in enumerate(records):
+        row = []
+        for place, (label, model) in enumerate(models):
+            if cancel.is_set():
+                raise CancelledError("the comparison was cancelled")
+            progress((number + place / len(models)) / len(records), f"{label}: {record.name}")
+            found = simulate(model, record.inputs, options)
+            row.append(found.at_samples(found.velocity if signal == "velocity" else found.reading))
+        simulated.append(row)
+    progress(1.0, "done")
+    units = _units(models[0][1], signal)
+    agreements = []
+    for place, (label, model) in enumerate(models):
+        own = tuple(
+            _agreement(record, simulated[k][place], floor, units, model, record.name in held_out)
+            for k, record in enumerate(records)
+        )
+        agreements.append(
+            ModelAgreement(
+                label=label, model=model.identity, effects=tuple(u.name for u in model.effects), traces=own,
+                in_sample=pooled([t for t in own if not t.held_out]), held_out=pooled([t for t in own if t.held_out]),
+            )  # fmt: skip
+        )
+    signals = tuple(
+        _signals(trace, record, tuple(row), units, record.name in held_out, signal)
+        for trace, record, row in zip(traces, records, simulated, strict=True)
+    )
+    return Comparison(tuple(agreements), signals)
+
+
+def _units(model: Model, signal: Signal) -> tuple[str, ...]:
+    kinds = [model.machine.joint(j).kind for j in model.machine.modelled_joints]
+    return tuple(("rad" if k == "revolute" else "m") + ("/s" if signal == "velocity" else "") for k in kinds)
+
+
+def _agreement(
+    record: Record, simulated: Floats, floor: Floats, units: tuple[str, ...], model: Model, held_out: bool
+) -> TraceAgreement:
+    left = record.measured - simulated
+    joints = []
+    for column, joint in enumerate(model.machine.modelled_joints):
+        sensor = model.machine.joint(joint).sensor
+        square = float(np.mean(left[:, column] ** 2))
+        motion = float(np.var(record.measured[:, column]))
+        joints.append(
+            JointAgreement(
+                joint=joint, unit=units[column], rmse=float(np.sqrt(square)),
+                largest=float(np.abs(left[:, column]).max()), floor=float(floor[column]),
+                count=resolution(sensor) if sensor is not None and not units[column].endswith("/s") else None,
+                share=square / motion if motion > 9 * floor[column] ** 2 else None,
+            )  # fmt: skip
+        )
+    return TraceAgreement(trace=record.name, held_out=held_out, samples=record.samples, joints=tuple(joints))
+
+
+def _signals(
+    trace: Trace, record: Record, simulated: tuple[Floats, ...], units: tuple[str, ...], held_out: bool, signal: Signal
+) -> TraceSignals:
+    joints = record.inputs.joints
+    wanted = None
+    if trace.set_point is not None and signal == "position":
+        wanted = trace.set_point[:, [trace.column(j) for j in joints]]
+    return TraceSignals(record.name, held_out, joints, units, trace.time, record.measured, simulated, wanted)

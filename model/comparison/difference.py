@@ -1,0 +1,45 @@
+"""Which parameters of two models differ, and by how much."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pydantic import BaseModel, ConfigDict
+
+from model.machine_model.model import Model
+
+SAME = 1e-12
+"""Relative difference below which two values are the same number."""
+
+
+class ParameterDifference(BaseModel):
+    """One parameter with its value in each model, None where a model has it not.
+
+    `deviations` is the spread of the values in expected deviations; None where one lacks it or none is expected.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str
+    unit: str
+    values: tuple[float | None, ...]
+    deviations: float | None
+
+
+def differences(models: Sequence[Model]) -> tuple[ParameterDifference, ...]:
+    """Parameters that do not have the same value in all models, in the order of the first that has them."""
+    names: dict[str, None] = {}
+    for model in models:
+        names |= dict.fromkeys(p.name for p in model.parameters)
+    found = []
+    for name in names:
+        own = [m.by_name.get(name) for m in models]
+        values = tuple(None if p is None else p.value for p in own)
+        numbers = [v for v in values if v is not None]
+        widest = max(numbers) - min(numbers)
+        if len(numbers) == len(models) and widest <= SAME * max(abs(v) for v in numbers):
+            continue
+        first = next(p for p in own if p is not None)
+        deviations = widest / first.deviation if first.deviation and len(numbers) == len(models) else None
+        found.append(ParameterDifference(name=name, unit=first.unit, values=values, deviations=deviations))
+    return tuple(found)

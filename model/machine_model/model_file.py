@@ -1,0 +1,54 @@
+"""Models as files: JSON, with a version that a reader checks before anything else."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from daq.contracts.errors import SpecError
+from model.machine_model.model import MODEL_FORMAT, Model
+
+
+def save_model(model: Model, path: Path) -> Path:
+    """Write a model. Returns `path`. Raises SpecError when the file cannot be written."""
+    try:
+        path.write_text(model.model_dump_json(indent=1) + "\n", "utf-8")
+    except OSError as error:
+        raise SpecError(f"{path}: cannot be written: {error.strerror}") from error
+    return path
+
+
+def load_model(path: Path) -> Model:
+    """The model in a file: a model of its own, or the one that a saved fit carries.
+
+    Raises SpecError, in one line, for no such file, another kind of file, or a model of a newer version.
+    """
+    try:
+        data = json.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise SpecError(f"model {path}: cannot be read: {error.strerror}") from error
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise SpecError(f"model {path}: is not JSON, so not a model") from error
+    if isinstance(data, dict) and isinstance(data.get("model"), dict):
+        data = data["model"]
+    if not isinstance(data, dict) or "machine" not in data:
+        raise SpecError(f"model {path}: is neither a model nor the result of a fit")
+    _check_version(path, data.get("format"))
+    try:
+        return Model.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "model"
+        raise SpecError(f"model {path}: {where}: {first['msg'].removeprefix('Value error, ')}") from error
+
+
+def _check_version(path: Path, version: Any) -> None:
+    if not isinstance(version, int) or version < 1:
+        raise SpecError(f"model {path}: says no version (format {version!r})")
+    if version > MODEL_FORMAT:
+        raise SpecError(
+            f"model {path}: has format {version}, this version of the program reads up to {MODEL_FORMAT}; update it"
+        )

@@ -1,0 +1,71 @@
+"""The report of one or more models beside traces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from model.comparison.agreement import ModelAgreement
+from model.comparison.compare import Comparison
+from model.comparison.difference import ParameterDifference
+from model.reports.motion import agreement_table, motion_section
+from model.reports.page import Cell, Report, Section, Table, cells, listed
+
+
+def comparison_report(found: Comparison, differences: Sequence[ParameterDifference] = ()) -> Report:
+    """Models beside what was measured; `differences` between the parameters of two models."""
+    labels = [m.label for m in found.models]
+    sections = [
+        Section("How large the error is", (agreement_table(found.models), _squared_errors(found.models))),
+        motion_section(found.signals, labels),
+    ]
+    if differences:
+        sections.append(Section("Where the models differ", (_differences(differences, labels),)))
+    facts = [(m.label, f"{m.model}: {', '.join(m.effects) or 'no effects'}") for m in found.models]
+    facts.append(("traces", listed([s.trace for s in found.signals])))
+    return Report(_title(labels), _answer(found.models), tuple(facts), tuple(sections))
+
+
+def _title(labels: Sequence[str]) -> str:
+    return f"{labels[0]} beside what was measured" if len(labels) == 1 else f"{' and '.join(labels)} compared"
+
+
+def _answer(models: Sequence[ModelAgreement]) -> str:
+    ranked = sorted(models, key=total_error)
+    best = ranked[0]
+    text = f"{best.label}: mean squared error {total_error(best):.4g} rad² summed over the joints"
+    if len(ranked) == 1:
+        return f"{text}."
+    others = ", ".join(f"{m.label} {total_error(m) / total_error(best):.3g} times" for m in ranked[1:])
+    return f"{text}; {others} as much."
+
+
+def total_error(model: ModelAgreement) -> float:
+    """Held-out traces count alone where there are any; rad²."""
+    held = model.mean_squared_error("held_out")
+    return held if held is not None else model.mean_squared_error("in_sample") or 0.0
+
+
+def _squared_errors(models: Sequence[ModelAgreement]) -> Table:
+    rows = []
+    for number, trace in enumerate(models[0].traces):
+        errors = [m.traces[number].mean_squared_error for m in models]
+        rows.append((
+            Cell(trace.trace), Cell("held out" if trace.held_out else "fitted to"),
+            *(Cell(f"{e:.4g}", number=True) for e in errors),
+        ))  # fmt: skip
+    return Table(
+        ("trace", "", *(m.label for m in models)), tuple(rows),
+        "Mean squared error summed over the joints, rad² (equation 4.70 of the source).",
+    )  # fmt: skip
+
+
+def _differences(differences: Sequence[ParameterDifference], labels: Sequence[str]) -> Table:
+    rows = tuple(
+        cells(d.name, *("–" if v is None else f"{v:.6g}" for v in d.values), d.unit,
+              "–" if d.deviations is None else f"{d.deviations:.2f}")
+        for d in differences
+    )  # fmt: skip
+    return Table(
+        ("parameter", *labels, "unit", "in expected deviations"), rows,
+        "Parameters whose values differ; a dash where a model has no such parameter.",
+    )  # fmt: skip

@@ -1,0 +1,84 @@
+"""Figures for print and screen: one style, colours that the colour-blind tell apart, and that follow the page's theme."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+
+INK = "#222222"
+QUIET = "#8a8a8a"
+GRID = "#e4e4e4"
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#a07800", "#4b4b9b")
+"""Okabe and Ito's, the yellow darkened to show on paper; the same a joint as in the plots of traces."""
+
+MODEL_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
+"""One a model where several are drawn together."""
+
+WIDTH = 7.2
+"""Inches: a page's text."""
+
+_THEMED = {INK: "ink", QUIET: "quiet", GRID: "grid"} | {c: f"colour-{k + 1}" for k, c in enumerate(COLOURS)}
+
+_STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans", "font.size": 8.0, "text.color": INK, "axes.spines.top": False,
+    "axes.spines.right": False, "axes.edgecolor": QUIET, "axes.labelcolor": INK, "axes.linewidth": 0.7,
+    "axes.grid": True, "axes.axisbelow": True, "grid.color": GRID, "grid.linewidth": 0.6, "xtick.color": INK,
+    "ytick.color": INK, "xtick.major.width": 0.7, "ytick.major.width": 0.7, "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5, "lines.linewidth": 1.2, "lines.solid_joinstyle": "round", "legend.frameon": False,
+    "legend.fontsize": 7.5, "axes.titlesize": 8.5, "axes.titleweight": "bold", "axes.titlelocation": "left",
+    "figure.facecolor": "none", "axes.facecolor": "none", "savefig.facecolor": "none", "svg.hashsalt": "ma2000-daq",
+    "path.simplify_threshold": 0.4,
+}  # fmt: skip
+
+
+def drawn(draw: Callable[[Figure], None], height: float, width: float = WIDTH) -> str:
+    """SVG of what `draw` puts on a figure of that size (inches). Its colours are variables of the page's style."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        draw(figure)
+        stream = io.StringIO()
+        figure.savefig(stream, format="svg", metadata={"Date": None})
+    text = stream.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r'<svg [^>]*?viewBox="([^"]+)"[^>]*>', r'<svg viewBox="\1" role="img">', text, count=1)
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    for colour, name in _THEMED.items():
+        text = text.replace(f": {colour}", f": var(--{name})")
+    return text.replace("font-family", "data-font")
+
+
+def thinned(time: Floats, *signals: Floats, most: int = 1500) -> tuple[Floats, ...]:
+    """At most about `most` samples of each, evenly picked: more than a printed page resolves."""
+    stride = max(1, -(-len(time) // most))
+    return (time[::stride], *(s[::stride] for s in signals))
+
+
+def shown_unit(unit: str) -> tuple[float, str]:
+    """Factor and name of the unit in which people read: degrees, millimetres."""
+    known = {"rad": (180 / np.pi, "°"), "m": (1e3, "mm"), "rad/s": (180 / np.pi, "°/s"), "m/s": (1e3, "mm/s")}
+    factor, name = known.get(unit, (1.0, unit))
+    return float(factor), name
+
+
+def panels(figure: Figure, rows: int, columns: int, **options: Any) -> Any:
+    """Axes (rows, columns), never squeezed."""
+    return figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def baseline(axes: Axes) -> None:
+    """The line of zero."""
+    axes.axhline(0.0, color=QUIET, lw=0.7, zorder=1)

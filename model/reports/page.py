@@ -1,0 +1,116 @@
+"""A report as data, and its one HTML file: no script, nothing loaded from elsewhere, readable in light, dark and print."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from daq.contracts.errors import SpecError
+
+Tone = Literal["plain", "good", "warning", "quiet"]
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph."""
+
+    text: str
+    tone: Tone = "plain"
+    kind: str = field(default="text", init=False)
+
+
+@dataclass(frozen=True)
+class Points:
+    """A list of remarks."""
+
+    items: tuple[str, ...]
+    kind: str = field(default="points", init=False)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of a table; numbers are set to the right."""
+
+    text: str
+    tone: Tone = "plain"
+    number: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of cells under headings; the first cell of a row names it. `caption` says what the numbers are."""
+
+    head: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    caption: str = ""
+    kind: str = field(default="table", init=False)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure as SVG text, and what it shows."""
+
+    svg: str
+    caption: str
+    kind: str = field(default="picture", init=False)
+
+
+Block = Text | Points | Table | Picture
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what stands below it."""
+
+    title: str
+    blocks: tuple[Block, ...]
+
+    @property
+    def anchor(self) -> str:
+        """Its name in links."""
+        return "".join(c if c.isalnum() else "-" for c in self.title.lower())
+
+
+@dataclass(frozen=True)
+class Report:
+    """A page: what it is of, the answer in one or two sentences, facts in two columns, and sections."""
+
+    title: str
+    answer: str
+    facts: tuple[tuple[str, str], ...]
+    sections: tuple[Section, ...]
+
+
+def cells(*texts: str, tone: Tone = "plain") -> tuple[Cell, ...]:
+    """A row: its name, then numbers."""
+    return (Cell(texts[0], tone), *(Cell(t, tone, number=True) for t in texts[1:]))
+
+
+def html(report: Report) -> str:
+    """The page as text; the same report gives the same text."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("model.reports"), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    return environment.get_template("report.html.j2").render(report=report)
+
+
+def write_report(report: Report, path: Path) -> Path:
+    """Write the page. Returns `path`. Raises SpecError when it is not an .html file or cannot be written."""
+    if path.suffix != ".html":
+        raise SpecError(f"report {path}: is written as .html")
+    try:
+        path.write_text(html(report), "utf-8")
+    except OSError as error:
+        raise SpecError(f"report {path}: cannot be written: {error.strerror}") from error
+    return path
+
+
+def listed(names: Sequence[str], most: int = 6) -> str:
+    """Names in a sentence; what is more than `most` is counted."""
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
