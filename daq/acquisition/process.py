@@ -37,7 +37,7 @@ def main() -> int:
 
     The rest of the input is the parent's: any byte is a stop, its end means the parent is gone.
     """
-    with Speaker() as speaker:
+    with Speaker(sys.stdout.fileno()) as speaker:
         try:
             job = read_job(sys.stdin.fileno())
             speaker.report_samples = job.report_samples

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import queue
-import sys
 import threading
 from types import TracebackType
 from typing import Self
@@ -19,16 +18,16 @@ WAITING_REPORTS = 4096
 
 
 class Speaker:
-    """Writes reports to standard output, one a line, on a thread of its own; a reader that has gone stops nobody.
+    """Writes reports to a descriptor, one a line, on a thread of its own; a reader that has gone stops nobody.
 
     The end of the run is told however long the reader takes: leaving the `with` block waits for it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, output: int) -> None:
         self.report_samples = False
         self.untold = 0
         """Reports that found no room."""
-        self._output = sys.stdout.fileno()
+        self._output = output
         self._queue: queue.Queue[Report | None] = queue.Queue(WAITING_REPORTS)
         self._thread = threading.Thread(target=self._write_all, name="reports", daemon=True)
 
