@@ -1,0 +1,218 @@
+/* One closed-loop run of the waist-shoulder-elbow arm, every effect of the rigid kernel compiled in: what the speed of
+   the Python one is measured against. Same algorithm, same expressions (three_joint.h), column numbers from layout.h,
+   which the benchmark writes. The effective parameters (body) come from the caller: they are formed once a run. */
+#include <math.h>
+#include <string.h>
+#include "layout.h"
+#include "three_joint.h"
+
+#define N 3
+enum { POSITION, SPEED, DEFLECTION, STUCK, CURRENT, ROTOR_POSITION, ROTOR_SPEED, RISE, STATE };
+enum { SUM, LAST_ERROR, MEMORY = 5 };
+#define QUEUE 16
+
+static inline double clamped(double x, double limit) { return x > limit ? limit : (x < -limit ? -limit : x); }
+static inline double outside(double x, double w) { return x > w ? x - w : (x < -w ? x + w : 0.0); }
+static inline double motor_gain(const double *j, double rise) {
+  return j[GEAR] * j[TORQUE_CONSTANT] / (j[RESISTANCE] * (1.0 + rise));
+}
+static inline double motor_damping(const double *j, double rise) {
+  const double e = j[BACK_EMF] * (1.0 + j[BACK_EMF_ERROR]);
+  return j[GEAR] * j[GEAR] * (j[TORQUE_CONSTANT] * e / (j[RESISTANCE] * (1.0 + rise)) + j[VISCOUS]);
+}
+static inline double steady_current(const double *j, double rise, double volts, double speed) {
+  return (volts - j[BACK_EMF] * (1.0 + j[BACK_EMF_ERROR]) * j[GEAR] * speed) / (j[RESISTANCE] * (1.0 + rise));
+}
+static inline double current_after(const double *j, double rise, double now, double steady, double t) {
+  return steady + (now - steady) * exp(-j[RESISTANCE] * (1.0 + rise) / j[INDUCTANCE] * t);
+}
+
+static double sensed_angle(double q, const double *j) {
+  double s = q + j[POTENTIOMETER_GAIN] * (q - j[AT_ZERO] - 0.5 * j[RANGE]) + j[POTENTIOMETER_OFFSET];
+  if (j[BEND_1] != 0 || j[BEND_2] != 0 || j[BEND_3] != 0 || j[BEND_4] != 0) {
+    const double w = M_PI * (q - j[AT_ZERO]) / j[RANGE];
+    s += j[BEND_1] * sin(w) + j[BEND_2] * sin(2 * w) + j[BEND_3] * sin(3 * w) + j[BEND_4] * sin(4 * w);
+  }
+  return s;
+}
+
+static double extra_torque(const double *j, long flags, double t, double q, double v, double z, double stuck, double motor) {
+  double torque = 0;
+  if (flags & HAS_STICTION) torque -= z * stuck * j[BREAKAWAY];
+  if (j[STRIBECK] != 0) torque -= z * j[STRIBECK] * exp(-fabs(v) / j[STRIBECK_SPEED]);
+  if (j[DIRECTION] != 0) torque -= 0.5 * j[DIRECTION] * z * z;
+  if (j[GEAR_LOSS] != 0) torque -= z * j[GEAR_LOSS] * fabs(motor);
+  if (j[RIPPLE_SINE] != 0 || j[RIPPLE_COSINE] != 0)
+    torque += j[RIPPLE_SINE] * sin(j[RIPPLE_CYCLES] * q) + j[RIPPLE_COSINE] * cos(j[RIPPLE_CYCLES] * q);
+  if (j[SPRING] != 0) torque -= j[SPRING] * (q - j[SPRING_REST]);
+  if (j[DISTURBANCE_SINE] != 0 || j[DISTURBANCE_COSINE] != 0) {
+    const double w = 2 * M_PI * j[DISTURBANCE_FREQUENCY] * t;
+    torque += j[DISTURBANCE_SINE] * sin(w) + j[DISTURBANCE_COSINE] * cos(w);
+  }
+  return torque;
+}
+
+static double special(const double *j, long flags, double t, double elapsed, double q, double v, double z, const double *s, double volts) {
+  const double steady = steady_current(j, s[RISE], volts, v);
+  const double now = flags & HAS_INDUCTANCE ? current_after(j, s[RISE], s[CURRENT], steady, elapsed) : steady;
+  const double k = j[GEAR] * j[TORQUE_CONSTANT];
+  return k * (now - steady) + extra_torque(j, flags, t, q, v, z, s[STUCK], k * now);
+}
+
+static void after_step(double *s, const double *j, long flags, double level, double volts, double h) {
+  if (flags & HAS_INDUCTANCE)
+    s[CURRENT] = current_after(j, s[RISE], s[CURRENT], steady_current(j, s[RISE], volts, s[SPEED]), h);
+  if (flags & HAS_STICTION) {
+    if (s[STUCK] > 0.5) {
+      if (fabs(s[DEFLECTION]) >= 1.0) s[STUCK] = 0;
+    } else if (fabs(s[SPEED]) < 1e-3 || s[SPEED] * s[DEFLECTION] < 0) {
+      const double whole = level + j[BREAKAWAY];
+      if (whole > 0) s[DEFLECTION] *= level / whole;
+      s[STUCK] = 1;
+    }
+  }
+}
+
+static inline void solve(const double *m, const double *t, double *restrict a) {
+  const double r = 1.0 / m[0], l2 = m[1] * r, l3 = m[2] * r;
+  const double e22 = m[3] - l2 * m[1], e23 = m[4] - l2 * m[2], e33 = m[5] - l3 * m[2];
+  const double b1 = t[0] - m[6], b2 = t[1] - m[7] - l2 * b1, b3 = t[2] - m[8] - l3 * b1;
+  const double d = 1.0 / (e22 * e33 - e23 * e23);
+  a[1] = (e33 * b2 - e23 * b3) * d;
+  a[2] = (e22 * b3 - e23 * b2) * d;
+  a[0] = (b1 - m[1] * a[1] - m[2] * a[2]) * r;
+}
+
+static void advance(double s[N][STATE], const double *volts, double start, double duration, long steps,
+                    const double p[N][PER_JOINT], const double *body, const long *flags) {
+  const double h = duration / steps, reaches[4] = {0, 0.5 * h, 0.5 * h, h}, weights[4] = {1, 2, 2, 1};
+  const int tilted = body[17] != 0 || body[18] != 0, is_special = (flags[0] | flags[1] | flags[2]) != 0;
+  double drive[N], damping[N], soft[N], q[N], v[N], z[N];
+  for (int j = 0; j < N; j++) {
+    drive[j] = motor_gain(p[j], s[j][RISE]) * volts[j];
+    damping[j] = motor_damping(p[j], s[j][RISE]);
+    soft[j] = 1.0 / p[j][PRESLIDING];
+    q[j] = s[j][POSITION]; v[j] = s[j][SPEED]; z[j] = s[j][DEFLECTION];
+  }
+  for (long step = 0; step < steps; step++) {
+    double a[N] = {0}, u[N], qs[N] = {0}, vs[N] = {0}, dq[N] = {0}, level[N];
+    for (int j = 0; j < N; j++) u[j] = v[j];
+    for (int stage = 0; stage < 4; stage++) {
+      const double reach = reaches[stage];
+      if (stage > 0)
+        for (int j = 0; j < N; j++) { dq[j] = reach * u[j]; u[j] = v[j] + reach * a[j]; }
+      const double t2 = q[1] + dq[1] + p[1][THETA], t3 = q[2] + dq[2] + p[2][THETA];
+      const double along2 = body[22] * sin(t2), along3 = body[23] * sin(t2 + t3);
+      level[0] = p[0][COULOMB] + p[0][COULOMB_ARM] * fabs(along2 * cos(t2) + along3 * cos(t2 + t3));
+      level[1] = p[1][COULOMB] + p[1][COULOMB_ARM] * fabs(along2 + along3 * cos(t3));
+      level[2] = p[2][COULOMB] + p[2][COULOMB_ARM] * fabs(along3);
+      double torque[N], y[N], m[9];
+      for (int j = 0; j < N; j++) {
+        y[j] = clamped(z[j] + dq[j] * soft[j], 1.0);
+        torque[j] = drive[j] - damping[j] * u[j] - y[j] * level[j];
+      }
+      if (is_special)
+        for (int j = 0; j < N; j++)
+          torque[j] += special(p[j], flags[j], start + step * h + reach, reach, q[j] + dq[j], u[j], y[j], s[j], volts[j]);
+      if (tilted) {
+        double b[3];
+        horizontal_gravity_torques(q[0] + dq[0] + p[0][THETA], t2, t3, body, b);
+        for (int j = 0; j < N; j++) torque[j] -= b[j];
+      }
+      mass_matrix_and_bias(t2, t3, u[0], u[1], u[2], body, m);
+      solve(m, torque, a);
+      for (int j = 0; j < N; j++) { qs[j] += weights[stage] * u[j]; vs[j] += weights[stage] * a[j]; }
+    }
+    for (int j = 0; j < N; j++) {
+      dq[j] = h / 6.0 * qs[j];
+      q[j] += dq[j];
+      v[j] += h / 6.0 * vs[j];
+      z[j] = clamped(z[j] + dq[j] * soft[j], 1.0);
+    }
+    if (is_special)
+      for (int j = 0; j < N; j++) {
+        s[j][DEFLECTION] = z[j]; s[j][SPEED] = v[j];
+        after_step(s[j], p[j], flags[j], level[j], volts[j], h);
+        z[j] = s[j][DEFLECTION];
+      }
+  }
+  for (int j = 0; j < N; j++) { s[j][POSITION] = q[j]; s[j][SPEED] = v[j]; s[j][DEFLECTION] = z[j]; }
+}
+
+static double board_pid(double error, const double *g, const double *j, long quantise, double *memory) {
+  double share = memory[SUM] / 64.0;
+  if (quantise) share = floor(share);
+  double power = g[6] * (1.0 + j[GAIN_ERROR]) * (g[0] * error + share + g[2] * (error - memory[LAST_ERROR]));
+  if (quantise) power = floor(power + 0.5);
+  const double growth = g[1] * error;
+  if (!((power >= 127 && growth > 0) || (power <= -127 && growth < 0))) memory[SUM] += growth;
+  memory[LAST_ERROR] = error;
+  return clamped(power, 127.0);
+}
+
+void run(long periods, const double *set_points, const double *noise, const double *initial, const double *first_drive,
+         const double *shared, const double p[N][PER_JOINT], const double *gains, const double *body, const long *modes,
+         const double *deflection, long quantise, double longest, double *out) {
+  double s[N][STATE], memory[N][MEMORY], queue[QUEUE][N], volts[N], times[N];
+  long order[N], late[N], flags[N];
+  memset(s, 0, sizeof s); memset(memory, 0, sizeof memory);
+  for (int j = 0; j < N; j++) {
+    const double delay = shared[DELAY] + p[j][EXTRA_DELAY];
+    late[j] = (long)floor(delay / shared[PERIOD] + 1e-12);
+    times[j] = delay - late[j] * shared[PERIOD];
+    int i = j;
+    for (; i > 0 && times[order[i - 1]] > times[j]; i--) order[i] = order[i - 1];
+    order[i] = j;
+    flags[j] = modes[j];
+    const int extras[] = {STRIBECK, DIRECTION, GEAR_LOSS, RIPPLE_SINE, RIPPLE_COSINE, SPRING, DISTURBANCE_SINE, DISTURBANCE_COSINE};
+    for (unsigned e = 0; e < sizeof extras / sizeof *extras; e++)
+      if (p[j][extras[e]] != 0) flags[j] |= HAS_EXTRA_TORQUE;
+    for (int k = 0; k < QUEUE; k++) queue[k][j] = first_drive[j];
+    volts[j] = clamped(outside(first_drive[j], p[j][DEAD_ZONE]), p[j][SUPPLY]);
+    s[j][POSITION] = initial[2 * j]; s[j][SPEED] = initial[2 * j + 1];
+    s[j][STUCK] = 1; s[j][DEFLECTION] = deflection[j];
+    s[j][CURRENT] = steady_current(p[j], 0, volts[j], initial[2 * j + 1]);
+  }
+  for (long k = 0; k < periods; k++) {
+    for (int j = 0; j < N; j++) {
+      double read = (sensed_angle(s[j][POSITION], p[j]) - p[j][AT_ZERO]) / p[j][RAD_PER_COUNT] + noise[k * N + j];
+      if (quantise) read = floor(read + 0.5);
+      const double now = set_points[k * N + j], before = set_points[(k > 0 ? k - 1 : 0) * N + j];
+      const double error = now - p[j][LOST] * (now - before) - read;
+      if (k == 0) memory[j][LAST_ERROR] = error;
+      const double power = board_pid(error, gains + 7 * j, p[j], quantise, memory[j]);
+      const double values[6] = {s[j][POSITION], s[j][SPEED], p[j][AT_ZERO] + p[j][RAD_PER_COUNT] * read,
+                                error * p[j][RAD_PER_COUNT], power, power * p[j][VOLTS_PER_COUNT]};
+      for (int o = 0; o < 6; o++) out[(o * periods + k) * N + j] = values[o];
+      queue[k % QUEUE][j] = values[5];
+    }
+    double done = 0;
+    for (int i = 0; i <= N; i++) {
+      const double until = i < N ? times[order[i]] : shared[PERIOD];
+      if (until != done) {
+        const long wanted = (long)ceil((until - done) / longest - 1e-9);
+        advance(s, volts, k * shared[PERIOD] + done, until - done, wanted > 1 ? wanted : 1, p, body, flags);
+      }
+      done = until;
+      if (i < N) {
+        const long j = order[i];
+        volts[j] = clamped(outside(queue[(k - late[j] + QUEUE) % QUEUE][j], p[j][DEAD_ZONE]), p[j][SUPPLY]);
+      }
+    }
+    for (int j = 0; j < N; j++)
+      if (p[j][HEATING] != 0) {
+        const double i = steady_current(p[j], s[j][RISE], volts[j], s[j][SPEED]);
+        const double kept = exp(-shared[PERIOD] / p[j][COOLING_TIME]);
+        s[j][RISE] = s[j][RISE] * kept + p[j][HEATING] * i * i * p[j][COOLING_TIME] * (1.0 - kept);
+      }
+  }
+}
+
+void run_many(long first, long last, long periods, const double *set_points, const double *noise, const double *initial,
+              const double *first_drive, const double *shared, const double *p, const double *gains, const double *body,
+              const long *modes, const double *deflection, long quantise, double longest, double *out) {
+  for (long r = first; r < last; r++)
+    run(periods, set_points, noise, initial, first_drive, shared + r * SHARED,
+        (const double(*)[PER_JOINT])(p + r * N * PER_JOINT), gains, body, modes, deflection, quantise, longest,
+        out + r * 6 * periods * N);
+}
