@@ -54,13 +54,13 @@ def expected_accelerations(model: Model, motion: MeasuredMotion, names: Sequence
     """
     if (model.flags & at.HAS_FLEXIBILITY).any():
         raise SpecError("the time-domain form needs rigid transmissions: a rotor's own motion is not measured")
-    plain = _accelerations(model, motion, model.vector)
+    plain = _accelerations(model, motion, model.vector.astype(np.complex128)).real
     derivatives = np.zeros((len(names), *plain.shape))
     for row, name in enumerate(names):
         vector = model.vector.astype(np.complex128)
         vector[list(model.parameter(name).slots)] += 1j * DUAL_STEP
         derivatives[row] = _accelerations(model, motion, vector).imag / DUAL_STEP
-    return plain, derivatives
+    return np.ascontiguousarray(plain), derivatives
 
 
 def damping_rates(model: Model, motion: MeasuredMotion) -> Floats:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
@@ -22,6 +23,8 @@ NOISE_SHARE = 0.05
 """Smoothing is chosen so that noise stays below this share of the acceleration."""
 MOVING = 4.0
 """A joint moves where its speed exceeds so many standard deviations of its noise."""
+FINE = 8
+"""Points a period at which friction's change of direction is looked for."""
 SHORTEST = 12
 """Samples that a trace needs at least."""
 
@@ -63,7 +66,7 @@ def observe(model: Model, trace: Trace, smoothing: float | None = None) -> Obser
     )  # fmt: skip
     position = d.smoothed(measured, width)
     speed = d.speeds(position, inputs.period)
-    friction = d.smoothed(_friction_deflection(model, d.smoothed(measured, 1.0)), width)
+    friction = d.smoothed(_friction_deflection(model, measured), width)
     motion = MeasuredMotion(inputs.time, position, speed, friction, inputs.drive, inputs.period, width)
     gain = d.noise_gain(width, inputs.period)
     noise = deviation * np.hypot(gain.acceleration, damping_rates(model, motion) * gain.speed)
@@ -88,14 +91,21 @@ def position_noise(model: Model) -> Floats:
     return np.array(deviations)
 
 
-def _friction_deflection(model: Model, position: Floats) -> Floats:
-    """Deflection of the friction contact (k, n) that follows the motion, from rest."""
-    joints = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
-    result = np.zeros_like(position)
-    for k in range(1, len(position)):
-        step = (position[k] - position[k - 1]) / joints[:, at.PRESLIDING]
-        result[k] = np.clip(result[k - 1] + step, -1.0, 1.0)
-    return result
+def _friction_deflection(model: Model, measured: Floats) -> Floats:
+    """Deflection of the friction contact (k, n) that follows the motion from rest, averaged as accelerations are.
+
+    Motion between samples is interpolated: friction turns around within a period, and when it does counts.
+    """
+    presliding = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)[:, at.PRESLIDING]
+    count = len(measured)
+    between = CubicSpline(np.arange(count), measured)(np.arange((count - 1) * FINE + 1) / FINE)
+    contact = np.zeros_like(between)
+    for k in range(1, len(between)):
+        contact[k] = np.clip(contact[k - 1] + (between[k] - between[k - 1]) / presliding, -1.0, 1.0)
+    weights = FINE - np.abs(np.arange(-FINE, FINE + 1))
+    padded = np.pad(contact, ((FINE, FINE), (0, 0)), mode="edge")
+    averaged = np.stack([np.convolve(column, weights / weights.sum(), mode="valid") for column in padded.T], axis=1)
+    return np.asarray(averaged[::FINE])
 
 
 def _spread(mask: Mask, reach: int) -> Mask:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from model.machine_model.model import Model
-from model.validation.gravity_load import gravity_loads
+from model.analysis.bodies import gravity_loads
 from model.validation.measured_motion import Observation
 
 Floats = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Gravity torques along a motion."""
+"""A model's bodies as a general chain, and gravity along a motion."""
 
 from __future__ import annotations
 

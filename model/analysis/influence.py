@@ -1,0 +1,54 @@
+"""Which inertial parameters act on which joint: the source's tables 5.1 to 5.3 beside what the dynamics do."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from model.dynamics.inertial_influence import PARAMETERS, State, acting_parameters, parameter_name
+from model.kinematics.chain import Chain
+
+
+class Influence(BaseModel):
+    """Parameters that act on one joint's torque, by the dynamics and as published; names such as m3, c2x, I3zz."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    table: str
+    joint: int
+    acting: tuple[str, ...]
+    published: tuple[str, ...]
+
+    @property
+    def published_too_many(self) -> tuple[str, ...]:
+        """Named by the source, without any effect."""
+        return tuple(p for p in self.published if p not in self.acting)
+
+    @property
+    def published_too_few(self) -> tuple[str, ...]:
+        """With an effect, not named by the source."""
+        return tuple(p for p in self.acting if p not in self.published)
+
+
+def influences(
+    chain: Chain, table: str, published: tuple[frozenset[str], ...], *, waist_still: bool = False, states: int = 10
+) -> tuple[Influence, ...]:
+    """Acting parameters of a chain of revolute joints at random states, beside published ones, one entry a joint.
+
+    Raises ChainError for a prismatic joint.
+    """
+    acting = acting_parameters(chain, _states(chain.joint_count, states, waist_still))
+    order = [parameter_name(link, which) for link in range(1, chain.joint_count + 1) for which in range(len(PARAMETERS))]
+    return tuple(
+        Influence(table=table, joint=j, acting=tuple(a), published=tuple(p for p in order if p in named))
+        for j, (a, named) in enumerate(zip(acting, published, strict=True), start=1)
+    )
+
+
+def _states(joints: int, count: int, waist_still: bool) -> list[State]:
+    rng = np.random.default_rng(5)
+    still = np.ones(joints)
+    if waist_still:
+        still[0] = 0.0
+    return [(rng.uniform(-3, 3, joints), still * rng.normal(size=joints), still * rng.normal(size=joints))
+            for _ in range(count)]  # fmt: skip

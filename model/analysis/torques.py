@@ -1,0 +1,171 @@
+"""Elements of D and the torques of inertia, interaction, speed and gravity along a motion (figures 7.12 to 7.14)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from daq.contracts.errors import SpecError
+from daq.contracts.trace import Trace
+from model.analysis.bodies import chain_of
+from model.dynamics import recursive
+from model.kinematics.chain import ChainArrays
+from model.machine_model.model import Model
+from model.simulation.simulate import Options, simulate
+from model.validation import differentiation
+
+Floats = NDArray[np.float64]
+Series = tuple[float, ...]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class InertiaElement(_Part):
+    """D_ij along a motion, kg·m² (or kg), joints from 1: translation and rotation of the bodies, and rotors.
+
+    `translation` is what the masses at their centres give, `rotation` their moments about their centres.
+    """
+
+    row: int
+    column: int
+    whole: Series
+    translation: Series
+    rotation: Series
+    rotor: float
+
+
+class InertialTorque(_Part):
+    """D_ij q̈_j: torque (N·m) at joint `at` from the acceleration of joint `of`; an interaction where they differ."""
+
+    at: int
+    of: int
+    values: Series
+
+
+class GravityTorque(_Part):
+    """Torque of gravity (N·m) at a joint: all bodies, and by link (from 1; the load belongs to the last)."""
+
+    joint: int
+    whole: Series
+    by_link: tuple[Series, ...]
+
+
+class SpeedTorque(_Part):
+    """Centrifugal and Coriolis torque H (N·m) at a joint."""
+
+    joint: int
+    values: Series
+
+
+class TorqueAnalysis(_Part):
+    """Figures 7.12 to 7.14 for any machine and motion. `source` says where the motion comes from."""
+
+    model: str
+    source: str
+    time: Series
+    inertia: tuple[InertiaElement, ...]
+    inertial: tuple[InertialTorque, ...]
+    speed: tuple[SpeedTorque, ...]
+    gravity: tuple[GravityTorque, ...]
+
+    def element(self, row: int, column: int) -> InertiaElement:
+        """D_ij, i ≤ j, from 1."""
+        return next(e for e in self.inertia if (e.row, e.column) == (row, column))
+
+    def inertial_torque(self, joint: int, of: int) -> InertialTorque:
+        """D_ij q̈_j."""
+        return next(t for t in self.inertial if (t.at, t.of) == (joint, of))
+
+
+def torques_of_run(model: Model, trace: Trace) -> TorqueAnalysis:
+    """Torques along the model's own motion for the set points of a trace; accelerations from its exact motion."""
+    run = simulate(model, trace, Options(quantise=False))
+    period = float(np.median(np.diff(run.time)))
+    acceleration = np.gradient(run.velocity, period, axis=0)
+    return torques_along(model, run.time, run.position, run.velocity, acceleration, f"simulation of {trace.record.trace_id}")
+
+
+def torques_of_trace(model: Model, trace: Trace, width: float = 2.0) -> TorqueAnalysis:
+    """Torques along a measured motion, smoothed by a kernel of standard deviation `width` samples.
+
+    Raises SpecError for a trace with gaps or uneven sampling.
+    """
+    columns = [trace.column(j) for j in model.machine.modelled_joints]
+    steps = np.diff(trace.time)
+    if len(trace) < 5 or steps.max() > 1.2 * steps.min():
+        raise SpecError(f"trace {trace.record.trace_id}: torques along it need even sampling without gaps")
+    period = float(np.median(steps))
+    position = differentiation.smoothed(trace.position[:, columns], width)
+    speed = differentiation.speeds(position, period)
+    acceleration = differentiation.accelerations(position, period)
+    return torques_along(model, trace.time, position, speed, acceleration, f"trace {trace.record.trace_id}")
+
+
+def torques_along(
+    model: Model, time: Floats, position: Floats, speed: Floats, acceleration: Floats, source: str
+) -> TorqueAnalysis:
+    """Torques along a motion (k, n) in rad, rad/s and rad/s²; bodies always with exact inertias."""
+    n = model.joint_count
+    chain = chain_of(model)
+    points = _without_moments(chain)
+    whole = np.array([recursive.mass_matrix(chain, q) for q in position])
+    translation = np.array([recursive.mass_matrix(points, q) for q in position])
+    rotors = np.asarray(chain.rotor_inertia)
+    speed_torque = np.array([recursive.velocity_torques(chain, q, v) for q, v in zip(position, speed, strict=True)])
+    gravity = np.array([recursive.gravity_torques(chain, q) for q in position])
+    by_link = np.array([[recursive.gravity_torques(_only(chain, link), q) for q in position] for link in range(n)])
+    return TorqueAnalysis(
+        model=model.identity, source=source, time=_series(time),
+        inertia=tuple(
+            _element(i, j, whole[:, i, j], translation[:, i, j], float(rotors[i]) if i == j else 0.0)
+            for i in range(n) for j in range(i, n)
+        ),
+        inertial=tuple(
+            InertialTorque(at=i + 1, of=j + 1, values=_series(whole[:, i, j] * acceleration[:, j]))
+            for i in range(n) for j in range(n)
+        ),
+        speed=tuple(SpeedTorque(joint=i + 1, values=_series(speed_torque[:, i])) for i in range(n)),
+        gravity=tuple(
+            GravityTorque(joint=i + 1, whole=_series(gravity[:, i]), by_link=tuple(_series(by_link[k, :, i]) for k in range(n)))
+            for i in range(n)
+        ),
+    )  # fmt: skip
+
+
+def _element(i: int, j: int, whole: Floats, translation: Floats, rotor: float) -> InertiaElement:
+    moved = translation - rotor
+    return InertiaElement(
+        row=i + 1, column=j + 1, whole=_series(whole), translation=_series(moved), rotation=_series(whole - translation),
+        rotor=rotor,
+    )  # fmt: skip
+
+
+def _without_moments(chain: ChainArrays) -> ChainArrays:
+    """The chain with every body's mass at its centre. A load counts as part of the last body."""
+    inertial = chain.inertial.copy()
+    for body in inertial:
+        mass, first = body[0], body[1:4]
+        centre = first / mass if mass > 0 else first
+        tensor = mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        body[4:] = tensor[np.triu_indices(3)]
+    return chain._replace(inertial=inertial)
+
+
+def _only(chain: ChainArrays, link: int) -> ChainArrays:
+    inertial = np.zeros_like(chain.inertial)
+    inertial[link] = chain.inertial[link]
+    return chain._replace(inertial=inertial)
+
+
+def _series(values: Floats) -> Series:
+    return tuple(map(float, values))
+
+
+def largest(values: Series) -> float:
+    """Largest magnitude of a series."""
+    return float(np.abs(np.array(values)).max())
+
+
