@@ -5,7 +5,9 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
+from operator import lt
 from typing import ClassVar
 
 from firmware_protocol.errors import PayloadLengthError, ProtocolError
@@ -19,6 +21,7 @@ SET_POINT_REGISTER_MAX = 1023
 """Largest value of the ten bits of a set point. The controller takes 0–999; memory may hold anything."""
 
 
+@lru_cache(maxsize=1 << JOINTS)
 def joints_of(mask: int) -> tuple[int, ...]:
     """Joint numbers (from 1) in a mask, ascending."""
     return tuple(joint for joint in range(1, JOINTS + 1) if mask >> (joint - 1) & 1)
@@ -42,6 +45,8 @@ def check_mask(what: str, mask: int) -> None:
 
 def check_ascending(what: str, joints: tuple[int, ...]) -> None:
     """Raises ProtocolError unless joints exist, ascend and are at least one: a mask keeps no other order."""
+    if joints and joints[0] > 0 and joints[-1] <= JOINTS and all(map(lt, joints, joints[1:])):
+        return
     if not joints:
         raise ProtocolError(f"{what}: no joints: at least one")
     if any(later <= earlier for earlier, later in pairwise(joints)):

@@ -82,6 +82,7 @@ class Board:
         ]
         self._set_point_addresses = frozenset(memory_map["set_point"].addresses)
         self._time_us = 0
+        self._complete_us = 0
         self._frozen = False
         self._process_inputs = 0
         self._host_until_us = 0
@@ -99,6 +100,11 @@ class Board:
     def next_event_us(self) -> int:
         """When the controller next does something by itself."""
         return self._next_us
+
+    @property
+    def next_snapshot_us(self) -> int:
+        """Before this time no further snapshot joins the ring."""
+        return max(self._next_us, self._complete_us)
 
     def run_until(self, time_us: int) -> None:
         """Lets time pass up to `time_us`, events at that very time included. A time already past changes nothing."""
@@ -200,6 +206,7 @@ class Board:
         self._advance_plant(off_us)
         self._volts = [0.0] * JOINTS
         self._powered = False
+        self._complete_us = 0
         self._published = []
         self._stored = 0
         self.memory.clear()
@@ -299,11 +306,12 @@ class Board:
         ]
         self._stored = 0
         self._publishing_since_us = now
-        end_us = now + len(self._published) * self._timing.publish_byte
-        self._schedule(end_us, partial(self._complete_period, results))
+        self._complete_us = now + len(self._published) * self._timing.publish_byte
+        self._schedule(self._complete_us, partial(self._complete_period, results))
 
     def _complete_period(self, results: PeriodSnapshot) -> None:
         self._store_published()
+        self._complete_us += self._timing.period
         self.snapshots.append(results)
         self._schedule(self._period_start_us + self._timing.period, self._start_period)
 

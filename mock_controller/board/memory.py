@@ -79,7 +79,7 @@ class SharedMemory:
         low, high, lowest, highest = column.low, column.high, column.lowest, column.highest
         pairs: list[tuple[int, int]] = []
         for index, value in values:
-            fits = min(max(value, lowest), highest)
+            fits = value if lowest <= value <= highest else min(max(value, lowest), highest)
             pairs.append((low[index], fits & 0xFF))
             if high is not None:
                 pairs.append((high[index], fits >> 8 & 0xFF))

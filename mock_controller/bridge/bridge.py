@@ -136,7 +136,7 @@ class Bridge:
         if sample is None:
             return None if advance is None else max(advance.until_us, self._board.time_us)
         now = self._board.time_us
-        wake = min(self._board.next_event_us, max(sample.until_us, now))
+        wake = min(self._board.next_snapshot_us, max(sample.until_us, now))
         return wake if advance is None else min(wake, max(advance.until_us, now))
 
     def hang_up(self) -> None:
