@@ -40,8 +40,8 @@ format: $(FOR_DEVELOPMENT) ## format the sources and mend what ruff can mend
 	@$(BIN)/ruff check --fix-only --quiet
 	@$(BIN)/ruff format --quiet
 
-bench: $(FOR_DEVELOPMENT) ## measure the figures the guide quotes
-	@$(BIN)/python -m benchmarks
+bench: $(FOR_DEVELOPMENT) ## measure the figures of docs/benchmarks.md, shorter than there
+	@$(BIN)/python -m benchmarks main-job --quick
 
 clean: ## remove caches and what was built
 	@rm -rf build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
