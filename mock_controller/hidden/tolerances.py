@@ -1,0 +1,119 @@
+"""What may differ between two sound arms, and by how much.
+
+A deviation is a fraction of the data file's value, of the computing delay seconds. Potentiometers deviate by a smooth
+curve each; for a refit it is represented by three harmonics (`LinearityHarmonic`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import resources
+from math import cos, pi, sin
+from random import Random
+from typing import ClassVar
+
+from firmware_protocol.units import ADC_COUNTS
+from mock_controller.board.parameters import BoardParameters
+from mock_controller.modifications.changes import change_body, change_joint
+from mock_controller.plant.parameters import PlantParameters
+from mock_controller.quantities import QuantityReader
+
+_MODELLED = (1, 2, 3)
+_MASSES = ("m1", "m2", "m3", "m_load")
+_LENGTHS = ("r1", "a2", "a3")
+_JOINT_CONSTANTS = ("resistance", "torque_constant", "back_emf_constant", "rotor_inertia", "viscous_friction")
+_MOST = 2.0
+"""Deviations are drawn within this many standard deviations."""
+_STEP_S = 1e-3
+"""The board's computing delay is whole steps of the plant."""
+HARMONICS = (1, 2, 3)
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """One quantity that may deviate; standard deviations as stated to others, and as drawn (fraction, or s)."""
+
+    name: str
+    stated: float
+    drawn: float
+
+
+@cache
+def tolerances() -> tuple[Tolerance, ...]:
+    """Every quantity of the arm that may deviate: `m1` … `a3`, `resistance_1` … `coulomb_arm_3`, `computing_delay`."""
+    text = resources.files("mock_controller.hidden").joinpath("tolerances.toml").read_text("utf-8")
+    reader = QuantityReader(text, "tolerances.toml")
+
+    def of_table(table: str, unit: str = "1") -> tuple[float, float]:
+        stated, drawn = (reader.take(table, key, unit, 0, 1) for key in ("stated", "drawn"))
+        return stated, drawn
+
+    mass, length = of_table("mass"), of_table("length")
+    found = [Tolerance(name, *mass) for name in _MASSES] + [Tolerance(name, *length) for name in _LENGTHS]
+    for table in (*_JOINT_CONSTANTS, "coulomb_arm"):
+        found += [Tolerance(f"{table}_{joint}", *of_table(table)) for joint in _MODELLED]
+    found.append(Tolerance("computing_delay", *of_table("computing_delay", "s")))
+    reader.finish()
+    return tuple(found)
+
+
+def draw_deviations(random: Random, scale: float = 1.0) -> dict[str, float]:
+    """Deviations of a sound arm, normal within two standard deviations, times `scale`."""
+    return {tolerance.name: scale * tolerance.drawn * _within(random) for tolerance in tolerances()}
+
+
+def _within(random: Random) -> float:
+    while True:
+        value = random.gauss(0.0, 1.0)
+        if abs(value) <= _MOST:
+            return value
+
+
+def deviating_plant(parameters: PlantParameters, deviations: Mapping[str, float]) -> PlantParameters:
+    """The arm with its deviations; zero deviations give the very same numbers."""
+    body = parameters.rigid_body
+    changed = {name: getattr(body, name) * (1.0 + deviations.get(name, 0.0)) for name in (*_MASSES, *_LENGTHS)}
+    parameters = change_body(parameters, **changed)
+    for joint in _MODELLED:
+        present = parameters.joints[joint - 1]
+        factors = {key: 1.0 + deviations.get(f"{key}_{joint}", 0.0) for key in _JOINT_CONSTANTS}
+        values = {key: getattr(present, key) * factor for key, factor in factors.items()}
+        parameters = change_joint(parameters, joint, **values)
+    friction = parameters.friction
+    more = [friction.effective_arm * deviations.get(f"coulomb_arm_{joint}", 0.0) for joint in _MODELLED]
+    one, two, three = (arm + extra for arm, extra in zip(friction.extra_arms, more, strict=True))
+    return replace(parameters, friction=replace(friction, extra_arms=(one, two, three)))
+
+
+def deviating_board(parameters: BoardParameters, deviations: Mapping[str, float]) -> BoardParameters:
+    """The board with its deviations: the computing delay, to the nearest ms."""
+    steps = round(deviations.get("computing_delay", 0.0) / _STEP_S)
+    timing = parameters.timing
+    late = timing.computing_delay + steps * round(_STEP_S * 1e6)
+    return replace(parameters, timing=replace(timing, computing_delay=max(late, 0)))
+
+
+@dataclass
+class LinearityHarmonic:
+    """A part of a potentiometer's curve: `counts` times sine and cosine shares of a harmonic of its range."""
+
+    name: ClassVar[str] = "linearity_harmonic"
+    joint: int
+    harmonic: int
+    sine: float
+    cosine: float
+
+    def reading(self, counts: float) -> float:
+        turn = 2.0 * pi * self.harmonic * counts / ADC_COUNTS
+        return counts + self.sine * sin(turn) + self.cosine * cos(turn)
+
+
+def harmonic_deviation(linearity: float, harmonic: int) -> float:
+    """Standard deviation (counts) of one share of a harmonic of curves within `linearity` (fraction of the range).
+
+    Curves have three harmonics of random phase and size falling with their order, and are scaled to 40 to 100 % of
+    the limit at their largest; the numbers are those of 20 000 such curves.
+    """
+    return linearity * ADC_COUNTS * {1: 0.40, 2: 0.20, 3: 0.13}[harmonic]
