@@ -48,7 +48,9 @@ def acquire(call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Pa
     Where a real arm waits for consent and a person can be asked, asks. Raises AcquisitionFailedError.
     """
     from daq.acquisition.messages import Finished, Job
+    from daq.transport import parse_port_url
 
+    parse_port_url(call.port)  # a port that is none needs no process to say so
     job = Job(
         url=call.port,
         machine=machine,
@@ -86,7 +88,7 @@ def _shown(job: Job) -> Finished | Failed:
     with (
         StopKeys() as keys,
         Acquisition(job) as process,
-        Progress(*columns, console=console(), transient=True) as bar,
+        Progress(*columns, console=console(), transient=True, disable=not console().is_terminal) as bar,
     ):
         keys.stops(process.stop)
         task = bar.add_task(job.spec.trajectory.kind, total=1.0, text="connecting")

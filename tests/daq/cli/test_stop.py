@@ -1,0 +1,78 @@
+"""`daq stop`, whatever it finds: it says what became of it, and never says more than it knows."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+from pathlib import Path
+
+import serial
+
+from daq.acquisition.stop_socket import stop_listener
+from daq.transport.mock_process import MockProcess
+from tests.daq.cli.board import ask
+from tests.daq.cli.invoke import CommandLine
+
+
+def test_with_nothing_running_and_nothing_configured(daq: CommandLine) -> None:
+    said = daq("stop")
+    assert (said.code, said.err) == (3, "")
+    assert said.out == "no robot is being moved from here, and none is configured: nothing to stop\n"
+    assert json.loads(daq("stop", "--json").out) == []
+
+
+def test_a_robot_that_nobody_holds_is_stopped_over_its_port(daq: CommandLine, mock: MockProcess, port: str) -> None:
+    said = daq("--port", port, "stop")
+    assert said.code == 0
+    assert "stopped, confirmed by the board" in said.out
+    assert ask(mock, "state")["frozen"]
+    assert "holds its posture and takes set points again" in daq("--port", port, "reset").out
+    assert not ask(mock, "state")["frozen"]
+    assert "was not stopped" in daq("--port", port, "reset").out
+
+
+def test_the_configured_robot_is_stopped_beside_those_that_run(daq: CommandLine, mock: MockProcess, port: str) -> None:
+    """A run on the mock must not hide that the arm itself was not asked."""
+    Path("daq.toml").write_text(f'[robot]\nport = "{port}"\n')
+    with stop_listener("another"):  # does not answer
+        said = daq("stop", "--json")
+    answers = {answer["robot"]: answer for answer in json.loads(said.out)}
+    assert said.code == 3
+    assert answers["ma2000"]["confirmed"]
+    assert not answers["another"]["delivered"]
+    daq("reset")
+
+
+def test_a_port_that_somebody_else_holds_is_told_as_not_delivered(daq: CommandLine) -> None:
+    master, slave = pty.openpty()
+    try:
+        with serial.Serial(os.ttyname(slave), exclusive=True):
+            said = daq("--port", f"serial://{os.ttyname(slave)}", "stop")
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert said.code == 3
+    assert "NOT DELIVERED" in said.out
+    assert "in use by another program" in said.out
+    assert "emergency stop" in said.out
+
+
+def test_a_board_that_does_not_answer_is_told_as_not_confirmed(daq: CommandLine) -> None:
+    master, slave = pty.openpty()
+    try:
+        said = daq("--port", f"serial://{os.ttyname(slave)}", "stop")
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert said.code == 3
+    assert "stop sent, NOT CONFIRMED" in said.out
+    assert "emergency stop" in said.out
+
+
+def test_a_configuration_that_cannot_be_read_is_told_and_stops_nobody_from_stopping(daq: CommandLine) -> None:
+    Path("daq.toml").write_text("[robot\n")
+    said = daq("stop")
+    assert said.code == 3
+    assert "NOT DELIVERED" in said.out
+    assert "not TOML" in said.out

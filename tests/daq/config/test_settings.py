@@ -1,0 +1,112 @@
+"""Where settings come from, which goes before which, and that no guard is lost by leaving a limit out."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+import pytest
+
+from daq.config import config_files, load_settings
+from daq.config.limits import merged_limits
+from daq.config.robot_files import load_memory_map
+from daq.contracts.errors import SpecError
+from daq.contracts.limits import JointLimits, Limits
+from daq.contracts.machine import load_machine
+
+
+@pytest.fixture(autouse=True)
+def nothing_configured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in [name for name in os.environ if name.startswith("DAQ_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "configuration"))
+
+
+def test_with_nothing_configured_the_mock_is_used() -> None:
+    settings, path = load_settings()
+    assert path is None
+    assert settings.port == "mock://"
+    assert settings.machine() == load_machine("ma2000")
+
+
+def test_the_file_asked_for_goes_before_the_folders_and_that_before_the_users(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    users = tmp_path / "configuration" / "ma2000-daq" / "config.toml"
+    users.parent.mkdir(parents=True)
+    for path, name in ((users, "users"), (tmp_path / "daq.toml", "here"), (tmp_path / "other.toml", "asked")):
+        path.write_text(f'[robot]\nname = "{name}"\n')
+    assert load_settings(Path("other.toml"))[0].robot.name == "asked"
+    assert load_settings()[0].robot.name == "here"
+    monkeypatch.setenv("DAQ_CONFIG", "other.toml")
+    assert load_settings()[0].robot.name == "asked"
+    monkeypatch.delenv("DAQ_CONFIG")
+    Path("daq.toml").unlink()
+    assert load_settings()[0].robot.name == "users"
+    assert config_files() == [Path("daq.toml"), users]
+
+
+def test_the_environment_goes_before_the_file_key_by_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("daq.toml").write_text('operator = "A"\n[robot]\nname = "here"\nport = "mock://?seed=1"\n')
+    monkeypatch.setenv("DAQ_ROBOT__PORT", "mock://?seed=2")
+    settings, _ = load_settings()
+    assert (settings.robot.name, settings.port, settings.operator) == ("here", "mock://?seed=2", "A")
+
+
+def test_the_programs_own_variables_are_no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DAQ_RUNTIME_FOLDER", "somewhere")
+    assert load_settings()[0].port == "mock://"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("DAQ_ROBOT__PROT", "3", "environment DAQ_ROBOT__PROT: robot.prot = '3': no such key"),
+        ("DAQ_ROBOT__LIMITS__REACH", "nan", "environment DAQ_ROBOT__LIMITS__REACH: .* finite"),
+        ("DAQ_ROBOT", "serial", "environment: .*DAQ_ROBOT__PORT|environment DAQ_ROBOT"),
+    ],
+)
+def test_a_wrong_variable_is_named(monkeypatch: pytest.MonkeyPatch, name: str, value: str, words: str) -> None:
+    monkeypatch.setenv(name, value)
+    with pytest.raises(SpecError, match=words) as caught:
+        load_settings()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"[robot"], ids=["no text", "no TOML"])
+def test_a_file_that_cannot_be_read_is_one_line(content: bytes) -> None:
+    Path("daq.toml").write_bytes(content)
+    with pytest.raises(SpecError, match=r"configuration daq\.toml: ") as caught:
+        load_settings()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_was_asked_for_must_be_there() -> None:
+    with pytest.raises(SpecError, match=r"missing\.toml: no such file"):
+        load_settings(Path("missing.toml"))
+
+
+def test_a_limit_that_is_given_replaces_the_machines_and_the_others_stay() -> None:
+    machine = load_machine("ma2000")
+    joints = tuple(JointLimits(speed=0.5) if joint == 1 else JointLimits() for joint in range(1, 7))
+    merged = merged_limits(machine, Limits(reach=1.0, joints=joints))
+    assert merged.reach == 1.0
+    assert merged.following_error_counts == machine.limits.following_error_counts == 127
+    assert merged.floor_height == machine.limits.floor_height
+    assert merged.joint(1) == JointLimits(low=machine.limits.joint(1).low, high=machine.limits.joint(1).high, speed=0.5)
+    assert merged.joint(2) == machine.limits.joint(2)
+
+
+def test_limits_that_contradict_the_machines_are_refused() -> None:
+    machine = load_machine("ma2000")
+    joints = (JointLimits(low=math.radians(350)), *(JointLimits() for _ in range(5)))
+    with pytest.raises(SpecError, match="joint 1: low .* must be below high"):
+        merged_limits(machine, Limits(joints=joints))
+
+
+def test_a_memory_map_that_cannot_be_read_is_one_line() -> None:
+    with pytest.raises(SpecError, match=r"memory map missing\.toml: cannot be read"):
+        load_memory_map(Path("missing.toml"))
+    assert load_memory_map(None).name.startswith("MA2000")
