@@ -64,6 +64,13 @@ def compiled(function: Callable[..., Any]) -> Any:
     return numba.njit(cache=True, error_model="numpy", fastmath={"contract"})(function)
 
 
+def internal(function: Callable[..., Any]) -> Any:
+    """As `compiled`, for functions that only compiled code calls: no entry from Python, so less to compile."""
+    return numba.njit(
+        cache=True, error_model="numpy", fastmath={"contract"}, no_cpython_wrapper=True, no_cfunc_wrapper=True
+    )(function)
+
+
 def inlined(function: Callable[..., Any]) -> Any:
     """As `compiled`, for small scalar functions that must disappear into their caller."""
     return numba.njit(cache=True, error_model="numpy", fastmath={"contract"}, forceinline=True)(function)

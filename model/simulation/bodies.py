@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.dynamics import rod_arm
-from model.dynamics.compilation import compiled
+from model.dynamics.compilation import compiled, internal
 from model.dynamics.dual import sin_cos
 from model.dynamics.effective_inertia import SIZE
 from model.kinematics.chain import ChainArrays
 from model.machine_model import layout as at
 
 
-@compiled
+@internal
 def gravity(shared: NDArray[Any]) -> Any:
     """Gravity (3) in the axes of a base that is turned about its x axis, then about its y axis."""
     sx, cx = sin_cos(shared[at.TILT_X])
@@ -26,7 +26,7 @@ def gravity(shared: NDArray[Any]) -> Any:
     return x, y, z
 
 
-@compiled
+@internal
 def reflected_rotor(joint: NDArray[Any], flags: int) -> Any:
     """n²J of a rotor that turns with its joint, kg·m²; zero where the transmission gives."""
     if flags & at.HAS_FLEXIBILITY:
@@ -84,7 +84,7 @@ def chain_body(shared: NDArray[Any], joints: NDArray[Any], flags: NDArray[Any]) 
     return ChainArrays(prismatic, geometry, inertial, rotor, pull)
 
 
-@compiled
+@internal
 def _fill_link(inertial: NDArray[Any], joint: NDArray[Any]) -> None:
     """Mass, first moments and xx xy xz yy yz zz of a link about the origin of its own frame."""
     mass = joint[at.MASS] + joint[at.MASS_ADDED]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from model.drives.piecewise import magnitude
 from model.dynamics import effective_inertia as lumped
-from model.dynamics.compilation import compiled, inlined
+from model.dynamics.compilation import inlined, internal
 from model.dynamics.dual import sin_cos
 from model.dynamics.linear_solve import solve_3
 from model.dynamics.three_joint import horizontal_gravity_torques, mass_matrix_and_bias
@@ -44,7 +44,7 @@ def friction_levels(theta_2: Any, theta_3: Any, arms: Any, plain: Any, weight_2:
     )
 
 
-@compiled
+@internal
 def advance(
     user: Any,
     state: NDArray[Any], volts: NDArray[Any], start: complex, duration: complex, steps: int,

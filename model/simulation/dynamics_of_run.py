@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from model.dynamics import effective_inertia as lumped
 from model.dynamics import recursive, three_joint
-from model.dynamics.compilation import compiled
+from model.dynamics.compilation import compiled, internal
 from model.dynamics.dual import sin_cos
 from model.dynamics.three_joint_motion import accelerations
 from model.kinematics.chain import ChainArrays
@@ -20,7 +20,7 @@ from model.simulation.closed_form_motion import friction_levels
 from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible
 
 
-@compiled
+@internal
 def rod_arm_accelerations(
     q: NDArray[Any], v: NDArray[Any], torque: NDArray[Any], joints: NDArray[Any], body: NDArray[Any], a: NDArray[Any]
 ) -> None:
@@ -50,7 +50,7 @@ def rod_arm_gravity(q: NDArray[Any], joints: NDArray[Any], body: NDArray[Any]) -
     return result
 
 
-@compiled
+@internal
 def chain_accelerations(
     q: NDArray[Any], v: NDArray[Any], torque: NDArray[Any], _joints: NDArray[Any], body: ChainArrays, a: NDArray[Any]
 ) -> None:
@@ -92,7 +92,7 @@ def chain_gravity(q: NDArray[Any], _joints: NDArray[Any], body: ChainArrays) -> 
     return recursive.gravity_torques(body, q)
 
 
-@compiled
+@internal
 def _published_levels(
     q: NDArray[Any], joints: NDArray[Any], weight_2: complex, weight_3: complex, out: NDArray[Any]
 ) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from model.dynamics.compilation import compiled
+from model.dynamics.compilation import internal
 from model.machine_model import layout as at
 from model.simulation.joint_torques import (
     DEFLECTION,
@@ -33,7 +33,7 @@ Q, V, M, W, TORQUE, A, B, LEVEL, SUM_V, SUM_A, SUM_W, SUM_B = range(12)
 WORK = 12
 
 
-@compiled
+@internal
 def advance(
     user: Any, kind: Any, state: NDArray[Any], volts: NDArray[Any], start: complex,
     duration: complex, steps: int, joints: NDArray[Any], body: Any, flags: NDArray[Any], settings: NDArray[Any],
@@ -78,7 +78,7 @@ def advance(
                 after_step(state[j], joints[j], flags[j], work[LEVEL, j], turning, volts[j], h)
 
 
-@compiled
+@internal
 def _begin(state: NDArray[Any], work: NDArray[Any]) -> None:
     """A step begins: stage values are those of the state, accelerations and sums are zero."""
     for j in range(state.shape[0]):
@@ -88,7 +88,7 @@ def _begin(state: NDArray[Any], work: NDArray[Any]) -> None:
             work[row, j] = 0.0 * state[j, SPEED]
 
 
-@compiled
+@internal
 def _to_stage(state: NDArray[Any], work: NDArray[Any], reach: complex) -> None:
     """Stage values from the state and the rates of the stage before."""
     for j in range(state.shape[0]):
@@ -98,7 +98,7 @@ def _to_stage(state: NDArray[Any], work: NDArray[Any], reach: complex) -> None:
         work[W, j] = state[j, ROTOR_SPEED] + reach * work[B, j]
 
 
-@compiled
+@internal
 def _add_stage(work: NDArray[Any], weight: float) -> None:
     """The stage's rates, weighted, into the sums."""
     for j in range(work.shape[1]):
@@ -108,7 +108,7 @@ def _add_stage(work: NDArray[Any], weight: float) -> None:
         work[SUM_B, j] += weight * work[B, j]
 
 
-@compiled
+@internal
 def _end(state: NDArray[Any], work: NDArray[Any], sixth: complex, joints: NDArray[Any]) -> None:
     """The state after the step."""
     for j in range(state.shape[0]):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.drives.piecewise import clamped, magnitude, outside
-from model.dynamics.compilation import compiled, inlined
+from model.dynamics.compilation import inlined, internal
 from model.dynamics.dual import sin_cos
 from model.machine_model import layout as at
 from model.simulation.specialised import user_torque
@@ -63,7 +63,7 @@ def current_after(joint: NDArray[Any], rise: Any, current: Any, steady: Any, dur
     return steady + (current - steady) * np.exp(-rate * duration)
 
 
-@compiled
+@internal
 def extra_torque(
     joint: NDArray[Any], flags: int, time: complex, q: complex, speed: complex, z: complex, stuck: complex,
     motor_torque: complex,
@@ -113,7 +113,7 @@ def special_torque(
     return torque
 
 
-@compiled
+@internal
 def after_step(
     state: NDArray[Any],
     joint: NDArray[Any],
@@ -131,7 +131,7 @@ def after_step(
         still_stuck(joint, level, state[SPEED], state[DEFLECTION : DEFLECTION + 1], state[STUCK : STUCK + 1])
 
 
-@compiled
+@internal
 def still_stuck(joint: NDArray[Any], level: complex, speed: complex, z: NDArray[Any], stuck: NDArray[Any]) -> None:
     """Breaks away when the contact is stretched to its end; sticks again when motion stops or turns.
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from model.drives.amplifier import motor_volts
 from model.drives.controller import MEMORY
 from model.drives.piecewise import clamped
-from model.dynamics.compilation import compiled
+from model.dynamics.compilation import internal
 from model.machine_model import layout as at
 from model.simulation import closed_form_motion, general_motion
 from model.simulation.dynamics_of_run import body_of, friction_levels_of, gravity_of
@@ -77,7 +77,7 @@ def _advance_of(
     return general
 
 
-@compiled
+@internal
 def batch(
     user: Any, kind: Any, first: int, last: int, which: Array, lengths: Array,
     set_points: Array, recorded: Array, noise: Array, initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array,
@@ -143,7 +143,7 @@ def batch(
             warm_up(state, volts, shared, joints)
 
 
-@compiled
+@internal
 def at_rest(
     state: Array, initial: Array, volts: Array, joints: Array, weights: Array, flags: Array, work: Array
 ) -> None:

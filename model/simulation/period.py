@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from model.drives.amplifier import warmed
 from model.drives.controller import LAST_READING, board_pid, cascade, sampled_pid
 from model.drives.sensor import reading
-from model.dynamics.compilation import compiled
+from model.dynamics.compilation import internal
 from model.machine_model import layout as at
 from model.simulation.joint_torques import POSITION, RISE, SPEED
 
@@ -22,7 +22,7 @@ OUT_POSITION, OUT_SPEED, OUT_READING, OUT_ERROR, OUT_POWER, OUT_DRIVE = range(6)
 OUTPUTS = 6
 
 
-@compiled
+@internal
 def sample(
     k: int, j: int, state: NDArray[Any], set_points: NDArray[Any], recorded: NDArray[Any], noise: NDArray[Any],
     gains: NDArray[Any], shared: NDArray[Any], joints: NDArray[Any], settings: NDArray[Any], memory: NDArray[Any],
@@ -66,7 +66,7 @@ def sample(
     return drive
 
 
-@compiled
+@internal
 def switching_times(shared: NDArray[Any], joints: NDArray[Any], order: NDArray[Any], times: NDArray[Any]) -> Any:
     """When in a period each joint's drive changes (`times`, s), in which order, and whole periods of delay per joint.
 
@@ -87,13 +87,13 @@ def switching_times(shared: NDArray[Any], joints: NDArray[Any], order: NDArray[A
     return periods
 
 
-@compiled
+@internal
 def step_count(duration: complex, step: float) -> int:
     """Equal steps of at most `step` s in a stretch of time; at least one."""
     return max(1, int(np.ceil(duration.real / step - 1e-9)))
 
 
-@compiled
+@internal
 def warm_up(state: NDArray[Any], volts: NDArray[Any], shared: NDArray[Any], joints: NDArray[Any]) -> None:
     """Resistance of each winding after one more period."""
     for j in range(joints.shape[0]):
@@ -101,7 +101,7 @@ def warm_up(state: NDArray[Any], volts: NDArray[Any], shared: NDArray[Any], join
             state[j, RISE] = warmed(state[j, RISE], volts[j], state[j, SPEED], shared[at.PERIOD], joints[j])
 
 
-@compiled
+@internal
 def extra_flags(joints: NDArray[Any], flags: NDArray[Any]) -> NDArray[Any]:
     """The joints' mode flags with the bit of every added torque that is not at its null value."""
     result = np.empty(flags.shape[0], dtype=np.int64)

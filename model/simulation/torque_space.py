@@ -1,0 +1,109 @@
+"""A trace in torque space: what the bodies need to move as they did, and what motor and friction supply.
+
+Works without a controller and without integrating anything, so errors do not build up along the record; at 12 bits and
+20 ms the accelerations are noisy, and the smoothing is what decides how far to trust a single sample.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from daq.contracts.errors import TraceError
+from daq.contracts.trace import Trace
+from model.dynamics import recursive
+from model.machine_model import layout as at
+from model.machine_model.model import Model
+from model.simulation.bodies import chain_body
+from model.simulation.dynamics_of_run import chain_levels
+from model.simulation.engines import is_rod_arm
+
+Floats = NDArray[np.float64]
+
+WINDOW = 0.2
+"""s over which position is smoothed by default: 11 samples at 20 ms."""
+ORDER = 3
+"""Order of the local polynomial (Savitzky and Golay 1964)."""
+
+
+@dataclass(frozen=True)
+class TorqueBalance:
+    """Torques at the joints along a trace, (m, n), N·m (N on prismatic joints).
+
+    required: D q̈ + H + G, rotors included. motor: of the recorded drive, back-EMF taken off; None without drive.
+    friction: of the model, opposing motion, viscous and Coulomb together. residual: motor + friction − required.
+    """
+
+    time: Floats
+    position: Floats
+    velocity: Floats
+    acceleration: Floats
+    required: Floats
+    friction: Floats
+    motor: Floats | None
+
+    @property
+    def residual(self) -> Floats | None:
+        """What motor and friction supply beyond what the motion requires; None without drive."""
+        return None if self.motor is None else self.motor + self.friction - self.required
+
+
+def torque_balance(model: Model, trace: Trace, window: float = WINDOW) -> TorqueBalance:
+    """Inverse dynamics of a trace by a model.
+
+    Args:
+        window: s over which a polynomial of third order is fitted to position (or to the measured velocity).
+
+    Raises:
+        TraceError: for a trace too short for the window, or one whose samples are not evenly spaced.
+    """
+    columns = [trace.column(j) for j in model.machine.modelled_joints]
+    position, velocity, acceleration = _motion(trace, columns, window)
+    shared = model.vector[: at.SHARED].copy()
+    joints = model.vector[at.SHARED :].reshape(-1, at.PER_JOINT).copy()
+    chain = chain_body(shared, joints, np.zeros_like(model.flags))
+    settings = np.zeros(at.SETTINGS, dtype=np.int64)
+    settings[at.PUBLISHED_LOADS] = int(is_rod_arm(model.machine))
+    required, levels = np.empty_like(position), np.empty_like(position)
+    for row in range(len(position)):
+        required[row] = recursive.inverse_dynamics(chain, position[row], velocity[row], acceleration[row])
+        chain_levels(position[row], joints, chain, settings, levels[row])
+    gear = joints[:, at.GEAR]
+    slow = 0.5 * np.abs(velocity).max(axis=0).clip(1e-9) * 1e-2
+    friction = -levels * np.tanh(velocity / slow) - gear**2 * joints[:, at.VISCOUS] * velocity
+    motor = None
+    if trace.drive is not None:
+        volts = np.clip(trace.drive[:, columns], -joints[:, at.SUPPLY], joints[:, at.SUPPLY])
+        back_emf = joints[:, at.BACK_EMF] * (1 + joints[:, at.BACK_EMF_ERROR]) * gear * velocity
+        motor = gear * joints[:, at.TORQUE_CONSTANT] * (volts - back_emf) / joints[:, at.RESISTANCE]
+    return TorqueBalance(trace.time, position, velocity, acceleration, required, friction, motor)
+
+
+def _motion(trace: Trace, columns: list[int], window: float) -> tuple[Floats, Floats, Floats]:
+    """Position, velocity and acceleration on the samples, from one local polynomial fit."""
+    steps = np.diff(trace.time)
+    if len(trace) < 3:
+        raise TraceError(f"trace {trace.record.trace_id}: {len(trace)} samples; at least 3 are needed")
+    step = float(np.median(steps))
+    if np.abs(steps - step).max() > 0.2 * step:
+        raise TraceError(
+            f"trace {trace.record.trace_id}: samples are {steps.min():.4g} to {steps.max():.4g} s apart; torque space "
+            "needs an even spacing: fill the gaps, or use a piece without any"
+        )
+    length = max(ORDER + 2, round(window / step)) | 1
+    if len(trace) < length:
+        raise TraceError(
+            f"trace {trace.record.trace_id}: {len(trace)} samples are fewer than the {length} of a {window} s window"
+        )
+    measured = trace.position[:, columns]
+    position = savgol_filter(measured, length, ORDER, axis=0)
+    if trace.velocity is None:
+        velocity = savgol_filter(measured, length, ORDER, deriv=1, delta=step, axis=0)
+        acceleration = savgol_filter(measured, length, ORDER, deriv=2, delta=step, axis=0)
+    else:
+        velocity = savgol_filter(trace.velocity[:, columns], length, ORDER, axis=0)
+        acceleration = savgol_filter(trace.velocity[:, columns], length, ORDER, deriv=1, delta=step, axis=0)
+    return np.ascontiguousarray(position), np.ascontiguousarray(velocity), np.ascontiguousarray(acceleration)

@@ -1,0 +1,46 @@
+"""Exact derivatives against wide finite differences of the same loop without rounding."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from daq.contracts.machine import load_machine
+from model.machine_model.model import Model, base_model
+from model.simulation.simulate import Options, sensitivities, simulate
+from tests.model.simulation.records import ramp_inputs
+
+SMOOTH = Options(quantise=False, step=2.5e-4)
+
+CASES = {
+    "load.mass": 1e-3,
+    "link3.length": 1e-4,
+    "joint2.motor.back_emf_constant": 1e-5,
+    "joint2.viscous_friction.coefficient": 1e-6,
+    "joint3.load_dependent_friction.arm": 1e-4,
+    "controller.delay": 1e-5,
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_dual_numbers_give_the_slope_of_finite_differences(name: str) -> None:
+    model = base_model(load_machine("ma2000"))
+    inputs = ramp_inputs(model.machine)
+    exact = sensitivities(model, inputs, [name], SMOOTH).reading[0]
+    value, width = model.parameter(name).value, CASES[name]
+    ends = [simulate(model.with_values({name: value + w}), inputs, SMOOTH).reading for w in (-width, width)]
+    difference = (ends[1] - ends[0]) / (2 * width)
+    assert np.abs(exact).max() > 0
+    assert np.abs(exact - difference).max() < 0.01 * np.abs(exact).max()
+
+
+def test_effects_at_their_null_value_have_derivatives_too() -> None:
+    model = base_model(load_machine("ma2000")).with_effect("spring_torque", (2,)).with_effect("input_delay", (3,))
+    names = ["joint2.spring_torque.stiffness", "joint3.input_delay.time", "initial.joint1.position"]
+    inputs = ramp_inputs(model.machine)
+    found = sensitivities(model, inputs, names, SMOOTH)
+    stiffer = simulate(model.with_values({names[0]: 0.05}), inputs, SMOOTH).reading
+    slope = (stiffer - found.simulation.reading) / 0.05
+    assert np.abs(found.reading[0] - slope).max() < 0.02 * np.abs(slope).max()
+    assert np.abs(found.reading[1][:, 2]).max() > 10 * np.abs(found.reading[1][:, 0]).max()
+    assert found.reading[2][0] == pytest.approx([1.0, 0.0, 0.0])
