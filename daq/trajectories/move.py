@@ -15,6 +15,9 @@ from daq.trajectories.set_points import Mark, Plan, control_period, make_plan, s
 MOVE_SPEED = 0.25
 """Highest speed of a slow move in rad/s: an assumption, under half that of the source's ramp."""
 
+NO_WAY = 1e-9
+"""rad (or m) below which there is no way to go: a millionth of an ADC count."""
+
 
 def plan_move(machine: Machine, start: Sequence[float], target: Sequence[float], speed: float = MOVE_SPEED) -> Plan:
     """From `start` to `target` (rad, all joints of the machine), cubic in time, all joints arriving together.
@@ -33,7 +36,7 @@ def plan_move(machine: Machine, start: Sequence[float], target: Sequence[float],
 def move_piece(way: Floats, period: float, speed: float = MOVE_SPEED) -> Piece:
     """Through `way` (k,) rad at no more than `speed` rad/s; nothing when there is no way to go."""
     longest = float(np.abs(way).max(initial=0.0))
-    if longest == 0.0:
+    if longest < NO_WAY:
         return smooth_piece(np.zeros((0, len(way))))
     duration = PEAK_SPEED * longest / speed
     fraction = rest_to_rest(sample_times(duration, period) / duration)
