@@ -21,9 +21,10 @@ def print_agreement(models: Sequence[ModelAgreement]) -> None:
     for name in ("joint", "rms", "in counts", "largest", "noise floor", "floor in counts"):
         table.add_column(name, justify="right")
     for model in models:
-        for kind, joints in (("fitted to", model.in_sample), ("held out", model.held_out)):
+        fitted = any(t.held_out is not None for t in model.traces)
+        for kind, joints in (("in sample", model.in_sample), ("held out", model.held_out)):
             for one in joints or ():
-                table.add_row(model.label, "" if model.held_out is None else kind, *_figures(one))
+                table.add_row(model.label, kind if fitted else "all", *_figures(one))
     Console(highlight=False, width=120).print(table)
 
 

@@ -8,7 +8,12 @@ import typer
 
 from daq.cli.context import JsonOption, console, invocation, print_json
 from daq.cli.model_input import (
-    MODEL_HELP, ReportOption, TraceFolderOption, model_labels, read_model, read_traces,
+    MODEL_HELP,
+    ReportOption,
+    TraceFolderOption,
+    model_labels,
+    read_model,
+    read_traces,
 )  # fmt: skip
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import shipped_machines
@@ -76,9 +81,9 @@ def _told_apart(names: Sequence[str]) -> tuple[list[str], list[str]]:
     return models, [n for n in names if n not in models]
 
 
-def _held_out(models: Sequence[Model], traces: Sequence[str]) -> list[str]:
+def _held_out(models: Sequence[Model], traces: Sequence[str]) -> list[str] | None:
     fitted = {trace for model in models for trace in model.lineage.traces}
-    return [trace for trace in traces if fitted and trace not in fitted]
+    return [trace for trace in traces if trace not in fitted] if fitted else None
 
 
 def _errors(comparison: Comparison) -> dict[str, dict[str, float | None]]:

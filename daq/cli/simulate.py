@@ -10,7 +10,13 @@ import typer
 
 from daq.cli.context import JsonOption, console, invocation, print_json
 from daq.cli.model_input import (
-    MODEL_HELP, ReportOption, TraceFolderOption, TracesArgument, model_label, read_model, read_traces,
+    MODEL_HELP,
+    ReportOption,
+    TraceFolderOption,
+    TracesArgument,
+    model_label,
+    read_model,
+    read_traces,
 )  # fmt: skip
 from daq.contracts.errors import SpecError
 

@@ -41,10 +41,10 @@ class JointAgreement(_Part):
 
 
 class TraceAgreement(_Part):
-    """One trace; `held_out` when the model was not fitted to it."""
+    """One trace; `held_out` tells whether the model was fitted to it, None where that is not the question."""
 
     trace: str
-    held_out: bool
+    held_out: bool | None
     samples: int
     joints: tuple[JointAgreement, ...]
 
@@ -55,7 +55,7 @@ class TraceAgreement(_Part):
 
 
 class ModelAgreement(_Part):
-    """One model on all traces; `held_out` pools the traces that are marked so, `in_sample` the others, None where there are none."""
+    """One model on all traces: `held_out` pools those that are marked so, `in_sample` the others; None for none."""
 
     label: str
     model: str
@@ -79,9 +79,7 @@ def pooled(traces: Sequence[TraceAgreement]) -> tuple[JointAgreement, ...] | Non
     for column, first in enumerate(traces[0].joints):
         own = [t.joints[column] for t in traces]
         square = sum(j.rmse**2 * t.samples for j, t in zip(own, traces, strict=True)) / total
-        motion = sum(
-            j.rmse**2 / j.share * t.samples for j, t in zip(own, traces, strict=True) if j.share is not None and j.share > 0
-        )
+        motion = sum(j.rmse**2 / j.share * t.samples for j, t in zip(own, traces, strict=True) if j.share)
         found.append(
             first.model_copy(
                 update={

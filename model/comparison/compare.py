@@ -23,11 +23,11 @@ Floats = NDArray[np.float64]
 class TraceSignals:
     """One trace beside its simulations.
 
-    time (m,) s; measured (m, n) and each of `simulated` (m, n) in `units`, one column a joint; set_point (m, n) or None.
+    time (m,) s; measured, set_point (or None) and each of `simulated` (m, n) in `units`, one column a joint.
     """
 
     trace: str
-    held_out: bool
+    held_out: bool | None
     joints: tuple[int, ...]
     units: tuple[str, ...]
     time: Floats
@@ -45,14 +45,15 @@ class Comparison:
 
 
 def compare(
-    models: Sequence[tuple[str, Model]], traces: Sequence[Trace], held_out: Collection[str] = (), *,
+    models: Sequence[tuple[str, Model]], traces: Sequence[Trace], held_out: Collection[str] | None = None, *,
     signal: Signal = "position", options: Options | None = None, progress: Progress = silent,
     cancel: Cancel | None = None,
 ) -> Comparison:  # fmt: skip
     """Every trace simulated with every model, each as the controller (or the recorded drive) drove the arm.
 
     Args:
-        models: labels and models, all of the same machine's joints. held_out: identities of traces not fitted to.
+        models: labels and models, all of the same machine's joints. held_out: identities of traces not fitted to;
+            None where nothing was fitted.
 
     Raises:
         TraceError, SpecError: for traces that cannot be simulated, or models that move different joints.
@@ -85,20 +86,28 @@ def compare(
     agreements = []
     for place, (label, model) in enumerate(models):
         own = tuple(
-            _agreement(record, simulated[k][place], floor, units, model, record.name in held_out)
+            _agreement(record, simulated[k][place], floor, units, model, _role(record, held_out))
             for k, record in enumerate(records)
         )
         agreements.append(
             ModelAgreement(
-                label=label, model=model.identity, effects=tuple(u.name for u in model.effects), traces=own,
-                in_sample=pooled([t for t in own if not t.held_out]), held_out=pooled([t for t in own if t.held_out]),
-            )  # fmt: skip
+                label=label,
+                model=model.identity,
+                effects=tuple(u.name for u in model.effects),
+                traces=own,
+                in_sample=pooled([t for t in own if not t.held_out]),
+                held_out=pooled([t for t in own if t.held_out]),
+            )
         )
     signals = tuple(
-        _signals(trace, record, tuple(row), units, record.name in held_out, signal)
+        _signals(trace, record, tuple(row), units, _role(record, held_out), signal)
         for trace, record, row in zip(traces, records, simulated, strict=True)
     )
     return Comparison(tuple(agreements), signals)
+
+
+def _role(record: Record, held_out: Collection[str] | None) -> bool | None:
+    return None if held_out is None else record.name in held_out
 
 
 def _units(model: Model, signal: Signal) -> tuple[str, ...]:
@@ -107,7 +116,7 @@ def _units(model: Model, signal: Signal) -> tuple[str, ...]:
 
 
 def _agreement(
-    record: Record, simulated: Floats, floor: Floats, units: tuple[str, ...], model: Model, held_out: bool
+    record: Record, simulated: Floats, floor: Floats, units: tuple[str, ...], model: Model, held_out: bool | None
 ) -> TraceAgreement:
     left = record.measured - simulated
     joints = []
@@ -117,17 +126,25 @@ def _agreement(
         motion = float(np.var(record.measured[:, column]))
         joints.append(
             JointAgreement(
-                joint=joint, unit=units[column], rmse=float(np.sqrt(square)),
-                largest=float(np.abs(left[:, column]).max()), floor=float(floor[column]),
+                joint=joint,
+                unit=units[column],
+                rmse=float(np.sqrt(square)),
+                largest=float(np.abs(left[:, column]).max()),
+                floor=float(floor[column]),
                 count=resolution(sensor) if sensor is not None and not units[column].endswith("/s") else None,
                 share=square / motion if motion > 9 * floor[column] ** 2 else None,
-            )  # fmt: skip
+            )
         )
     return TraceAgreement(trace=record.name, held_out=held_out, samples=record.samples, joints=tuple(joints))
 
 
 def _signals(
-    trace: Trace, record: Record, simulated: tuple[Floats, ...], units: tuple[str, ...], held_out: bool, signal: Signal
+    trace: Trace,
+    record: Record,
+    simulated: tuple[Floats, ...],
+    units: tuple[str, ...],
+    held_out: bool | None,
+    signal: Signal,
 ) -> TraceSignals:
     joints = record.inputs.joints
     wanted = None

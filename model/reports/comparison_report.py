@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from model.comparison.agreement import ModelAgreement
 from model.comparison.compare import Comparison
 from model.comparison.difference import ParameterDifference
-from model.reports.motion import agreement_table, motion_section
-from model.reports.page import Cell, Report, Section, Table, cells, listed
+from model.reports.motion import ROLES, agreement_table, motion_section
+from model.reports.page import Cell, Report, Section, Table, cells, listed, spoken
 
 
 def comparison_report(found: Comparison, differences: Sequence[ParameterDifference] = ()) -> Report:
@@ -20,7 +20,7 @@ def comparison_report(found: Comparison, differences: Sequence[ParameterDifferen
     ]
     if differences:
         sections.append(Section("Where the models differ", (_differences(differences, labels),)))
-    facts = [(m.label, f"{m.model}: {', '.join(m.effects) or 'no effects'}") for m in found.models]
+    facts = [(m.label, f"{m.model}, {spoken(m.effects)}") for m in found.models]
     facts.append(("traces", listed([s.trace for s in found.signals])))
     return Report(_title(labels), _answer(found.models), tuple(facts), tuple(sections))
 
@@ -50,7 +50,7 @@ def _squared_errors(models: Sequence[ModelAgreement]) -> Table:
     for number, trace in enumerate(models[0].traces):
         errors = [m.traces[number].mean_squared_error for m in models]
         rows.append((
-            Cell(trace.trace), Cell("held out" if trace.held_out else "fitted to"),
+            Cell(trace.trace), Cell(ROLES[trace.held_out]),
             *(Cell(f"{e:.4g}", number=True) for e in errors),
         ))  # fmt: skip
     return Table(

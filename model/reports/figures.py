@@ -1,4 +1,4 @@
-"""Figures for print and screen: one style, colours that the colour-blind tell apart, and that follow the page's theme."""
+"""Figures for print and screen: one style, colours for the colour-blind too, light or dark as the page is."""
 
 from __future__ import annotations
 

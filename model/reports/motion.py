@@ -5,12 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from model.comparison.agreement import JointAgreement, ModelAgreement
 from model.comparison.compare import TraceSignals
 from model.reports.figures import (
-    COLOURS, INK, MODEL_COLOURS, QUIET, baseline, drawn, panels, shown_unit, thinned,
+    COLOURS,
+    INK,
+    MODEL_COLOURS,
+    QUIET,
+    baseline,
+    drawn,
+    panels,
+    shown_unit,
+    thinned,
 )  # fmt: skip
 from model.reports.page import Cell, Picture, Section, Table, cells
 
@@ -19,6 +25,8 @@ if TYPE_CHECKING:
 
 ABREAST = 3
 """Joints beside each other."""
+ROLES = {True: "held out", False: "fitted to", None: "all"}
+"""What a trace was to a model."""
 
 
 def motion_section(signals: Sequence[TraceSignals], labels: Sequence[str], most: int = 8) -> Section:
@@ -36,13 +44,17 @@ def _picture(one: TraceSignals, labels: Sequence[str]) -> Picture:
         for column, joint in enumerate(one.joints):
             band, place = divmod(column, ABREAST)
             _joint(axes[2 * band][place], axes[2 * band + 1][place], one, column, joint, labels, first=column == 0)
+        widest = max(float(abs(one.measured - s).max()) for s in one.simulated) * shown_unit(one.units[0])[0]
+        if len(set(one.units)) == 1:
+            for row in axes[1::2].flat:
+                row.set_ylim(-1.08 * widest, 1.08 * widest)
         for empty in axes[-2:, len(one.joints) - (bands - 1) * ABREAST :].flat:
             empty.set_visible(False)
 
-    kind = "held out, not fitted to" if one.held_out else "fitted" if one.held_out is False else ""
+    role = "" if one.held_out is None else f" ({ROLES[one.held_out]})"
     return Picture(
         drawn(draw, 3.4 * bands),
-        f"{one.trace} ({kind}). Above: measured, set point and simulated. Below: measured − simulated.",
+        f"{one.trace}{role}. Above: measured, set point and simulated. Below: measured − simulated.",
     )
 
 
@@ -83,14 +95,13 @@ def agreement_table(models: Sequence[ModelAgreement]) -> Table:
     """By model, kind of trace and joint: root mean square, largest, and the noise floor beside it."""
     rows = []
     for model in models:
-        for kind, joints in (("fitted to", model.in_sample), ("held out", model.held_out)):
-            for one in joints or ():
-                rows.append(_row(model.label, kind, one))
+        for kind, joints in ((in_sample(model), model.in_sample), (ROLES[True], model.held_out)):
+            rows += [_row(model.label, kind, one) for one in joints or ()]
     return Table(
         ("model", "traces", "joint", "rms", "in counts", "largest", "noise floor", "floor in counts", "left of motion"),
         tuple(rows),
-        "Measured − simulated over all samples of these traces. The noise floor is what rounding and noise of the sensor "
-        "alone would leave. Left of motion: mean square of the residual over that of the motion about its mean.",
+        "Measured − simulated over all samples of these traces. The noise floor is what rounding and noise of the "
+        "sensor alone would leave. Left of motion: mean square of the residual over that of the motion about its mean.",
     )
 
 
@@ -103,11 +114,11 @@ def _row(label: str, kind: str, one: JointAgreement) -> tuple[Cell, ...]:
     )  # fmt: skip
 
 
+def in_sample(model: ModelAgreement) -> str:
+    """What the traces that are not held out were to a model."""
+    return ROLES[next((t.held_out for t in model.traces if not t.held_out), None)]
+
+
 def counted(value: float | None) -> str:
     """Counts of a sensor, or a dash where there is none."""
     return "–" if value is None else f"{value:.2f}"
-
-
-def spread(values: Sequence[float]) -> float:
-    """Distance between the smallest and the largest."""
-    return float(np.ptp(np.asarray(values)))

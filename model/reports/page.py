@@ -1,4 +1,4 @@
-"""A report as data, and its one HTML file: no script, nothing loaded from elsewhere, readable in light, dark and print."""
+"""A report as data, and its one HTML file: no script, nothing loaded from elsewhere, light or dark, and printed."""
 
 from __future__ import annotations
 
@@ -114,3 +114,8 @@ def listed(names: Sequence[str], most: int = 6) -> str:
     """Names in a sentence; what is more than `most` is counted."""
     shown = ", ".join(names[:most])
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+
+
+def spoken(effects: Sequence[str]) -> str:
+    """Effects in words."""
+    return ", ".join(e.replace("_", " ") for e in effects) or "no effects"

@@ -1,0 +1,81 @@
+"""Effects, parameters and bounds as the command line names them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from daq.contracts.effects import effect_names
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import parse_joints
+
+if TYPE_CHECKING:
+    from model.machine_model.model import Model
+
+NO_EFFECT = "none"
+
+
+def with_effects(model: Model, text: str) -> Model:
+    """The model with the effects of `viscous,coulomb:2-3` besides its own; `none` adds none.
+
+    A name may be cut short as long as it names one effect. Without joints an effect acts on every joint, or on the
+    machine where it belongs to that. Raises SpecError with one line.
+    """
+    from model.effects.library import effect
+
+    if text.strip() == NO_EFFECT:
+        return model
+    for part in text.split(","):
+        name, _, joints = part.strip().partition(":")
+        found = effect_name(name)
+        if effect(found).whole_machine:
+            if joints:
+                raise SpecError(f"effect {found}: belongs to the whole machine; write it without {':' + joints!r}")
+            model = model.with_effect(found)
+        else:
+            model = model.with_effect(found, parse_joints(joints) if joints else model.machine.modelled_joints)
+    return model
+
+
+def effect_name(text: str) -> str:
+    """The one effect that `text` begins. Raises SpecError with those it could be."""
+    from model.effects.library import library
+
+    name = text.strip().replace("-", "_")
+    if name in library():
+        return name
+    begun = [n for n in library() if name and n.startswith(name)]
+    if len(begun) == 1:
+        return begun[0]
+    if begun:
+        raise SpecError(f"effect {text!r}: could be {', '.join(begun)}")
+    known = ", ".join(n for n in library() if n in effect_names())
+    raise SpecError(f"effect {text!r}: not in the library; it has {known}")
+
+
+def patterns(text: str | None) -> tuple[str, ...] | None:
+    """Names or patterns of parameters, separated by commas; None where nothing is said."""
+    if text is None:
+        return None
+    found = tuple(part.strip() for part in text.split(",") if part.strip())
+    if not found:
+        raise SpecError("no parameter named: write names or patterns like link2.mass,*.viscous_friction.*")
+    return found
+
+
+def bounds(texts: Sequence[str]) -> dict[str, tuple[float | None, float | None]]:
+    """Bounds written `link2.mass=0.3:0.9`, either side may be left out. Raises SpecError with one line."""
+    found: dict[str, tuple[float | None, float | None]] = {}
+    for text in texts:
+        match = re.fullmatch(r"\s*([\w.+]+)\s*=\s*([^:]*):([^:]*)", text)
+        if match is None:
+            raise SpecError(f"bound {text!r}: write name=low:high, either may be left out")
+        try:
+            low, high = (float(side) if side.strip() else None for side in match.groups()[1:])
+        except ValueError:
+            raise SpecError(f"bound {text!r}: low and high must be numbers") from None
+        if low is not None and high is not None and not low < high:
+            raise SpecError(f"bound {text!r}: the lower bound {low:g} is not below the upper {high:g}")
+        found[match[1]] = (low, high)
+    return found

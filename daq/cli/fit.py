@@ -1,0 +1,183 @@
+"""`daq fit`: a model's parameters from traces, with what the traces cannot tell."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from daq.cli.context import Invocation, JsonOption, console, invocation, print_json
+from daq.cli.effect_choice import bounds, patterns, with_effects
+from daq.cli.model_input import (
+    MODEL_HELP,
+    ReportOption,
+    TraceFolderOption,
+    TracesArgument,
+    machine_of,
+    read_model,
+    read_traces,
+)
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import load_machine
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from daq.contracts.trace import Trace
+    from model.comparison.compare import Comparison
+    from model.fitting.result import FitResult, FittedParameter
+    from model.machine_model.model import Model
+
+app = typer.Typer(add_completion=False)
+
+EffectsOption = Annotated[
+    str | None,
+    typer.Option(help="Effects beside rigid bodies and motors: viscous,coulomb:2-3 or none (default: the machine's)."),
+]
+ParametersOption = Annotated[
+    str | None, typer.Option(help="What to find: names or patterns such as *.mass,joint2.* (default: all uncertain).")
+]
+
+
+@app.command()
+def fit(
+    context: typer.Context,
+    traces: TracesArgument,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Where the fitted model goes, a .json file.")],
+    model: Annotated[str | None, typer.Option(help=f"Begin from this one. {MODEL_HELP}")] = None,
+    machine: Annotated[str | None, typer.Option(help="Machine file or name (default: the traces').")] = None,
+    effects: EffectsOption = None,
+    parameters: ParametersOption = None,
+    hold: Annotated[str | None, typer.Option(help="Names or patterns to leave as they are.")] = None,
+    bound: Annotated[list[str] | None, typer.Option(help="name=low:high, instead of the model's own bounds.")] = None,
+    holdout: Annotated[
+        list[str] | None, typer.Option(help="A trace to judge the model by, not fitted to. May be repeated.")
+    ] = None,
+    no_priors: Annotated[bool, typer.Option("--no-priors", help="Leave expected deviations out.")] = False,
+    method: Annotated[
+        Literal["least_squares", "nelder_mead"], typer.Option(help="nelder_mead is the source's hill climbing.")
+    ] = "least_squares",
+    starts: Annotated[int, typer.Option(min=1, max=100, help="Searches, from different beginnings.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of the beginnings.")] = 0,
+    open_loop: Annotated[bool, typer.Option("--open-loop", help="Apply the recorded drive.")] = False,
+    report: ReportOption = None,
+    folder: TraceFolderOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Find the parameters with which a model best repeats traces, and name what the traces cannot tell."""
+    from daq.cli.model_progress import shown_progress
+    from model.comparison.compare import compare
+    from model.fitting.fit import fit as run_fit
+    from model.fitting.options import FitOptions
+    from model.simulation.simulate import Options
+
+    call = invocation(context)
+    if out.suffix != ".json":
+        raise SpecError(f"--out {out}: a model is written as .json")
+    fitted_to = read_traces(call, folder, traces)
+    held = read_traces(call, folder, holdout or []) if holdout else []
+    begin = _beginning(call, fitted_to, model, machine, effects)
+    loop: Literal["open", "closed"] | None = "open" if open_loop else None
+    options = FitOptions(
+        parameters=patterns(parameters), held=patterns(hold) or (), bounds=bounds(bound or []),
+        use_priors=not no_priors, method=method, starts=starts, seed=seed, loop=loop,
+    )  # fmt: skip
+    with shown_progress("fitting") as tell:
+        found = run_fit(begin, fitted_to, options, lambda f, text: tell(0.9 * f, text))
+        comparison = compare(
+            [("before", begin), ("fitted", found.model)], [*fitted_to, *held], [t.record.trace_id for t in held],
+            options=Options(loop=loop or "closed"), progress=lambda f, text: tell(0.9 + 0.1 * f, text),
+        )  # fmt: skip
+    found.save(out)
+    if json:
+        _print_json(found, comparison, out)
+    else:
+        _print(found, comparison)
+        console().print(f"model {found.model.identity}: {out}")
+    if report is not None:
+        from model.reports.fit_report import fit_report
+        from model.reports.page import write_report
+
+        console().print(f"report: {write_report(fit_report(found, comparison), report)}")
+
+
+def _beginning(
+    call: Invocation, traces: Sequence[Trace], model: str | None, machine: str | None, effects: str | None
+) -> Model:
+    """The model that the search begins from."""
+    from model.machine_model.model import base_model
+
+    if model is not None and machine is not None:
+        raise SpecError("--model and --machine: name one of them; a model has its machine")
+    if model is not None:
+        begin = read_model(model)
+        return begin if effects is None else with_effects(begin, effects)
+    chosen = machine_of(traces, call) if machine is None else load_machine(machine)
+    if effects is None:
+        return base_model(chosen)
+    return with_effects(base_model(chosen, friction=False), effects)
+
+
+def _print_json(found: FitResult, comparison: Comparison, out: Path) -> None:
+    from daq.cli.agreement_table import agreement_data
+
+    print_json({
+        "model": found.model.identity,
+        "file": out,
+        "parameters": [p.model_dump(mode="json") for p in found.parameters],
+        "undetermined": [c.model_dump(mode="json") for c in found.identifiability.undetermined],
+        "agreement": agreement_data(comparison.models),
+        "whitened_mean_square": found.whitened_mean_square,
+        "converged": found.converged,
+        "evaluations": found.evaluations,
+        "seconds": found.seconds,
+    })  # fmt: skip
+
+
+def _print(found: FitResult, comparison: Comparison) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from daq.cli.agreement_table import print_agreement
+
+    table = Table(box=None, header_style="bold")
+    for name, side in (("parameter", "left"), ("value", "right"), ("95 % interval", "right"), ("unit", "left"),
+                       ("before", "right"), ("", "left")):  # fmt: skip
+        table.add_column(name, justify="right" if side == "right" else "left", overflow="fold")
+    for p in found.parameters:
+        table.add_row(*_row(p))
+    Console(highlight=False, width=140).print(table)
+    known = sum(p.verdict == "known" for p in found.parameters)
+    print(f"\nknown: {known} of {len(found.parameters)}", end="")
+    print("; no number is given for the others" if known < len(found.parameters) else "")
+    for combination in found.identifiability.undetermined:
+        print(f"  not determined: {combination.text}")
+    print()
+    print_agreement(comparison.models)
+    if not found.converged:
+        print(f"the search did not converge: {found.message}")
+
+
+def _row(p: FittedParameter) -> tuple[str, ...]:
+    bound = "" if p.at_bound is None else f"at its {'lower' if p.at_bound == 'low' else 'upper'} bound"
+    if p.value is None or p.low is None or p.high is None or p.deviation is None:
+        what = {"combination": "only in combination", "unknown": "not determined"}.get(p.verdict, p.verdict)
+        return p.name, "–", "–", p.unit, f"{p.before:.5g}", what
+    digits = significant(p.value, p.deviation)
+    return (
+        p.name,
+        f"{p.value:.{digits}g}",
+        f"{p.low:.{digits}g} to {p.high:.{digits}g}",
+        p.unit,
+        f"{p.before:.5g}",
+        bound,
+    )
+
+
+def significant(value: float, deviation: float) -> int:
+    """Digits of a value so that its deviation shows with two; at most seven."""
+    if value == 0 or deviation <= 0:
+        return 3
+    return max(2, min(7, 2 + math.floor(math.log10(abs(value))) - math.floor(math.log10(deviation))))
