@@ -3,11 +3,11 @@
     python -m benchmarks stop_latency
 
 A host process samples three joints of a mock at 115200 baud through a pseudo-terminal, sends set points in every
-period, and listens on the socket of `daq stop`, all with the code of a real run. Stops come at random moments: from
-another thread of the host; from another process through that socket, as `daq stop` does once Python has started; and by
-the command itself, counted from its start. First on a clean line, then with one frame in a hundred damaged or lost, both
-ways. The moments are the mock's own record: board time, and the reading of the system's monotonic clock (which all
-processes share) at its zero.
+period, and listens on the socket of `daq stop`, all with the code of a real run. Stops come at random moments:
+from another thread of the host; from another process through that socket, as `daq stop` does once Python has started;
+and by the command itself, counted from its start. First on a clean line, then with one frame in a hundred damaged or
+lost, both ways. The moments are the mock's own record: board time, and the reading of the system's monotonic clock
+(which all processes share) at its zero.
 """
 
 from __future__ import annotations

@@ -118,6 +118,8 @@ class FrameDecoder:
         frames: list[Frame] = []
         *ended, begun = data.split(DELIMITER)
         for piece in ended:
+            if not (piece or self._partial or self._overrun):
+                continue  # nothing lies between two delimiters
             self._take(piece)
             frame = self._finish()
             if frame is not None:
@@ -146,8 +148,6 @@ class FrameDecoder:
         if self._overrun:
             self.oversized += 1
             self._overrun = False
-            return None
-        if not self._partial:
             return None
         encoded = bytes(self._partial)
         self._partial.clear()
