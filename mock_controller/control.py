@@ -108,8 +108,8 @@ class Control:
             "set_points": memory.values("set_point"),
             "gains": [list(gains) for gains in zip(*columns, strict=True)],
             "missed": board.counters.set_points_missed,
-            "angles_rad": board.plant.joint_angles,
-            "motor_volts": list(board.plant.motor_volts),
+            "angles_rad": None if self._device.keeps_secret else board.plant.joint_angles,
+            "motor_volts": None if self._device.keeps_secret else list(board.plant.motor_volts),
             "stalled_joints": sorted(board.plant.stalled_joints),
             "process_outputs": board.process_outputs,
             "gripper_closed": board.gripper_closed,
@@ -151,7 +151,7 @@ class Control:
         return {"faults": self._device.faults.listing()}
 
     def _modifications(self, _: Answer) -> Answer:
-        """Hidden physical effects that this mock was started with."""
+        """Hidden physical effects that this mock was started with; those of a secret are not told."""
         return {"modifications": list(self._device.modifications)}
 
     def _brown_out(self, _: Answer) -> Answer:

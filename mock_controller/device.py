@@ -29,6 +29,8 @@ class Device:
     bridge: Bridge
     link: Link
     modifications: tuple[str, ...]
+    keeps_secret: bool
+    """Whether the arm is one whose true state nobody may ask for."""
 
 
 def build_device(options: Options, disconnect: Callable[[float], None]) -> Device:
@@ -37,20 +39,28 @@ def build_device(options: Options, disconnect: Callable[[float], None]) -> Devic
     `disconnect` cuts the line for so many seconds. Raises ValueError with one clear line for what cannot be.
     """
     parameters = _board_parameters(options)
-    modifications = build_modifications(_modification(text) for text in options.modify)
     plant_parameters = _plant_parameters(options)
+    arm_seed: int | None = None
+    if options.secret is None:
+        modifications = build_modifications(_modification(text) for text in options.modify)
+    else:
+        from mock_controller.hidden.arm import draw_arm
+
+        arm = draw_arm(options.secret)
+        arm_seed, modifications = arm.seed, arm.modifications()
+        parameters, plant_parameters = arm.board_parameters(parameters), arm.plant_parameters(plant_parameters)
     if options.start is None:
         plant = Plant(plant_parameters, modifications)
     else:
         pairs = zip(parameters.calibrations, options.start, strict=True)
         plant = Plant(plant_parameters, modifications, [scale.posture_to_rad(posture) for scale, posture in pairs])
-    board = Board(parameters, _memory_map(options), plant, options.seed, modifications)
+    board = Board(parameters, _memory_map(options), plant, options.seed, modifications, arm_seed)
     faults = FaultSet(FaultyBoard(board, disconnect), options.seed)
     bridge = Bridge(Timeline(board, faults), sees_period=options.sample, lock_step=options.lock_step)
     link = Link(bridge, faults, options.baud)
     for text in options.fault:
         faults.switch_on(text)
-    return Device(board, faults, bridge, link, options.modify)
+    return Device(board, faults, bridge, link, options.modify, options.secret is not None)
 
 
 def _memory_map(options: Options) -> MemoryMap:

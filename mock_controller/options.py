@@ -40,6 +40,7 @@ class Options(BaseModel):
     plant: Path | None = None
     board: Path | None = None
     modify: tuple[str, ...] = ()
+    secret: Annotated[int, Field(ge=0, lt=2**63)] | None = None
     fault: tuple[str, ...] = ()
 
 
@@ -53,6 +54,11 @@ def read_options(arguments: list[str]) -> Options:
         from mock_controller.faults.registry import table
 
         print(table())
+        raise SystemExit(0)
+    if given.pop("help_modifications"):
+        from mock_controller.modifications.registry import table as modifications_table
+
+        print(modifications_table())
         raise SystemExit(0)
     config: Path | None = given.pop("config")
     chosen = {} if config is None else _read_file(config)
@@ -72,6 +78,8 @@ def read_options(arguments: list[str]) -> Options:
         raise OptionsError("pty and tcp: give one of them")
     if not (options.pty or options.tcp):
         raise OptionsError("nowhere to be reached: give --pty or --tcp HOST:PORT")
+    if options.secret is not None and options.modify:
+        raise OptionsError("secret and modify: give one of them")
     if options.link is not None and not options.pty:
         raise OptionsError("link: a name for the pseudo-terminal needs --pty")
     return options
@@ -147,8 +155,15 @@ def _parser() -> argparse.ArgumentParser:
     machine.add_argument(
         "--modify", action="append", metavar="NAME:KEY=VALUE,…", help="a hidden physical effect; may be repeated"
     )
+    machine.add_argument(
+        "--secret",
+        type=int,
+        metavar="SEED",
+        help="an arm with tolerances and hidden effects that nobody is told; python -m mock_controller.reveal SEED is",
+    )
 
     parser.add_argument("--fault", action="append", metavar="NAME:KEY=VALUE,…", help="a fault; may be repeated")
     parser.add_argument("--help-faults", action="store_true", help="list faults and their parameters, and leave")
+    parser.add_argument("--help-modifications", action="store_true", help="list hidden effects likewise, and leave")
     parser.add_argument("--config", type=Path, metavar="FILE", help="the same options in a TOML file")
     return parser

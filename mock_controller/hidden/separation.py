@@ -11,6 +11,8 @@ J is taken at the data file's arm by finite differences of this very plant; pote
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -33,6 +35,7 @@ from mock_controller.hidden.tolerances import (
     harmonic_deviation,
     tolerances,
 )
+from mock_controller.modifications.controller import InputDelay
 from mock_controller.modifications.interface import Modification
 from mock_controller.plant import PlantParameters
 
@@ -47,12 +50,42 @@ _DELAY_STEP_S = 2e-3
 """Change of the computing delay: a step of the plant."""
 
 
+MOST_REFITS = 4
+"""Times that the refit looks where it has got to; each takes a run of the experiment."""
+_SMALL_MOVE = 0.5
+"""Standard deviations within which the tangents are trusted without looking."""
+_SETTLED = 0.95
+"""A refit that leaves more than this share of the cost is the last."""
+_FARTHEST_FRACTION = 0.9
+"""No constant is moved by more than this fraction of its value."""
+_EARLIEST_S = 5e-3
+"""The computing delay is moved by no more than this: something is left of it."""
+
+
 @dataclass(frozen=True)
 class Tangents:
-    """∂ readings/∂ tolerance parameter, in reading deviations per standard deviation; `matrix` (periods·3, names)."""
+    """∂ readings/∂ tolerance parameter, in reading deviations per standard deviation; `matrix` (periods·3, names).
+
+    `deviations` are the standard deviations: fractions, seconds for the delay, counts for the potentiometers' curves.
+    """
 
     names: tuple[str, ...]
     matrix: NDArray[np.float64]
+    deviations: NDArray[np.float64]
+
+    @property
+    def farthest(self) -> NDArray[np.float64]:
+        """How many standard deviations each may be moved at most."""
+        limits = [
+            math.inf
+            if name.startswith("linearity")
+            else _EARLIEST_S
+            if name == "computing_delay"
+            else _FARTHEST_FRACTION
+            for name in self.names
+        ]
+        farthest: NDArray[np.float64] = np.array(limits) / self.deviations
+        return farthest
 
 
 @dataclass(frozen=True)
@@ -66,9 +99,10 @@ class Separation:
 
 @dataclass(frozen=True)
 class _Direction:
-    """One tolerance parameter: its name, the arm with it moved a step, and how many steps its deviation is."""
+    """One tolerance parameter: its name and standard deviation, how many steps that is, and the arm a step on."""
 
     name: str
+    deviation: float
     steps: float
     parts: LoopParts
 
@@ -85,7 +119,7 @@ def tangents(
     kept = None if cache is None else cache / f"tangents-{_key(plant, board, experiment, priors)}.npz"
     if kept is not None and kept.exists():
         with np.load(kept) as stored:
-            return Tangents(tuple(str(name) for name in stored["names"]), stored["matrix"])
+            return Tangents(tuple(str(name) for name in stored["names"]), stored["matrix"], stored["deviations"])
     directions = _directions(plant, board, priors)
     base = LoopParts(plant, replace(board, linearity=0.0), (), 0)
     run = partial(_row, experiment)
@@ -97,31 +131,109 @@ def tangents(
         rows = [run(parts) for parts in every]
     one = reading_deviation(board)
     columns = [direction.steps * (row - rows[0]) / one for direction, row in zip(directions, rows[1:], strict=True)]
-    found = Tangents(tuple(direction.name for direction in directions), np.stack(columns, axis=1))
+    found = Tangents(
+        tuple(direction.name for direction in directions),
+        np.stack(columns, axis=1),
+        np.array([direction.deviation for direction in directions]),
+    )
     if kept is not None:
         kept.parent.mkdir(parents=True, exist_ok=True)
-        np.savez(kept, names=np.array(found.names), matrix=found.matrix)
+        np.savez(kept, names=np.array(found.names), matrix=found.matrix, deviations=found.deviations)
     return found
 
 
 def separation(
-    parts: LoopParts, experiment: Experiment, known: Tangents, without: tuple[Modification, ...] = ()
+    parts: LoopParts,
+    experiment: Experiment,
+    known: Tangents,
+    without: tuple[Modification, ...] = (),
+    refits: int = MOST_REFITS,
 ) -> Separation:
-    """d′ between `parts` and the same arm with the modifications `without` only (by default none)."""
+    """d′ between `parts` and the same arm with the modifications `without` only (by default none).
+
+    The refit goes along the tangents, then looks where that has led and goes on, up to `refits` times: a strong effect
+    that tolerances can imitate is far from where the tangents were taken. A step that does not help is halved.
+    """
+    one = reading_deviation(parts.board)
     present = readings(parts, experiment)[:, :MODELLED]
-    absent = readings(replace(parts, modifications=without), experiment)[:, :MODELLED]
-    return project(((present - absent) / reading_deviation(parts.board)).ravel(), known)
+    sound = replace(parts, modifications=without)
+
+    def left_at(moved: NDArray[np.float64]) -> NDArray[np.float64]:
+        absent = readings(_moved(sound, known, moved), experiment)[:, :MODELLED]
+        left: NDArray[np.float64] = ((present - absent) / one).ravel()
+        return left
+
+    start = left_at(np.zeros(len(known.names)))
+    found = project(start, known)
+    if refits == 0 or max(map(abs, found.moved.values()), default=0.0) < _SMALL_MOVE:
+        return found
+    return _refitted(start, left_at, known, refits)
 
 
 def project(difference: NDArray[np.float64], known: Tangents) -> Separation:
-    """d′ of a difference of readings (in their standard deviations, periods·3) after the refit."""
+    """d′ of a difference of readings (in their standard deviations, periods·3) after one refit along the tangents."""
+    moved = _step(difference, np.zeros(len(known.names)), known)
+    return _told(float(np.linalg.norm(difference)), difference - known.matrix @ moved, moved, known)
+
+
+def _refitted(
+    start: NDArray[np.float64],
+    left_at: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    known: Tangents,
+    refits: int,
+) -> Separation:
+    moved = np.zeros(len(known.names))
+    left, cost = start, float(start @ start)
+    share = 1.0
+    for _ in range(refits):
+        step = _step(left, moved, known)
+        trial = np.clip(moved + share * step, -known.farthest, known.farthest)
+        left_there = left_at(trial)
+        cost_there = float(left_there @ left_there + trial @ trial)
+        if cost_there < cost:
+            settled = cost_there > _SETTLED * cost
+            moved = np.asarray(trial, dtype=np.float64)
+            left, cost, share = left_there, cost_there, min(2.0 * share, 1.0)
+            if settled:
+                break
+        else:
+            share *= 0.5
+    return _told(float(np.linalg.norm(start)), left, moved, known)
+
+
+def _step(left: NDArray[np.float64], moved: NDArray[np.float64], known: Tangents) -> NDArray[np.float64]:
+    """By how much to move on from `moved` where `left` is what is left."""
     matrix = known.matrix
     normal = matrix.T @ matrix + np.eye(matrix.shape[1])
-    moved = np.linalg.solve(normal, matrix.T @ difference)
-    left = difference - matrix @ moved
+    step: NDArray[np.float64] = np.linalg.solve(normal, matrix.T @ left - moved)
+    return step
+
+
+def _told(before: float, left: NDArray[np.float64], moved: NDArray[np.float64], known: Tangents) -> Separation:
     squared = float(left @ left + moved @ moved)
     by_name = {name: float(value) for name, value in zip(known.names, moved, strict=True)}
-    return Separation(float(np.sqrt(squared)), float(np.linalg.norm(difference)), by_name)
+    return Separation(float(np.sqrt(squared)), before, by_name)
+
+
+def _moved(parts: LoopParts, known: Tangents, moved: NDArray[np.float64]) -> LoopParts:
+    """The arm with its tolerance parameters moved by so many of their standard deviations."""
+    deviations = dict(zip(known.names, (moved * known.deviations).tolist(), strict=True))
+    if not any(deviations.values()):
+        return parts
+    late = deviations.get("computing_delay", 0.0)
+    whole = math.floor(late * 1e3) * 1e-3
+    deviations["computing_delay"] = whole
+    plant, board = deviating_plant(parts.plant, deviations), deviating_board(parts.board, deviations)
+    effects: list[Modification] = [InputDelay(joint, late - whole) for joint in range(1, MODELLED + 1)]
+    for joint in range(1, MODELLED + 1):
+        for harmonic in HARMONICS:
+            sine, cosine = (deviations[_harmonic_name(joint, share, harmonic)] for share in ("sine", "cosine"))
+            effects.append(LinearityHarmonic(joint, harmonic, sine, cosine))
+    return LoopParts(plant, board, (*parts.modifications, *effects), parts.arm_seed)
+
+
+def _harmonic_name(joint: int, share: str, harmonic: int) -> str:
+    return f"linearity_{joint}_{share}_{harmonic}"
 
 
 def _row(experiment: Experiment, parts: LoopParts) -> NDArray[np.float64]:
@@ -137,14 +249,14 @@ def _directions(plant: PlantParameters, board: BoardParameters, priors: Priors) 
         step = _DELAY_STEP_S if late else min(deviation, _LARGEST_STEP)
         moved = {tolerance.name: step}
         parts = LoopParts(deviating_plant(plant, moved), deviating_board(flat, moved), (), 0)
-        found.append(_Direction(tolerance.name, deviation / step, parts))
+        found.append(_Direction(tolerance.name, deviation, deviation / step, parts))
     for joint in range(1, MODELLED + 1):
         for harmonic in HARMONICS:
             counts = harmonic_deviation(board.linearity, harmonic)
             for name, sine, cosine in (("sine", counts, 0.0), ("cosine", 0.0, counts)):
                 bend = LinearityHarmonic(joint, harmonic, sine, cosine)
                 parts = LoopParts(plant, flat, (bend,), 0)
-                found.append(_Direction(f"linearity_{joint}_{name}_{harmonic}", 1.0, parts))
+                found.append(_Direction(_harmonic_name(joint, name, harmonic), counts, 1.0, parts))
     return found
 
 

@@ -7,7 +7,8 @@ scale. It is the distance from the effect's null value: a factor of 1 ± size, a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import dataclasses
+from dataclasses import dataclass
 from math import pi
 from random import Random
 
@@ -28,8 +29,8 @@ class SizeRange:
     parameter: str
     ranges: tuple[Range, ...]
     signed: bool = False
-    also: dict[str, Range] = field(default_factory=dict)
-    per_joint: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    also: dict[str, Range] = dataclasses.field(default_factory=dict)
+    per_joint: dict[str, tuple[float, float, float]] = dataclasses.field(default_factory=dict)
     joints: tuple[int, ...] = (1, 2, 3)
 
     @property
@@ -42,9 +43,9 @@ def draw_values(random: Random, size: SizeRange, joint: int | None, strength: fl
     """Parameters of an effect at `joint`, its size at `strength` (0 to 1) of the range there."""
     low, high = size.ranges[0 if joint is None else joint - 1]
     amount = low * (high / low) ** strength
-    null = fields_of(known_modifications()[size.effect])[size.parameter].metadata["null"]
+    field = fields_of(known_modifications()[size.effect])[size.parameter]
     values: dict[str, float] = {} if joint is None else {"joint": joint}
-    values[size.parameter] = null + sign * amount
+    values[size.parameter] = round(amount) if field.type == "int" else field.metadata["null"] + sign * amount
     for key, choices in size.per_joint.items():
         values[key] = choices[(joint or 1) - 1]
     for key, (least, most) in size.also.items():
@@ -118,7 +119,7 @@ OPEN_SIZES: tuple[SizeRange, ...] = (
     SizeRange("ageing_friction", "torque", ((1, 4), (2, 8), (0.5, 2)), also={"onset": (0.05, 0.5)}),
     SizeRange("detent_cogging", "amplitude", ((2, 8), (4, 16), (1, 4)), also={"periods": (10, 40)}),
     SizeRange("amplifier_slew_rate", "time_per_volt", _alike(0.001, 0.005)),
-    SizeRange("drive_coupling", "share", _alike(0.05, 0.3), signed=True),
+    SizeRange("drive_coupling", "share", _alike(0.05, 0.3), signed=True, per_joint={"onto": (2, 3, 1)}),
     SizeRange(
         "potentiometer_zero_drift", "drift", _alike(0.01, 0.06), signed=True, also={"time_constant": (8.0, 30.0)}
     ),

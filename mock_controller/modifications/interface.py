@@ -9,7 +9,7 @@ from 1, angles in rad and torques in N·m, at the joint.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 if TYPE_CHECKING:
     from mock_controller.board.parameters import BoardParameters
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class Modification(Protocol):
     """What every modification has: the name it is asked for by."""
 
-    name: str
+    name: ClassVar[str]
 
 
 @runtime_checkable

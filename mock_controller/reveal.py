@@ -1,0 +1,30 @@
+"""`python -m mock_controller.reveal SEED…`: what the arms of `--secret SEED` hide, one line of JSON each.
+
+For whoever scores answers, once they have been given. Exit code 2 for seeds that stand for no arm.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+
+from mock_controller.hidden.arm import draw_arm
+
+
+def main(arguments: list[str]) -> int:
+    """Prints the truth; the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m mock_controller.reveal", description=__doc__)
+    parser.add_argument("seeds", type=int, nargs="+", metavar="SEED")
+    try:
+        truths = [draw_arm(seed).truth() for seed in parser.parse_args(arguments).seeds]
+    except ValueError as error:
+        print(f"mock_controller.reveal: {error}", file=sys.stderr)
+        return 2
+    for truth in truths:
+        print(json.dumps(truth))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
