@@ -97,9 +97,6 @@ class Terminal:
 def terminal(words: list[str]) -> Iterator[Terminal]:
     """`daq` as the foreground of a terminal of its own; the mock runs in real time behind a pseudo-terminal."""
     master, slave = pty.openpty()
-    take_the_terminal = (
-        "import fcntl,os,sys,termios; fcntl.ioctl(0,termios.TIOCSCTTY,0); os.execv(sys.executable,sys.argv[1:])"
-    )
     process = subprocess.Popen(
         [sys.executable, "-c", TAKE_THE_TERMINAL, *DAQ, "--port", "mock://?pty=1&seed=3", *words],
         stdin=slave, stdout=slave, stderr=slave, start_new_session=True,
