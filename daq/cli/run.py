@@ -29,6 +29,15 @@ KINDS: dict[str, type[BaseModel]] = {
     "multisine": experiment.Multisine,
     "cubic": experiment.Cubic,
 }
+_IN_SHORT = {
+    "ramp": "Equal increments, all joints arriving together.",
+    "step": "The whole amplitude in one set point.",
+    "staircase": "Equal steps up, and down again.",
+    "slow-ramp": "Constant low speed, with reversals.",
+    "sine": "A sine about the start posture.",
+    "multisine": "Many sines at once, with seeded phases.",
+    "cubic": "Cubic in time, at rest at both ends.",
+}
 _ANGLES = {"phase": "degrees", "speed": "degrees/s"}
 
 JointsOption = Annotated[str, typer.Option(help="Joints that move: 1-3, 1,3 or 2.")]
@@ -145,7 +154,7 @@ def _command(kind: type[BaseModel]) -> Callable[..., None]:
 
 
 for _name, _kind in KINDS.items():
-    app.command(_name)(_command(_kind))
+    app.command(_name, short_help=_IN_SHORT[_name])(_command(_kind))
 
 
 @app.command("spec")
