@@ -182,18 +182,17 @@ def _refitted(
     known: Tangents,
     refits: int,
 ) -> Separation:
-    moved = np.zeros(len(known.names))
+    moved: NDArray[np.float64] = np.zeros(len(known.names))
     left, cost = start, float(start @ start)
     share = 1.0
     for _ in range(refits):
         step = _step(left, moved, known)
-        trial = np.clip(moved + share * step, -known.farthest, known.farthest)
+        trial: NDArray[np.float64] = np.clip(moved + share * step, -known.farthest, known.farthest)
         left_there = left_at(trial)
         cost_there = float(left_there @ left_there + trial @ trial)
         if cost_there < cost:
             settled = cost_there > _SETTLED * cost
-            moved = np.asarray(trial, dtype=np.float64)
-            left, cost, share = left_there, cost_there, min(2.0 * share, 1.0)
+            moved, left, cost, share = trial, left_there, cost_there, min(2.0 * share, 1.0)
             if settled:
                 break
         else:
