@@ -22,6 +22,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "config": ("daq.cli.config", "Show and check the configuration."),
     "mock": ("daq.cli.mock", "Start a mock controller that others can connect to."),
     "fit": ("daq.cli.fit", "A model's parameters from traces."),
+    "validate": ("daq.cli.validate", "What must move for a model to explain traces."),
     "simulate": ("daq.cli.simulate", "What a model does where a trace was recorded."),
     "compare": ("daq.cli.compare", "Several models beside the same traces."),
     "demo": ("daq.cli.demo", "The ramp step on the mock, from command to plot."),

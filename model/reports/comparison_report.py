@@ -26,7 +26,11 @@ def comparison_report(found: Comparison, differences: Sequence[ParameterDifferen
 
 
 def _title(labels: Sequence[str]) -> str:
-    return f"{labels[0]} beside what was measured" if len(labels) == 1 else f"{' and '.join(labels)} compared"
+    return (
+        f"{labels[0]} beside what was measured"
+        if len(labels) == 1
+        else f"{', '.join(labels[:-1])} and {labels[-1]} compared"
+    )
 
 
 def _answer(models: Sequence[ModelAgreement]) -> str:

@@ -8,7 +8,7 @@ from model.comparison.compare import Comparison
 from model.fitting.result import FitResult, FittedParameter
 from model.reports.figures import COLOURS, QUIET, drawn, panels
 from model.reports.motion import agreement_table, in_sample, motion_section
-from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, cells, listed, spoken
+from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, Tone, cells, listed, spoken
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,12 +67,12 @@ def _parameter_table(found: FitResult) -> Table:
 def _parameter_row(p: FittedParameter) -> tuple[Cell, ...]:
     expected = "–" if p.expected is None else f"{p.expected:.4g} ± {p.expected_deviation:.2g}"
     verdict = VERDICTS[p.verdict] + ("" if p.at_bound is None else f", at its {p.at_bound} bound")
-    tone = "plain" if p.verdict == "known" else "warning"
+    tone: Tone = "plain" if p.verdict == "known" else "warning"
     value, interval = "–", "–"
     if p.value is not None and p.low is not None and p.high is not None:
-        value, interval = f"{p.value:.5g}", f"{p.low:.5g} to {p.high:.5g}"
-    numbers = cells(p.name, value, interval)
-    return (*numbers, Cell(p.unit), *cells(f"{p.before:.5g}", expected), Cell(verdict, tone))  # type: ignore[arg-type]
+        value, interval = f"{p.value:.4g}", f"{p.low:.4g} to {p.high:.4g}"
+    before, after = Cell(f"{p.before:.5g}", number=True), Cell(expected, number=True)
+    return (*cells(p.name, value, interval), Cell(p.unit), before, after, Cell(verdict, tone))
 
 
 def _interval_picture(found: FitResult) -> tuple[Picture, ...]:

@@ -48,6 +48,8 @@ def _picture(one: TraceSignals, labels: Sequence[str]) -> Picture:
         if len(set(one.units)) == 1:
             for row in axes[1::2].flat:
                 row.set_ylim(-1.08 * widest, 1.08 * widest)
+        handles, names = axes[0][0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside upper right", ncols=len(names), handlelength=2.0)
         for empty in axes[-2:, len(one.joints) - (bands - 1) * ABREAST :].flat:
             empty.set_visible(False)
 
@@ -67,7 +69,7 @@ def _joint(
     assert isinstance(below, Axes)
     factor, unit = shown_unit(one.units[column])
     colour = COLOURS[(joint - 1) % len(COLOURS)]
-    above.set_title(f"joint {joint}", color=colour)
+    above.set_title(f"joint {joint}", color=colour if len(labels) == 1 else INK)
     if one.set_point is not None:
         time, wanted = thinned(one.time, one.set_point[:, column] * factor)
         above.plot(time, wanted, color=QUIET, lw=0.9, ls=(0, (4, 2)), drawstyle="steps-post", label="set point")
@@ -88,7 +90,6 @@ def _joint(
     if first:
         above.set_ylabel(f"position / {unit}" if not unit.endswith("/s") else f"speed / {unit}")
         below.set_ylabel(f"residual / {unit}")
-        above.legend(loc="best", handlelength=2.0)
 
 
 def agreement_table(models: Sequence[ModelAgreement]) -> Table:

@@ -1,0 +1,225 @@
+"""The report of a validation by distortion: the sum, the curves behind it, and the variations with time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels, thinned
+from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, cells, listed
+from model.validation.criterion import Curve, Fidelity
+from model.validation.time_domain import TimeDomain, Variation
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+CURVES_ABREAST = 4
+VARIATIONS_SHOWN = 8
+"""In time, those that explain most of what is left."""
+
+
+def validation_report(label: str, found: tuple[Fidelity, Fidelity], in_time: Sequence[TimeDomain]) -> Report:
+    """The page of a validation; `found` in the source's convention of τ′ and in that of three standard deviations."""
+    source, three = found
+    sections = [
+        Section("What would have to move", (_distortion_table(source, three), _contribution_picture(source, three))),
+        *([Section("How the error grows", (_curves(source),))] if source.curves else []),
+        *(_in_time(one) for one in in_time),
+    ]
+    if source.notes:
+        sections.append(Section("Remarks", (Points(source.notes),)))
+    joints = ", ".join(f"joint {j}: {e:.3g}" for j, e in zip(source.outputs, source.error_by_joint, strict=True))
+    facts = (
+        ("model", f"{label}, {source.model}"),
+        ("traces", listed(source.traces)),
+        ("squared error", f"{source.error:.4g} rad² ({joints})"),
+        ("Σλ²", f"{source.sum_of_contributions:.4f} with τ′ = â/(3√2), {three.sum_of_contributions:.4f} with τ′ = â/3"),
+        ("damping ratio", f"{source.damping_ratio:g}, of the associate system"),
+    )
+    return Report(f"Validation of {label} by distortion", _answer(source, three), facts, tuple(sections))
+
+
+def _answer(source: Fidelity, three: Fidelity) -> str:
+    total = f"Σλ² = {source.sum_of_contributions:.3f} (the other convention of τ′: {three.sum_of_contributions:.3f})"
+    strongest = max(source.parameters, key=lambda p: p.contribution)
+    if source.explains:
+        return (
+            f"{total}: deviations of the parameters as large as expected explain all that the model misses. "
+            f"{strongest.name} alone contributes {strongest.contribution:.2g}."
+        )
+    return (
+        f"{total}, below 1: deviations as large as expected do not explain what the model misses. "
+        f"Something is not in the model. The largest contribution is that of {strongest.name}, "
+        f"{strongest.contribution:.2g}."
+    )
+
+
+def _distortion_table(source: Fidelity, three: Fidelity) -> Table:
+    rows = []
+    for one, other in zip(source.parameters, three.parameters, strict=True):
+        down = "–" if one.change_down is None else f"−{one.change_down:.3g}"
+        up = "–" if one.change_up is None else f"+{one.change_up:.3g}"
+        needed = "very large" if one.required is None else f"{one.required:.3g}"
+        rows.append((
+            *cells(one.name, f"{one.value:.5g}"), Cell(one.unit),
+            Cell(f"{down} / {up}", number=True), Cell(needed, number=True), Cell(f"{one.expected:.3g}", number=True),
+            Cell(f"{one.contribution:.4f}", number=True), Cell(f"{other.contribution:.4f}", number=True),
+        ))  # fmt: skip
+    return Table(
+        ("parameter", "value", "unit", "doubles the error", "σ needed", "τ′ expected", "λ²", "λ² with â/3"), tuple(rows),
+        "The change of one parameter alone that doubles the mean squared error gives σ, the standard deviation it would "
+        "need to explain the residual (4.63); λ² = τ′²/σ² (4.92) compares it with the deviation that is expected.",
+    )  # fmt: skip
+
+
+def _contribution_picture(source: Fidelity, three: Fidelity) -> Picture:
+    shown = sorted(source.parameters, key=lambda p: p.contribution)[-14:]
+    other = {p.name: p.contribution for p in three.parameters}
+
+    def draw(figure: Figure) -> None:
+        axes = panels(figure, 1, 1)[0][0]
+        rows = np.arange(len(shown))
+        axes.barh(
+            rows + 0.2, [p.contribution for p in shown], 0.36, color=COLOURS[0], label="τ′ = â/(3√2), the source's"
+        )
+        axes.barh(rows - 0.2, [other[p.name] for p in shown], 0.36, color=COLOURS[1], label="τ′ = â/3")
+        axes.set_yticks(rows, [p.name for p in shown])
+        axes.set_xlabel("contribution λ²")
+        axes.grid(visible=False, axis="y")
+        axes.legend(loc="lower right")
+
+    caption = "Contributions to Σλ², the largest last. The model explains the record when their sum reaches 1."
+    return Picture(drawn(draw, 0.8 + 0.26 * len(shown)), caption)
+
+
+def _curves(found: Fidelity) -> Picture:
+    rows = -(-len(found.curves) // CURVES_ABREAST)
+
+    def draw(figure: Figure) -> None:
+        axes = panels(figure, rows, CURVES_ABREAST, sharey=True)
+        for place, curve in enumerate(found.curves):
+            _curve(axes.flat[place], curve, found)
+            if place % CURVES_ABREAST == 0:
+                axes.flat[place].set_ylabel("error / least")
+        for empty in axes.flat[len(found.curves) :]:
+            empty.set_visible(False)
+
+    caption = (
+        "Mean squared error over its least against each parameter, the others held. The dashed line is twice the least; "
+        "a flat curve is a parameter that the record does not feel."
+    )
+    return Picture(drawn(draw, 1.45 * rows + 0.2), caption)
+
+
+def _curve(axes: Axes, curve: Curve, found: Fidelity) -> None:
+    one = {p.name: p for p in found.parameters}[curve.name]
+    errors = np.array([np.nan if e is None else e for e in curve.errors]) / found.error
+    axes.plot(curve.values, errors, color=COLOURS[0])
+    axes.axhline(2.0, color=QUIET, lw=0.8, ls=(0, (4, 2)))
+    axes.axvline(one.value, color=QUIET, lw=0.7)
+    axes.axvspan(one.value - one.expected, one.value + one.expected, color=QUIET, alpha=0.16, lw=0)
+    axes.set_ylim(0.0, 4.0)
+    axes.set_title(_short(curve.name), fontsize=6.6)
+    axes.tick_params(labelsize=6.5)
+    axes.locator_params(axis="x", nbins=3)
+
+
+def _short(name: str) -> str:
+    """A name over two lines where it is long."""
+    head, _, tail = name.partition(".")
+    return name if len(name) < 22 else f"{head}.\n{tail}"
+
+
+def _in_time(one: TimeDomain) -> Section:
+    shown = sorted(one.parameters, key=lambda v: -v.alone_varying)[:VARIATIONS_SHOWN]
+    blocks: list[Text | Table | Picture | Points] = [
+        Text(
+            "All parameters move together, as little as explains the measured accelerations. A variation beyond its noise "
+            "says which term is wrong, when, and what it goes with."
+        ),
+        _variation_table(one),
+        _residual_picture(one),
+        _variation_picture(one, shown),
+    ]
+    if one.notes:
+        blocks.append(Points(one.notes))
+    return Section(f"Variation with time: {one.trace}", tuple(blocks))
+
+
+def _variation_table(one: TimeDomain) -> Table:
+    rows = []
+    for v in one.parameters:
+        strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in v.against if c.significant][:2]
+        tone = "plain" if v.within_expectation else "warning"
+        rows.append((
+            Cell(v.name), Cell(f"{v.deviation:.3g}", tone, number=True), Cell(f"{v.expected:.3g}", number=True),
+            Cell(v.unit), Cell(f"{100 * v.significant:.0f} %", number=True),
+            Cell(f"{100 * v.alone_constant:.0f} %", number=True), Cell(f"{100 * v.alone_varying:.0f} %", number=True),
+            Cell(", ".join(strongest) or "–"),
+        ))  # fmt: skip
+    return Table(
+        ("parameter", "σ of α(t)", "τ′", "unit", "beyond noise", "explains, constant", "varying", "goes with"),
+        tuple(rows),
+        "σ of the variation against what is expected (4.24). Beyond noise: share of the time at which it is. Explains: "
+        "share of the residual's energy that this parameter explains by itself, as a constant and varying.",
+    )
+
+
+def _residual_picture(one: TimeDomain) -> Picture:
+    def draw(figure: Figure) -> None:
+        axes = panels(figure, 1, len(one.joints), sharey=True)[0]
+        for place, joint in enumerate(one.joints):
+            time, values = thinned(np.array(one.time), _numbers(joint.values))
+            axes[place].axhspan(-2 * joint.noise, 2 * joint.noise, color=QUIET, alpha=0.16, lw=0)
+            baseline(axes[place])
+            axes[place].plot(time, values, color=COLOURS[(joint.joint - 1) % len(COLOURS)], lw=0.9)
+            axes[place].set_title(f"joint {joint.joint}")
+            axes[place].set_xlabel("time / s")
+        axes[0].set_ylabel("measured − expected / rad/s²")
+
+    told = [
+        f"joint {j.joint}: {', '.join(f'{c.regressor} of joint {c.joint} ({c.value:+.2f})' for c in strong)}"
+        for j in one.joints
+        if (strong := [c for c in j.against if c.significant][:3])
+    ]
+    tail = f" It goes with: {'; '.join(told)}." if told else ""
+    return Picture(drawn(draw, 1.9), f"Acceleration that the model does not expect; the band is twice its noise.{tail}")
+
+
+def _variation_picture(one: TimeDomain, shown: Sequence[Variation]) -> Picture:
+    columns = 2
+    rows = -(-len(shown) // columns)
+
+    def draw(figure: Figure) -> None:
+        axes = panels(figure, rows, columns, sharex=True)
+        for place, v in enumerate(shown):
+            _variation(axes.flat[place], np.array(one.time), v)
+        for empty in axes.flat[len(shown) :]:
+            empty.set_visible(False)
+        for last in axes[-1]:
+            last.set_xlabel("time / s")
+
+    caption = (
+        f"α(t) of the {len(shown)} parameters that explain most, with twice its noise (shaded) and ±τ′ (dashed). "
+        "No line where no joint that shows the parameter moves."
+    )
+    return Picture(drawn(draw, 1.35 * rows + 0.3), caption)
+
+
+def _variation(axes: Axes, time: np.ndarray, v: Variation) -> None:
+    time, values, noise = thinned(time, _numbers(v.values), _numbers(v.noise))
+    axes.fill_between(time, values - 2 * noise, values + 2 * noise, color=QUIET, alpha=0.25, lw=0)
+    baseline(axes)
+    axes.plot(time, values, color=COLOURS[0], lw=0.9)
+    for side in (-1, 1):
+        axes.axhline(side * v.expected, color=INK, lw=0.6, ls=(0, (4, 3)))
+    axes.set_title(f"{v.name} / {v.unit}", fontsize=7)
+    reach = 1.15 * max(v.expected, float(np.nanmax(np.abs(values), initial=0.0)))
+    axes.set_ylim(-reach, reach)
+
+
+def _numbers(values: Sequence[float | None]) -> np.ndarray:
+    return np.array([np.nan if v is None else v for v in values])

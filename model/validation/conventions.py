@@ -1,0 +1,27 @@
+"""The same distortions judged by another convention of τ′: the changes that double the error stay as they are."""
+
+from __future__ import annotations
+
+import math
+
+from model.machine_model.model import Model
+from model.validation.criterion import Fidelity, contribution
+from model.validation.expected_deviation import Convention, expected_deviation
+
+
+def in_convention(found: Fidelity, model: Model, convention: Convention) -> Fidelity:
+    """`found` with τ′, λ² and Σλ² of another convention, without simulating again."""
+    parameters = []
+    for one in found.parameters:
+        expected, basis = expected_deviation(model.parameter(one.name), convention)
+        parameters.append(
+            one.model_copy(
+                update={
+                    "expected": expected, "basis": basis, "contribution": contribution(one.required, expected)
+                }
+            )
+        )  # fmt: skip
+    total = math.fsum(p.contribution for p in parameters)
+    return found.model_copy(
+        update={"parameters": tuple(parameters), "convention": convention, "sum_of_contributions": total}
+    )
