@@ -12,8 +12,9 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from model.fitting.options import HELD_BY_DEFAULT, FitOptions, Prior
 from model.fitting.records import Record, Signal, resolution, sensor_deviation
-from model.fitting.simulated import initial_name
+from model.fitting.simulated import initial_name, presliding_name
 from model.fitting.unknowns import Unknown, torque_power
+from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
@@ -21,13 +22,21 @@ BEND = "potentiometer_nonlinearity"
 BEND_SHARE = 0.5
 """Standard deviation of a bend's first term as a share of the stated linearity; later terms fall as one over their number,
 which makes the whole curve stay within the linearity in about nine of ten cases."""
+SLIDING_FRICTION = (
+    "coulomb_friction", "load_dependent_friction", "stribeck_friction", "direction_dependent_friction", "gear_loss",
+    "stiction",
+)  # fmt: skip
+PRESLIDING_SHARE = 0.5
+"""Standard deviation of the presliding distance as a share of what the model assumes."""
 
 
 def chosen_unknowns(model: Model, options: FitOptions) -> tuple[Unknown, ...]:
     """The parameters that the options ask for. Raises SpecError for a pattern that matches none, or a wrong bound."""
     for name in (*options.bounds, *options.priors):
         model.parameter(name)
-    expected = {p.name: p.value for p in Model(machine=model.machine, effects=model.effects, ties=model.ties).parameters}
+    expected = {
+        p.name: p.value for p in Model(machine=model.machine, effects=model.effects, ties=model.ties).parameters
+    }
     wanted = [p for p in model.parameters if _chosen(p, options)]
     for pattern in (*(options.parameters or ()), *options.held):
         if not any(fnmatchcase(p.name, pattern) for p in model.parameters):
@@ -43,7 +52,9 @@ def with_bends(model: Model, options: FitOptions, signal: Signal) -> tuple[Model
         return model, ()
     taken = {j for use in model.effects if use.name == BEND for j in use.joints}
     joints = tuple(
-        j for j in model.machine.modelled_joints if j not in taken and (options.sensor_bend or _linearity(model.machine, j))
+        j
+        for j in model.machine.modelled_joints
+        if j not in taken and (options.sensor_bend or _linearity(model.machine, j))
     )
     if not joints:
         return model, ()
@@ -76,6 +87,24 @@ def start_postures(machine: Machine, records: Sequence[Record], bends: bool) -> 
     return tuple(found)
 
 
+def presliding(model: Model) -> tuple[Unknown, ...]:
+    """One unknown a joint with friction: the distance over which friction builds up when motion starts or turns.
+
+    It lies below the sensor's resolution and no machine file gives it, but it decides a little of every reversal.
+    """
+    found = []
+    for joint in model.machine.modelled_joints:
+        if any(use.name in SLIDING_FRICTION and joint in use.joints for use in model.effects):
+            start = float(model.vector[at.slot(joint, at.PRESLIDING)])
+            found.append(
+                Unknown(
+                    presliding_name(joint), "rad", start, 0.05 * start, 10 * start, start, PRESLIDING_SHARE * start,
+                    nuisance=True,
+                )
+            )  # fmt: skip
+    return tuple(found)
+
+
 def _linearity(machine: Machine, joint: int) -> float | None:
     sensor = machine.joint(joint).sensor
     return None if sensor is None or sensor.linearity is None else sensor.linearity.value
@@ -95,7 +124,9 @@ def _unknown(p: Parameter, expected: float, options: FitOptions) -> Unknown:
     if not low < high:
         raise SpecError(f"{p.name}: lower bound {low:g} {p.unit} is not below the upper bound {high:g} {p.unit}")
     if low < p.low or high > p.high:
-        raise SpecError(f"{p.name}: bounds {low:g} to {high:g} {p.unit} leave what is possible, {p.low:g} to {p.high:g}")
+        raise SpecError(
+            f"{p.name}: bounds {low:g} to {high:g} {p.unit} leave what is possible, {p.low:g} to {p.high:g}"
+        )
     prior = Prior(expected=expected, deviation=p.deviation) if p.deviation else None
     prior = options.priors.get(p.name, prior if options.use_priors else None)
     return Unknown(

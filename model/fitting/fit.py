@@ -13,11 +13,11 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
 from daq.contracts.trace import Trace
-from model.fitting.choice import chosen_unknowns, start_postures, with_bends
+from model.fitting.choice import chosen_unknowns, presliding, start_postures, with_bends
 from model.fitting.covariance import sandwich
 from model.fitting.least_squares import Search, Solution, solve
 from model.fitting.nelder_mead import climb
-from model.fitting.noise import noise_of
+from model.fitting.noise import replicas, with_noise
 from model.fitting.options import FitOptions
 from model.fitting.problem import Evaluation, whitened
 from model.fitting.records import Signal, noise_floor, records_of
@@ -84,15 +84,18 @@ def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> S
     records = records_of(traces, model.machine, signal)
     samples = sum(r.measured.size for r in records)
     if samples <= len(unknowns):
-        raise TraceError(f"{samples} samples for {len(unknowns)} parameters: there must be more samples than parameters")
+        raise TraceError(
+            f"{samples} samples for {len(unknowns)} parameters: there must be more samples than parameters"
+        )
     simple = options.method == "nelder_mead"
     wider, bends = (model, ()) if simple else with_bends(model, options, signal)
     postures = ()
     if options.start_posture and signal == "position" and not simple:
         postures = start_postures(model.machine, records, bool(bends))
+    contacts = presliding(model) if options.presliding and not simple else ()
     loop = options.loop or ("open" if isinstance(model.machine.controller, NoController) else "closed")
     return SimulatedProblem(
-        wider, records, (*unknowns, *bends, *postures), noise_floor(records, model.machine, signal), signal, loop,
+        wider, records, (*unknowns, *bends, *contacts, *postures), noise_floor(records, model.machine, signal), signal, loop,
         options.step,
     )  # fmt: skip
 
@@ -160,10 +163,13 @@ def _with_noise(
     problem: SimulatedProblem, values: Floats, options: FitOptions
 ) -> tuple[SimulatedProblem, list[Whitener]]:
     """The problem with the noise that its residual shows, and the whitening that its residual then asks for."""
+    if problem.loop == "closed" and problem.signal == "position":
+        if options.noise_feedback:
+            problem = with_noise(problem.with_offset(None), values)
+        if options.replicas:
+            drawn = replicas(problem, values, options.replicas, options.seed, options.noise_feedback)
+            problem = problem.with_offset([np.mean(each, axis=0) for each in zip(*drawn, strict=True)])
     evaluations = problem.evaluate(values, derivatives=False)
-    if options.noise_feedback and problem.loop == "closed" and problem.signal == "position":
-        problem = problem.with_noise(noise_of(evaluations, problem.records))
-        evaluations = problem.evaluate(values, derivatives=False)
     whiteners = []
     for column, floor in enumerate(problem.floor):
         runs = [e.residual[run, column] for e, runs in zip(evaluations, problem.runs, strict=True) for run in runs]
@@ -253,9 +259,7 @@ def _errors(
         )
         unit = "rad" if model.machine.joint(joint).kind == "revolute" else "m"
         unit += "/s" if problem.signal == "velocity" else ""
-        found.append(
-            JointError(joint=joint, unit=unit, before=first, after=last, floor=float(problem.floor[column]))
-        )
+        found.append(JointError(joint=joint, unit=unit, before=first, after=last, floor=float(problem.floor[column])))
     return tuple(found)
 
 

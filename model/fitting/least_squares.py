@@ -116,7 +116,9 @@ def solve(
         loss=(lambda z: huber(z, samples)) if search.robust else "linear",
         ftol=search.tolerance, xtol=search.tolerance, gtol=search.tolerance, max_nfev=search.most_evaluations,
     )  # fmt: skip
-    return Solution(objective.values(found.x), float(found.cost), objective.evaluations, found.status > 0, found.message)
+    return Solution(
+        objective.values(found.x), float(found.cost), objective.evaluations, found.status > 0, found.message
+    )
 
 
 def _inside(x: Floats, low: Floats, high: Floats) -> Floats:

@@ -33,6 +33,7 @@ class FitOptions(BaseModel):
     starts: searches from different beginnings, the model's own values and seeded draws from the priors.
     start_posture: let the arm start off the posture it was read at, by the sensor's error.
     sensor_bend: let the potentiometers bend within their stated linearity; None: where the machine states one.
+    presliding: let friction build up over a distance of its own on every joint.
     noise_feedback: give the simulated controller the noise that the record shows. whiten: take out the correlation
         of the residual before weighing it.
     """
@@ -50,8 +51,11 @@ class FitOptions(BaseModel):
     seed: Annotated[int, Field(ge=0)] = 0
     start_posture: bool = True
     sensor_bend: bool | None = None
+    presliding: bool = True
     noise_feedback: bool = True
     whiten: bool = True
+    replicas: Annotated[int, Field(ge=0, le=1000)] = 16
+    """Simulations with drawn noise that tell what the noise does on average; 0 for none."""
     longest_memory: Annotated[int, Field(ge=0, le=100)] = 12
     """Samples that the whitening looks back, at most."""
     rounds: Annotated[int, Field(ge=1, le=20)] = 4

@@ -15,6 +15,7 @@ from model.dynamics.dual import DUAL_STEP
 from model.fitting.problem import Evaluation
 from model.fitting.records import Record, Signal
 from model.fitting.unknowns import Unknown
+from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.simulation.engines import engine_for
 from model.simulation.period import OUT_READING, OUT_SPEED, OUTPUTS
@@ -22,6 +23,7 @@ from model.simulation.simulate import LONGEST_STEP, Options, Prepared, at_rows, 
 
 Floats = NDArray[np.float64]
 INITIAL = "initial"
+PRESLIDING = "presliding"
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,7 @@ class SimulatedProblem:
     Args:
         noise: per record (k, n) noise of the readings, rad, that the simulated controller is given; None for none.
             It is taken out again of the simulated readings, so that a residual is always against the arm itself.
+        offset: per record (m, n) residual, rad, that the model itself would leave on average; None for none.
     """
 
     model: Model
@@ -41,6 +44,7 @@ class SimulatedProblem:
     loop: Literal["closed", "open"] = "closed"
     step: float = LONGEST_STEP
     noise: tuple[Floats, ...] | None = None
+    offset: tuple[Floats, ...] | None = None
 
     @property
     def runs(self) -> Sequence[Sequence[slice]]:
@@ -50,6 +54,36 @@ class SimulatedProblem:
     def with_noise(self, noise: Sequence[Floats] | None) -> SimulatedProblem:
         """The problem with other noise in the simulated controllers' readings."""
         return replace(self, noise=None if noise is None else tuple(noise))
+
+    def with_offset(self, offset: Sequence[Floats] | None) -> SimulatedProblem:
+        """The problem with another expected residual."""
+        return replace(self, offset=None if offset is None else tuple(offset))
+
+    def with_readings(self, readings: Sequence[Floats]) -> SimulatedProblem:
+        """The problem with other measurements (m, n) in place of the recorded ones."""
+        return replace(self, records=tuple(replace(r, measured=m) for r, m in zip(self.records, readings, strict=True)))
+
+    def noisy_readings(self, values: Floats, rng: np.random.Generator) -> list[Floats]:
+        """What the records would show if the model with these values were the arm: noise drawn, readings rounded."""
+        machine = self.model.machine
+        sensors = [machine.joint(j).sensor for j in machine.modelled_joints]
+        deviations = np.array([0.0 if s is None or s.noise is None else s.noise.value for s in sensors])
+        options = Options(loop=self.loop, quantise=True, step=self.step)
+        prepared = [
+            replace(p, noise=deviations * rng.standard_normal(p.noise.shape))
+            for p in (prepare(self.model, record.inputs, options) for record in self.records)
+        ]
+        vector, initials = self._state(values)
+        count = len(prepared)
+        out = np.zeros((count, OUTPUTS, max(len(r.inputs) for r in self.records), self.model.joint_count))
+        engine_for(self.model).run(
+            prepared, np.arange(count), np.tile(vector, (count, 1)), np.array(initials), self.model.flags, self.step, out
+        )
+        if not np.isfinite(out).all():
+            raise SpecError("a simulation with noise does not stay finite: the loop is unstable")
+        return [
+            at_rows(out[t, OUT_READING, : len(r.inputs)], r.inputs.rows) for t, r in enumerate(self.records)
+        ]
 
     @cached_property
     def _counts(self) -> Floats:
@@ -63,7 +97,9 @@ class SimulatedProblem:
         prepared = [prepare(self.model, record.inputs, options) for record in self.records]
         if self.noise is None:
             return prepared
-        return [replace(p, noise=np.ascontiguousarray(n / self._counts)) for p, n in zip(prepared, self.noise, strict=True)]
+        return [
+            replace(p, noise=np.ascontiguousarray(n / self._counts)) for p, n in zip(prepared, self.noise, strict=True)
+        ]
 
     @cached_property
     def _places(self) -> list[tuple[NDArray[np.int64], tuple[int, int] | None]]:
@@ -102,6 +138,8 @@ class SimulatedProblem:
             if self.noise is not None and self.signal == "position":
                 simulated = simulated - self.noise[t]
             residual = at_rows(simulated, record.inputs.rows) - record.measured
+            if self.offset is not None:
+                residual = residual - self.offset[t]
             jacobian = None
             if derivatives:
                 jacobian = np.zeros((len(self.unknowns), *residual.shape))
@@ -141,7 +179,16 @@ def initial_name(trace: int, joint: int) -> str:
     return f"{INITIAL}.trace{trace}.joint{joint}.position"
 
 
+def presliding_name(joint: int) -> str:
+    """Name of the unknown that is a joint's presliding distance, rad."""
+    return f"{PRESLIDING}.joint{joint}"
+
+
 def _place(model: Model, name: str) -> tuple[NDArray[np.int64], tuple[int, int] | None]:
+    """Where an unknown acts: its slots in the flat vector, or its place (joint index, column) in the initial state."""
+    if name.startswith(PRESLIDING + "."):
+        joint = int(name.rpartition("joint")[2])
+        return np.array([at.slot(joint, at.PRESLIDING)]), None
     if name.startswith(INITIAL + "."):
         joint = int(name.split(".")[2].removeprefix("joint"))
         return np.zeros(0, dtype=np.int64), (joint - 1, 0)
