@@ -1,0 +1,50 @@
+"""Traces that a model makes of itself, so that the truth behind them is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+
+from daq.contracts.machine import load_machine
+from daq.contracts.trace import Trace, TraceRecord
+from model.machine_model.model import Model, base_model
+from model.simulation.simulate import Options, simulate
+
+PERIOD = 0.02
+START = (np.pi, np.pi / 4, 0.0)
+
+
+def arm() -> Model:
+    """The MA2000 as its machine file describes it."""
+    return base_model(load_machine("ma2000"))
+
+
+def ramp_trace(plant: Model, seconds: float = 1.6, seed: int = 0) -> Trace:
+    """The experiment's ramp (section 6.5) run by `plant`, with the sensors' noise."""
+    time = PERIOD * np.arange(round(seconds / PERIOD))
+    rise = np.radians(21.6) * np.clip((time - 0.2) / 0.65, 0, 1)
+    return _run(plant, np.array(START) + rise[:, None], seed)
+
+
+def swinging_trace(plant: Model, seconds: float = 6.0, seed: int = 0) -> Trace:
+    """Two sines a joint, out of step."""
+    time = np.maximum(PERIOD * np.arange(round(seconds / PERIOD)) - 0.2, 0)
+    waves = [np.sin(2 * np.pi * (0.4 + 0.13 * j) * time) + 0.5 * np.sin(2 * np.pi * (1.1 + 0.2 * j) * time) for j in range(3)]
+    return _run(plant, np.array(START) + np.radians(20) * np.stack(waves, axis=1), seed)
+
+
+def _run(plant: Model, set_points: np.ndarray, seed: int) -> Trace:
+    count = len(set_points)
+    record = TraceRecord(
+        trace_id=f"synthetic-{seed}", created=datetime(2026, 1, 1, tzinfo=UTC), software="test", source="imported",
+        period=PERIOD,
+    )  # fmt: skip
+    trace = Trace(
+        record=record, joints=(1, 2, 3), time=PERIOD * np.arange(count), position=np.tile(START, (count, 1)),
+        set_point=set_points, drive=np.zeros((count, 3)), tick=np.arange(count),
+    )  # fmt: skip
+    noise = 0.3 * np.random.default_rng(seed).standard_normal((count, 3))
+    run = simulate(plant, trace, Options(noise=noise))
+    return replace(trace, position=run.reading, drive=run.drive)
