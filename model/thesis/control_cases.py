@@ -94,7 +94,7 @@ def control_chapter(progress: Progress = silent, cancel: Cancel | None = None) -
         if cancel.is_set():
             raise CancelledError
         progress(k / len(runs), f"chapter 8: {run.name}")
-        cases.append(_case(run, control(plant, run.law, wanted, run.start, DURATION), wanted))
+        cases.append(_case(run, control(plant, run.law, wanted, run.start, DURATION, every=100), wanted))
     progress(1.0, "chapter 8: done")
     return ControlChapter(
         cases=tuple(cases), checks=_checks({c.name: c for c in cases}), choices=CHOICES, findings=FINDINGS

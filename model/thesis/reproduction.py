@@ -124,7 +124,7 @@ FINDINGS = (
     "text describes and which gives 42 to 46 % more.",
     "Table 5.1 names too many parameters for the waist: the shoulder lies on the waist's axis, so mass and centre of link "
     "2 have no arm there, and I*zz of links 2 and 3 acts about axes at right angles to it. Table 5.2 names too many for "
-    "it too: while the waist hardly moves, the terms that are left act through products of inertia.",
+    "it too: with the waist at rest, links 2 and 3 reach it through products of inertia and offsets along z alone.",
     "K_b2 and v_eff2 cannot be told apart by voltage and position: only K_b2 + v_eff2 R/K_T can. It is 0.0747, 0.0707 and "
     "0.0714 V·s/rad in tables 7.5, 7.7 and 7.9; that K_b2 returns to its data sheet once viscous friction is in the model "
     "is a matter of where the fit starts, not of the record.",

@@ -1,0 +1,64 @@
+"""The whole reproduction on a ramp of a plant with complete friction."""
+
+from __future__ import annotations
+
+import pytest
+
+from daq.contracts.errors import SpecError
+from model.thesis.ladder import Ladder
+from model.thesis.reproduction import Reproduction, reproduce_thesis
+from model.thesis.text import as_text
+from tests.model.validation.synthetic import arm, ramp_trace
+
+
+@pytest.fixture(scope="module")
+def result() -> Reproduction:
+    return reproduce_thesis([ramp_trace(arm())], ("least_squares",))
+
+
+@pytest.fixture(scope="module")
+def ladder(result: Reproduction) -> Ladder:
+    return result.ladders[0]
+
+
+def test_every_step_of_the_ladder_fits_better_and_explains_more(ladder: Ladder) -> None:
+    errors = [s.error for s in ladder.steps]
+    sums = [s.fidelity.sum_of_contributions for s in ladder.steps]
+    assert errors == sorted(errors, reverse=True)
+    assert sums == sorted(sums)
+    assert ladder.unoptimised_error > errors[0]
+
+
+def test_back_emf_of_joint_2_stands_in_for_friction_until_there_is_some(ladder: Ladder) -> None:
+    _, with_back_emf, viscous, complete = ladder.steps
+    assert with_back_emf.values["Kb2"] > 0.06
+    assert viscous.values["Kb2"] == pytest.approx(0.0334, rel=0.2)
+    assert complete.values["Kb2"] == pytest.approx(0.0334, rel=0.2)
+    assert complete.values["v_eff2"] == pytest.approx(2.53e-4, rel=0.25)
+
+
+def test_the_waist_s_link_is_insensitive_throughout(ladder: Ladder) -> None:
+    for step in ladder.steps:
+        for name in ("link1.mass", "link1.radius"):
+            assert step.fidelity.parameter(name).contribution < 0.01 * step.fidelity.sum_of_contributions
+
+
+def test_only_what_is_known_not_to_come_out_does_not(result: Reproduction) -> None:
+    assert {c.name for c in result.failed} == {
+        "table 5.1, joint 1",
+        "table 5.2, joint 1",
+        "with the tabled back-EMF constants cases 1 and 2 are damped",
+        "PID from 90°: joint 3 overshoots",
+    }
+
+
+def test_text_shows_ours_beside_the_published(result: Reproduction) -> None:
+    text = as_text(result)
+    for shown in ("0.2449", "0.2426", "9.4940e-4"[:4], "start posture", "not given", "Found on the way"):
+        assert shown in text
+    assert Reproduction.model_validate_json(result.model_dump_json()) == result
+
+
+def test_nothing_to_reproduce_from_is_an_error() -> None:
+    with pytest.raises(SpecError, match="at least one trace"):
+        reproduce_thesis([])
