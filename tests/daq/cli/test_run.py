@@ -110,7 +110,7 @@ def terminal(words: list[str]) -> Iterator[Terminal]:
         os.close(master)
 
 
-@pytest.mark.parametrize("keys", [b"\x03", b"\x03\x03", b"\x1a"], ids=["Ctrl-C", "Ctrl-C twice", "Ctrl-Z"])
+@pytest.mark.parametrize("keys", [b"\x03\x03", b"\x1a"], ids=["Ctrl-C twice", "Ctrl-Z"])
 def test_keys_that_stop_the_arm(keys: bytes) -> None:
     with terminal(LONG) as person:
         person.until(b"ramp starts")
