@@ -13,7 +13,7 @@ from model.reports.page import Cell, Picture, Points, Report, Section, Table, Te
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-VERDICTS = {"known": "known", "combination": "only in combination", "unknown": "not determined"}
+VERDICTS = {"known": "known", "combination": "only\u00a0in\u00a0combination", "unknown": "not\u00a0determined"}
 
 
 def fit_report(found: FitResult, comparison: Comparison) -> Report:

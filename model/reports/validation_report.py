@@ -69,9 +69,10 @@ def _distortion_table(source: Fidelity, three: Fidelity) -> Table:
             Cell(f"{one.contribution:.4f}", number=True), Cell(f"{other.contribution:.4f}", number=True),
         ))  # fmt: skip
     return Table(
-        ("parameter", "value", "unit", "doubles the error", "σ needed", "τ′ expected", "λ²", "λ² with â/3"), tuple(rows),
-        "The change of one parameter alone that doubles the mean squared error gives σ, the standard deviation it would "
-        "need to explain the residual (4.63); λ² = τ′²/σ² (4.92) compares it with the deviation that is expected.",
+        ("parameter", "value", "unit", "doubles the error", "σ needed", "τ′ expected", "λ²", "λ² with â/3"),
+        tuple(rows),
+        "The change of one parameter alone that doubles the mean squared error gives σ, the standard deviation it "
+        "would need to explain the residual (4.63); λ² = τ′²/σ² (4.92) compares it with the deviation that is expected.",
     )  # fmt: skip
 
 
@@ -87,11 +88,16 @@ def _contribution_picture(source: Fidelity, three: Fidelity) -> Picture:
         )
         axes.barh(rows - 0.2, [other[p.name] for p in shown], 0.36, color=COLOURS[1], label="τ′ = â/3")
         axes.set_yticks(rows, [p.name for p in shown])
+        axes.axvline(1.0, color=QUIET, lw=0.9, ls=(0, (4, 2)))
+        axes.set_xscale("log")
+        axes.set_xlim(1e-4, 2.0 * max(1.0, *other.values()))
         axes.set_xlabel("contribution λ²")
         axes.grid(visible=False, axis="y")
-        axes.legend(loc="lower right")
+        figure.legend(loc="outside upper right", ncols=2)
 
-    caption = "Contributions to Σλ², the largest last. The model explains the record when their sum reaches 1."
+    caption = (
+        "Contributions to Σλ², the largest above. The model explains the record when their sum reaches 1 (dashed)."
+    )
     return Picture(drawn(draw, 0.8 + 0.26 * len(shown)), caption)
 
 
@@ -108,8 +114,8 @@ def _curves(found: Fidelity) -> Picture:
             empty.set_visible(False)
 
     caption = (
-        "Mean squared error over its least against each parameter, the others held. The dashed line is twice the least; "
-        "a flat curve is a parameter that the record does not feel."
+        "Mean squared error over its least against each parameter, the others held. The dashed line is twice the "
+        "least; a flat curve is a parameter that the record does not feel."
     )
     return Picture(drawn(draw, 1.45 * rows + 0.2), caption)
 
@@ -137,8 +143,8 @@ def _in_time(one: TimeDomain) -> Section:
     shown = sorted(one.parameters, key=lambda v: -v.alone_varying)[:VARIATIONS_SHOWN]
     blocks: list[Text | Table | Picture | Points] = [
         Text(
-            "All parameters move together, as little as explains the measured accelerations. A variation beyond its noise "
-            "says which term is wrong, when, and what it goes with."
+            "All parameters move together, as little as explains the measured accelerations. A variation beyond its "
+            "noise says which term is wrong, when, and what it goes with."
         ),
         _variation_table(one),
         _residual_picture(one),
