@@ -102,7 +102,7 @@ def test_a_limit_that_is_given_replaces_the_machines_and_the_others_stay() -> No
 def test_limits_that_contradict_the_machines_are_refused() -> None:
     machine = load_machine("ma2000")
     joints = (JointLimits(low=math.radians(350)), *(JointLimits() for _ in range(5)))
-    with pytest.raises(SpecError, match="joint 1: low .* must be below high"):
+    with pytest.raises(SpecError, match=r"joint 1: low .* must be below high"):
         merged_limits(machine, Limits(joints=joints))
 
 
