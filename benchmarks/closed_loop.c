@@ -27,6 +27,11 @@ static inline double current_after(const double *j, double rise, double now, dou
   return steady + (now - steady) * exp(-j[RESISTANCE] * (1.0 + rise) / j[INDUCTANCE] * t);
 }
 
+static inline double mean_current(const double *j, double rise, double now, double steady, double h) {
+  const double turns = j[RESISTANCE] * (1.0 + rise) / j[INDUCTANCE] * h;
+  return steady + (now - steady) * (1.0 - exp(-turns)) / turns;
+}
+
 static double sensed_angle(double q, const double *j) {
   double s = q + j[POTENTIOMETER_GAIN] * (q - j[AT_ZERO] - 0.5 * j[RANGE]) + j[POTENTIOMETER_OFFSET];
   if (j[BEND_1] != 0 || j[BEND_2] != 0 || j[BEND_3] != 0 || j[BEND_4] != 0) {
@@ -52,9 +57,9 @@ static double extra_torque(const double *j, long flags, double t, double q, doub
   return torque;
 }
 
-static double special(const double *j, long flags, double t, double elapsed, double q, double v, double z, const double *s, double volts) {
+static double special(const double *j, long flags, double t, double h, double q, double v, double z, const double *s, double volts) {
   const double steady = steady_current(j, s[RISE], volts, v);
-  const double now = flags & HAS_INDUCTANCE ? current_after(j, s[RISE], s[CURRENT], steady, elapsed) : steady;
+  const double now = flags & HAS_INDUCTANCE ? mean_current(j, s[RISE], s[CURRENT], steady, h) : steady;
   const double k = j[GEAR] * j[TORQUE_CONSTANT];
   return k * (now - steady) + extra_torque(j, flags, t, q, v, z, s[STUCK], k * now);
 }
@@ -113,7 +118,7 @@ static void advance(double s[N][STATE], const double *volts, double start, doubl
       }
       if (is_special)
         for (int j = 0; j < N; j++)
-          torque[j] += special(p[j], flags[j], start + step * h + reach, reach, q[j] + dq[j], u[j], y[j], s[j], volts[j]);
+          torque[j] += special(p[j], flags[j], start + step * h + reach, h, q[j] + dq[j], u[j], y[j], s[j], volts[j]);
       if (tilted) {
         double b[3];
         horizontal_gravity_torques(q[0] + dq[0] + p[0][THETA], t2, t3, body, b);

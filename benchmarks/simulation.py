@@ -136,14 +136,14 @@ def _c_runs(model: Model, prepared: Prepared, count: int) -> Callable[[int], NDA
         prepared.gains,
         body,
     ]
-    pointers = [np.ascontiguousarray(a).ctypes.data_as(Pointer) for a in arrays]
+    arrays = [np.ascontiguousarray(a) for a in arrays]
+    pointers = [a.ctypes.data_as(Pointer) for a in arrays]  # they keep what they point to
     flags = np.array(model.flags, dtype=ctypes.c_long)
     deflection = _initial_deflection(model, prepared)
     tail = (
         flags.ctypes.data_as(ctypes.POINTER(ctypes.c_long)), deflection.ctypes.data_as(Pointer), ctypes.c_long(1),
         ctypes.c_double(LONGEST_STEP), out.ctypes.data_as(Pointer),
     )  # fmt: skip
-    kept = (arrays, flags, deflection)  # the pointers look into these
 
     def piece(first: int, last: int) -> None:
         library.run_many(ctypes.c_long(first), ctypes.c_long(last), ctypes.c_long(periods), *pointers, *tail)
@@ -155,7 +155,7 @@ def _c_runs(model: Model, prepared: Prepared, count: int) -> Callable[[int], NDA
         edges = np.linspace(0, count, cores * 4 + 1).astype(int)
         with ThreadPoolExecutor(cores) as pool:
             list(pool.map(piece, edges[:-1].tolist(), edges[1:].tolist()))
-        return out if kept else out
+        return out
 
     return run
 
@@ -288,9 +288,10 @@ def _first_use(cold: bool) -> None:
                 cwd=FOLDER.parent,
             )
             loaded, once, dual = (float(x) for x in done.stdout.split()[-3:])
+            reach = 20 if state == "cold" else 1
             sys.stdout.write(
                 f"first use, cache {state}: import {loaded:.2f} s (with the benchmark's own), "
-                f"first simulation {once:.2f} s, first sensitivities {dual:.2f} s (reach ≤ {20 if state == 'cold' else 1} s)\n"
+                f"first simulation {once:.2f} s, first sensitivities {dual:.2f} s (≤ {reach} s)\n"
             )
 
 

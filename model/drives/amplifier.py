@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from model.drives.piecewise import clamped, outside
 from model.dynamics.compilation import internal
 from model.machine_model import layout as at
-from model.drives.piecewise import clamped, outside
 
 
 @internal

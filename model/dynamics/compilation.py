@@ -66,9 +66,8 @@ def compiled(function: Callable[..., Any]) -> Any:
 
 def internal(function: Callable[..., Any]) -> Any:
     """As `compiled`, for functions that only compiled code calls: no entry from Python, so less to compile."""
-    return numba.njit(
-        cache=True, error_model="numpy", fastmath={"contract"}, no_cpython_wrapper=True, no_cfunc_wrapper=True
-    )(function)
+    without_entry: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # options its stubs do not list
+    return numba.njit(cache=True, error_model="numpy", fastmath={"contract"}, **without_entry)(function)
 
 
 def inlined(function: Callable[..., Any]) -> Any:

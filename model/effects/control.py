@@ -10,7 +10,11 @@ CONTROL = (
         "input_delay",
         physics="the drive of a period acts t later; any part of a period, up to 14 periods",
         source="computing and transport delay",
-        parameters=(EffectParameter("time", at.EXTRA_DELAY, "s", low=0.0, high=lambda s: 13 * s.period, deviation=lambda s: s.period),),
+        parameters=(
+            EffectParameter(
+                "time", at.EXTRA_DELAY, "s", low=0.0, high=lambda s: 13 * s.period, deviation=lambda s: s.period
+            ),
+        ),
     ),
     Effect(
         "wrong_gain",
@@ -24,5 +28,5 @@ CONTROL = (
         source="section 6.5: the controller takes no set points while the host holds the memory",
         parameters=(EffectParameter("share", at.LOST, "1", low=0.0, high=1.0, deviation=0.2),),
     ),
-)  # fmt: skip
+)
 """Effects of the controller family."""

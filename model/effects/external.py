@@ -11,7 +11,14 @@ EXTERNAL = (
         physics="τ = −k (q − q_0)",
         source="Hooke; a cable or hose",
         parameters=(
-            EffectParameter("stiffness", at.SPRING, "N·m/rad", low=lambda s: -s.torque, high=lambda s: 10 * s.torque, deviation=lambda s: 0.05 * s.torque),
+            EffectParameter(
+                "stiffness",
+                at.SPRING,
+                "N·m/rad",
+                low=lambda s: -s.torque,
+                high=lambda s: 10 * s.torque,
+                deviation=lambda s: 0.05 * s.torque,
+            ),
             EffectParameter("rest", at.SPRING_REST, "rad", null=None, start=0.0, low=-10.0, high=10.0, deviation=1.0),
         ),
     ),
@@ -20,10 +27,33 @@ EXTERNAL = (
         physics="τ = a sin(2πft) + b cos(2πft), t from the start of the record",
         source="harmonic force",
         parameters=(
-            EffectParameter("sine", at.DISTURBANCE_SINE, "N·m", low=lambda s: -s.torque, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
-            EffectParameter("cosine", at.DISTURBANCE_COSINE, "N·m", low=lambda s: -s.torque, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
-            EffectParameter("frequency", at.DISTURBANCE_FREQUENCY, "Hz", null=None, start=1.0, low=0.05, high=lambda s: 0.5 / s.period, deviation=1.0),
+            EffectParameter(
+                "sine",
+                at.DISTURBANCE_SINE,
+                "N·m",
+                low=lambda s: -s.torque,
+                high=lambda s: s.torque,
+                deviation=lambda s: 0.02 * s.torque,
+            ),
+            EffectParameter(
+                "cosine",
+                at.DISTURBANCE_COSINE,
+                "N·m",
+                low=lambda s: -s.torque,
+                high=lambda s: s.torque,
+                deviation=lambda s: 0.02 * s.torque,
+            ),
+            EffectParameter(
+                "frequency",
+                at.DISTURBANCE_FREQUENCY,
+                "Hz",
+                null=None,
+                start=1.0,
+                low=0.05,
+                high=lambda s: 0.5 / s.period,
+                deviation=1.0,
+            ),
         ),
     ),
-)  # fmt: skip
+)
 """Effects of the external family."""

@@ -12,7 +12,10 @@ FRICTION = (
         source="(7.30)",
         parameters=(
             EffectParameter(
-                "coefficient", at.VISCOUS, "N·m·s/rad", low=0.0,
+                "coefficient",
+                at.VISCOUS,
+                "N·m·s/rad",
+                low=0.0,
                 deviation=lambda s: max(s.viscous / 3, 0.02 * s.torque / s.speed / s.gear**2),
             ),
         ),
@@ -22,7 +25,9 @@ FRICTION = (
         physics="τ = −T_c z",
         source="Coulomb 1785; contact as an elastic, perfectly plastic element (Prandtl 1928)",
         parameters=(
-            EffectParameter("torque", at.COULOMB, "N·m", low=0.0, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
+            EffectParameter(
+                "torque", at.COULOMB, "N·m", low=0.0, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque
+            ),
         ),
     ),
     Effect(
@@ -36,17 +41,29 @@ FRICTION = (
         physics="τ = −F_s exp(−|q̇|/V) z: friction F_s above its value at speed, falling over V",
         source="(7.31)",
         parameters=(
-            EffectParameter("torque", at.STRIBECK, "N·m", low=0.0, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
-            EffectParameter("speed", at.STRIBECK_SPEED, "rad/s", null=None, start=lambda s: 0.03 * s.speed, low=1e-3, high=lambda s: s.speed,
-                            deviation=lambda s: 0.02 * s.speed),
+            EffectParameter(
+                "torque", at.STRIBECK, "N·m", low=0.0, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque
+            ),
+            EffectParameter(
+                "speed",
+                at.STRIBECK_SPEED,
+                "rad/s",
+                null=None,
+                start=lambda s: 0.03 * s.speed,
+                low=1e-3,
+                high=lambda s: s.speed,
+                deviation=lambda s: 0.02 * s.speed,
+            ),
         ),
     ),
     Effect(
         "stiction",
-        physics="at rest the joint holds T_b above Coulomb friction; it breaks away at once and sticks again when it stops",
+        physics="at rest the joint holds T_b above Coulomb friction, then breaks away; it sticks again when it stops",
         source="Karnopp 1985 (stick as a state of its own)",
         parameters=(
-            EffectParameter("breakaway", at.BREAKAWAY, "N·m", low=0.0, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
+            EffectParameter(
+                "breakaway", at.BREAKAWAY, "N·m", low=0.0, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque
+            ),
         ),
         flag=at.HAS_STICTION,
     ),
@@ -55,8 +72,15 @@ FRICTION = (
         physics="τ = −½ ΔT z²: friction ΔT higher forwards than backwards",
         source="Armstrong-Hélouvry, Dupont, Canudas de Wit 1994, section 2.2",
         parameters=(
-            EffectParameter("difference", at.DIRECTION, "N·m", low=lambda s: -s.torque, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
+            EffectParameter(
+                "difference",
+                at.DIRECTION,
+                "N·m",
+                low=lambda s: -s.torque,
+                high=lambda s: s.torque,
+                deviation=lambda s: 0.02 * s.torque,
+            ),
         ),
     ),
-)  # fmt: skip
+)
 """Effects of the friction family."""

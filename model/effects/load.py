@@ -18,14 +18,25 @@ LOAD = (
         "link_mass",
         physics="m_i → m_i + m, of the same shape",
         source="section 7.2",
-        parameters=(EffectParameter("added", at.MASS_ADDED, "kg", low=lambda s: -0.99 * s.mass, high=50.0, deviation=lambda s: 0.5 * s.mass),),
+        parameters=(
+            EffectParameter(
+                "added", at.MASS_ADDED, "kg", low=lambda s: -0.99 * s.mass, high=50.0, deviation=lambda s: 0.5 * s.mass
+            ),
+        ),
     ),
     Effect(
         "centre_of_mass",
         physics="c̄_i → c̄_i + s along the link, inertia about the centre unchanged",
         source="section 7.2; appendix B",
         parameters=(
-            EffectParameter("shift", at.SHIFT, "m", low=lambda s: -0.5 * s.length, high=lambda s: 0.5 * s.length, deviation=lambda s: 0.2 * s.length),
+            EffectParameter(
+                "shift",
+                at.SHIFT,
+                "m",
+                low=lambda s: -0.5 * s.length,
+                high=lambda s: 0.5 * s.length,
+                deviation=lambda s: 0.2 * s.length,
+            ),
         ),
     ),
     Effect(
@@ -38,5 +49,5 @@ LOAD = (
         ),
         whole_machine=True,
     ),
-)  # fmt: skip
+)
 """Effects of the inertia and gravity families."""

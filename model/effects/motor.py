@@ -18,30 +18,45 @@ MOTOR = (
         source="first-order heat balance; copper gains 0.39 % a kelvin",
         parameters=(
             EffectParameter("heating", at.HEATING, "1/(A²·s)", low=0.0, high=1.0, deviation=0.005),
-            EffectParameter("time_constant", at.COOLING_TIME, "s", null=None, start=60.0, low=1.0, high=3600.0, deviation=40.0),
+            EffectParameter(
+                "time_constant", at.COOLING_TIME, "s", null=None, start=60.0, low=1.0, high=3600.0, deviation=40.0
+            ),
         ),
     ),
     Effect(
         "motor_inductance",
         physics="L di/dt = u − R i − K_b n q̇, advanced by its exact exponential",
         source="(3.55), table 7.1",
-        parameters=(EffectParameter("inductance", at.INDUCTANCE, "H", null=0.0, start=1e-3, low=1e-7, high=1.0, deviation=1e-2),),
+        parameters=(
+            EffectParameter("inductance", at.INDUCTANCE, "H", null=0.0, start=1e-3, low=1e-7, high=1.0, deviation=1e-2),
+        ),
         flag=at.HAS_INDUCTANCE,
     ),
     Effect(
         "dead_zone",
         physics="u = 0 for |u_c| < w, else u_c − w sign(u_c)",
         source="input dead zone of a linear amplifier; volts at the motor",
-        parameters=(EffectParameter("width", at.DEAD_ZONE, "V", low=0.0, high=lambda s: s.volts, deviation=lambda s: 0.03 * s.volts),),
+        parameters=(
+            EffectParameter(
+                "width", at.DEAD_ZONE, "V", low=0.0, high=lambda s: s.volts, deviation=lambda s: 0.03 * s.volts
+            ),
+        ),
     ),
     Effect(
         "supply_limit",
         physics="|u| ≤ U_s",
         source="section 6.2; the machine file's limit is the null value",
         parameters=(
-            EffectParameter("voltage", at.SUPPLY, "V", null=lambda s: s.supply, low=lambda s: 0.02 * s.volts, high=lambda s: s.supply,
-                            deviation=lambda s: 0.25 * s.volts),
+            EffectParameter(
+                "voltage",
+                at.SUPPLY,
+                "V",
+                null=lambda s: s.supply,
+                low=lambda s: 0.02 * s.volts,
+                high=lambda s: s.supply,
+                deviation=lambda s: 0.25 * s.volts,
+            ),
         ),
     ),
-)  # fmt: skip
+)
 """Effects of the motor and amplifier families."""

@@ -30,7 +30,14 @@ SENSOR = (
         physics="reading = q + o",
         source="zero of a potentiometer",
         parameters=(
-            EffectParameter("offset", at.POTENTIOMETER_OFFSET, "rad", low=_least_bend, high=_bend_limit, deviation=lambda s: 10 * s.resolution),
+            EffectParameter(
+                "offset",
+                at.POTENTIOMETER_OFFSET,
+                "rad",
+                low=_least_bend,
+                high=_bend_limit,
+                deviation=lambda s: 10 * s.resolution,
+            ),
         ),
     ),
     Effect(
@@ -42,5 +49,5 @@ SENSOR = (
             for k, column in enumerate((at.BEND_1, at.BEND_2, at.BEND_3, at.BEND_4), start=1)
         ),
     ),
-)  # fmt: skip
+)
 """Effects of the sensor family."""

@@ -26,9 +26,25 @@ TRANSMISSION = (
         physics="τ = a sin(N q) + b cos(N q)",
         source="cogging of motor or gear, first harmonic",
         parameters=(
-            EffectParameter("sine", at.RIPPLE_SINE, "N·m", low=lambda s: -s.torque, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
-            EffectParameter("cosine", at.RIPPLE_COSINE, "N·m", low=lambda s: -s.torque, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque),
-            EffectParameter("cycles", at.RIPPLE_CYCLES, "1", null=None, start=12.0, low=0.5, high=1000.0, deviation=6.0),
+            EffectParameter(
+                "sine",
+                at.RIPPLE_SINE,
+                "N·m",
+                low=lambda s: -s.torque,
+                high=lambda s: s.torque,
+                deviation=lambda s: 0.02 * s.torque,
+            ),
+            EffectParameter(
+                "cosine",
+                at.RIPPLE_COSINE,
+                "N·m",
+                low=lambda s: -s.torque,
+                high=lambda s: s.torque,
+                deviation=lambda s: 0.02 * s.torque,
+            ),
+            EffectParameter(
+                "cycles", at.RIPPLE_CYCLES, "1", null=None, start=12.0, low=0.5, high=1000.0, deviation=6.0
+            ),
         ),
     ),
     Effect(
@@ -42,9 +58,19 @@ TRANSMISSION = (
         physics="no torque while |q_m − q| < g/2, an elastic contact beyond; rotor and link move apart",
         source="Nordin and Gutman 2002, dead-zone model",
         parameters=(
-            EffectParameter("gap", at.GAP, "rad", low=0.0, high=lambda s: 0.1 * s.range, deviation=lambda s: 6 * s.resolution),
-            EffectParameter("damping", at.TRANSMISSION_DAMPING, "N·m·s/rad", null=None, start=_damping, low=0.0,
-                            high=lambda s: 10 * _damping(s), deviation=_damping),
+            EffectParameter(
+                "gap", at.GAP, "rad", low=0.0, high=lambda s: 0.1 * s.range, deviation=lambda s: 6 * s.resolution
+            ),
+            EffectParameter(
+                "damping",
+                at.TRANSMISSION_DAMPING,
+                "N·m·s/rad",
+                null=None,
+                start=_damping,
+                low=0.0,
+                high=lambda s: 10 * _damping(s),
+                deviation=_damping,
+            ),
         ),
         flag=at.HAS_FLEXIBILITY,
     ),
@@ -53,12 +79,26 @@ TRANSMISSION = (
         physics="τ = (q_m − q)/c + d (q̇_m − q̇) between rotor and link",
         source="Spong 1987, elastic joints",
         parameters=(
-            EffectParameter("compliance", at.COMPLIANCE, "rad/(N·m)", low=0.0, high=lambda s: 0.1 * s.range / (s.torque / 20),
-                            deviation=lambda s: 6 * s.resolution / (0.05 * s.torque)),
-            EffectParameter("damping", at.TRANSMISSION_DAMPING, "N·m·s/rad", null=None, start=_damping, low=0.0,
-                            high=lambda s: 10 * _damping(s), deviation=_damping),
+            EffectParameter(
+                "compliance",
+                at.COMPLIANCE,
+                "rad/(N·m)",
+                low=0.0,
+                high=lambda s: 0.1 * s.range / (s.torque / 20),
+                deviation=lambda s: 6 * s.resolution / (0.05 * s.torque),
+            ),
+            EffectParameter(
+                "damping",
+                at.TRANSMISSION_DAMPING,
+                "N·m·s/rad",
+                null=None,
+                start=_damping,
+                low=0.0,
+                high=lambda s: 10 * _damping(s),
+                deviation=_damping,
+            ),
         ),
         flag=at.HAS_FLEXIBILITY,
     ),
-)  # fmt: skip
+)
 """Effects of the transmission family."""

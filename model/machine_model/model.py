@@ -72,15 +72,12 @@ class Model(_Part):
 
     @model_validator(mode="after")
     def _known(self) -> Self:
-        try:
-            for use in self.effects:
-                _check_use(self.machine, use)
-            if repeated := [u.name for i, u in enumerate(self.effects) for v in self.effects[:i] if _overlap(u, v)]:
-                raise SpecError(f"effect {repeated[0]}: in the model twice for the same joint")
-            if unknown := sorted(set(self.values) - set(self.by_name)):
-                raise SpecError(f"parameter {unknown[0]!r}: this model has {', '.join(self.by_name)}")
-        except SpecError as error:
-            raise ValueError(str(error)) from error
+        for use in self.effects:
+            _check_use(self.machine, use)
+        if repeated := [u.name for i, u in enumerate(self.effects) for v in self.effects[:i] if _overlap(u, v)]:
+            raise SpecError(f"effect {repeated[0]}: in the model twice for the same joint")
+        if unknown := sorted(set(self.values) - set(self.by_name)):
+            raise SpecError(f"parameter {unknown[0]!r}: this model has {', '.join(self.by_name)}")
         return self
 
     @cached_property
@@ -103,8 +100,8 @@ class Model(_Part):
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name. Raises SpecError with the names that come closest."""
         if name not in self.by_name:
-            last = name.split(".")[-1]
-            near = [n for n in self.by_name if n.split(".")[0] == name.split(".")[0] or n.endswith(last)]
+            last = name.rpartition(".")[2]
+            near = [n for n in self.by_name if n.partition(".")[0] == name.partition(".")[0] or n.endswith(last)]
             raise SpecError(f"parameter {name!r}: not in this model; it has {', '.join(near or self.by_name)}")
         return self.by_name[name]
 
@@ -160,7 +157,7 @@ class Model(_Part):
         chosen: dict[str, float] = {}
         for key, value in (values or {}).items():
             own = [p.name for p in effect_parameters(self.machine, name, joints, shared)]
-            matching = [n for n in own if n == key or n.split(".")[-1] == key]
+            matching = [n for n in own if n == key or n.rpartition(".")[2] == key]
             if not matching:
                 raise SpecError(f"effect {name} has no parameter {key!r}; it has {', '.join(own)}")
             chosen.update(dict.fromkeys(matching, value))

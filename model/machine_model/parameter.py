@@ -18,7 +18,7 @@ class Parameter:
         low, high: what is physically possible; ±inf where nothing bounds it.
         null: value at which the effect does nothing; None for a number that every model has, and for one that only
             shapes an effect.
-        deviation: expected standard deviation of the real machine from the nominal value; None where nothing is claimed.
+        deviation: expected standard deviation of the real machine from the nominal value; None where none is claimed.
         source: where the value comes from.
         slots: indices in the flat vector that it fills, all with the same value.
         effect: the effect it belongs to; None for a number of the machine itself.

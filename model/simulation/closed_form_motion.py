@@ -45,7 +45,7 @@ def friction_levels(theta_2: Any, theta_3: Any, arms: Any, plain: Any, weight_2:
 
 
 @internal
-def advance(
+def advance(  # noqa: PLR0915 (a step in registers: three joints written out, nothing allocated)
     user: Any,
     state: NDArray[Any], volts: NDArray[Any], start: complex, duration: complex, steps: int,
     joints: NDArray[Any], body: NDArray[Any], flags: NDArray[Any],
@@ -100,9 +100,9 @@ def advance(
             t3 = drive_3 - damping_3 * u3 - y3 * l3
             if special:
                 now = start + step * h + reach
-                t1 += special_torque(user, joints[0], flags[0], now, reach, q1 + dq1, u1, u1, y1, state[0], volts[0])
-                t2 += special_torque(user, joints[1], flags[1], now, reach, p2, u2, u2, y2, state[1], volts[1])
-                t3 += special_torque(user, joints[2], flags[2], now, reach, p3, u3, u3, y3, state[2], volts[2])
+                t1 += special_torque(user, joints[0], flags[0], now, h, q1 + dq1, u1, u1, y1, state[0], volts[0])
+                t2 += special_torque(user, joints[1], flags[1], now, h, p2, u2, u2, y2, state[1], volts[1])
+                t3 += special_torque(user, joints[2], flags[2], now, h, p3, u3, u3, y3, state[2], volts[2])
             if tilted:
                 b1, b2, b3 = horizontal_gravity_torques(q1 + dq1 + offset_1, p2 + offset_2, p3 + offset_3, body)
                 t1, t2, t3 = t1 - b1, t2 - b2, t3 - b3
@@ -110,7 +110,7 @@ def advance(
                 p2 + offset_2, p3 + offset_3, u1, u2, u3, body
             )
             a1, a2, a3 = solve_3(d11, d12, d13, d22, d23, d33, t1 - b1, t2 - b2, t3 - b3)
-            weight = 2.0 if stage == 1 or stage == 2 else 1.0
+            weight = 2.0 if stage in (1, 2) else 1.0
             qs1, qs2, qs3 = qs1 + weight * u1, qs2 + weight * u2, qs3 + weight * u3
             vs1, vs2, vs3 = vs1 + weight * a1, vs2 + weight * a2, vs3 + weight * a3
         dq1, dq2, dq3 = sixth * qs1, sixth * qs2, sixth * qs3

@@ -1,5 +1,7 @@
 """The two kinds of dynamics behind one face: bodies, accelerations, friction levels, gravity. Compiled."""
 
+# ruff: noqa: ARG001 (what an implementation does not need is part of the face all of them share)
+
 from __future__ import annotations
 
 from typing import Any

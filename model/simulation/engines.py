@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,7 +42,8 @@ class Engine:
 
         Threads share the work; the compiled code holds no lock of Python's. Results do not depend on their number.
         """
-        shares = np.ascontiguousarray(vectors[:, : at.SHARED])
+        shares = vectors[:, : at.SHARED].copy()
+        shares[:, at.PERIOD] = np.array([p.period for p in prepared])[which]
         parts = np.ascontiguousarray(vectors[:, at.SHARED :]).reshape(len(vectors), -1, at.PER_JOINT)
         arguments = (
             which, np.array([len(p.set_points) for p in prepared]), _padded([p.set_points for p in prepared]),
@@ -47,17 +52,25 @@ class Engine:
             np.array([p.settings for p in prepared]), step, out,
         )  # fmt: skip
         cores = available_cores() if cores is None else cores
+        self._say_if_it_takes_long()
         if len(which) == 1 or cores == 1:
             self.batch(0, len(which), *arguments)
             return
         edges = np.unique(np.linspace(0, len(which), min(len(which), cores * CHUNKS_A_CORE) + 1).astype(np.int64))
         self.batch(int(edges[0]), int(edges[1]), *arguments)  # here, so that what has to be compiled is compiled once
         with ThreadPoolExecutor(cores) as pool:
-            pieces = [
-                pool.submit(self.batch, int(a), int(b), *arguments) for a, b in zip(edges[1:-1], edges[2:], strict=True)
-            ]
+            pieces = [pool.submit(self.batch, int(a), int(b), *arguments) for a, b in pairwise(edges[1:])]
         for piece in pieces:
             piece.result()
+
+    def _say_if_it_takes_long(self) -> None:
+        name = self.batch.__name__
+        compiler: Any = numba.config
+        if not getattr(self.batch, "signatures", True) and not any(
+            Path(compiler.CACHE_DIR).rglob(f"kernel.{name}-*.nbc")
+        ):
+            sys.stderr.write("Compiling the simulation for this machine, once: some 20 s\n")
+            sys.stderr.flush()
 
 
 def available_cores() -> int:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from model.dynamics.compilation import internal
 from model.machine_model import layout as at
+from model.simulation.dynamics_of_run import accelerate, friction_levels_of
 from model.simulation.joint_torques import (
     DEFLECTION,
     POSITION,
@@ -26,7 +27,6 @@ from model.simulation.joint_torques import (
     special_torque,
     transmitted,
 )
-from model.simulation.dynamics_of_run import accelerate, friction_levels_of
 
 # Rows of the work array (WORK, n): stage values, accelerations, weighted sums.
 Q, V, M, W, TORQUE, A, B, LEVEL, SUM_V, SUM_A, SUM_W, SUM_B = range(12)
@@ -61,7 +61,7 @@ def advance(
                 link = -z * work[LEVEL, j]
                 if flags[j] != 0:
                     link += special_torque(
-                        user, joint, flags[j], now, reach, work[Q, j], work[V, j], turning, z, state[j], volts[j]
+                        user, joint, flags[j], now, h, work[Q, j], work[V, j], turning, z, state[j], volts[j]
                     )
                 if gives:
                     through = transmitted(joint, work[M, j] - work[Q, j], work[W, j] - work[V, j])

@@ -63,6 +63,13 @@ def current_after(joint: NDArray[Any], rise: Any, current: Any, steady: Any, dur
     return steady + (current - steady) * np.exp(-rate * duration)
 
 
+@inlined
+def mean_current(joint: NDArray[Any], rise: Any, current: Any, steady: Any, h: Any) -> Any:
+    """Current that gives a step of h s the impulse of the exact exponential, however short that is beside the step."""
+    turns = joint[at.RESISTANCE] * (1.0 + rise) / joint[at.INDUCTANCE] * h
+    return steady + (current - steady) * (1.0 - np.exp(-turns)) / turns
+
+
 @internal
 def extra_torque(
     joint: NDArray[Any], flags: int, time: complex, q: complex, speed: complex, z: complex, stuck: complex,
@@ -94,17 +101,17 @@ def extra_torque(
 
 @inlined
 def special_torque(
-    user: Any, joint: NDArray[Any], flags: int, time: Any, elapsed: Any, q: Any, speed: Any, rotor_speed: Any, z: Any,
+    user: Any, joint: NDArray[Any], flags: int, time: Any, h: Any, q: Any, speed: Any, rotor_speed: Any, z: Any,
     state: NDArray[Any], volts: Any,
 ) -> Any:  # fmt: skip
     """What inductance, added torques and effects of the user's own add to a joint's torque at a stage of a step.
 
-    `elapsed` s since the step began; `user` is the tag of the user's effects.
+    `h` is the step, s; `user` is the tag of the user's effects.
     """
     steady = steady_current(joint, state[RISE], volts, rotor_speed)
     current = steady
     if flags & at.HAS_INDUCTANCE:
-        current = current_after(joint, state[RISE], state[CURRENT], steady, elapsed)
+        current = mean_current(joint, state[RISE], state[CURRENT], steady, h)
     to_torque = joint[at.GEAR] * joint[at.TORQUE_CONSTANT]
     torque = to_torque * (current - steady)
     torque += extra_torque(joint, flags, time, q, speed, z, state[STUCK], to_torque * current)

@@ -8,9 +8,12 @@ Every entry takes a batch of runs:
     lengths: (t,) periods of each record. set_points: (t, k, n) counts for the board's PID, rad else.
     recorded: (t, k, n) motor volts where nothing controls. noise: (t, k, n) added to the readings before rounding.
     initial: (r, n, 2) position and speed. first_drive: (t, n) commanded volts before the record.
-    shares: (r, SHARED) and parts: (r, n, PER_JOINT), the flat vectors. gains: (t, n, GAINS). flags: (n,). settings: (t, SETTINGS).
+    shares: (r, SHARED) and parts: (r, n, PER_JOINT), the flat vectors. gains: (t, n, GAINS). flags: (n,).
+    settings: (t, SETTINGS).
     step: longest step of integration, s. out: (r, OUTPUTS, k, n), filled.
 """
+
+# ruff: noqa: ARG001 (what an implementation does not need is part of the face all of them share)
 
 from __future__ import annotations
 
@@ -46,8 +49,8 @@ Array = NDArray[Any]
 
 
 def advance_of(
-    kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any, flags: Any,
-    settings: Any, work: Any,
+    kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any,
+    flags: Any, settings: Any, work: Any,
 ) -> None:  # fmt: skip
     """Advances `state` over a stretch of constant motor volts."""
     raise NotImplementedError("for compiled code")
@@ -55,22 +58,22 @@ def advance_of(
 
 @overload(advance_of, jit_options=OPTIONS)
 def _advance_of(
-    kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any, flags: Any,
-    settings: Any, work: Any,
+    kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any,
+    flags: Any, settings: Any, work: Any,
 ) -> Any:  # fmt: skip
     if kind.instance_class is ClosedForm:
 
         def closed_form(
-            kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any, flags: Any,
-    settings: Any, work: Any,
+            kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any,
+            flags: Any, settings: Any, work: Any,
         ) -> None:  # fmt: skip
             closed_form_motion.advance(user, state, volts, start, duration, steps, joints, body, flags)
 
         return closed_form
 
     def general(
-        kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any, flags: Any,
-    settings: Any, work: Any,
+        kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any,
+        flags: Any, settings: Any, work: Any,
     ) -> None:  # fmt: skip
         general_motion.advance(user, kind, state, volts, start, duration, steps, joints, body, flags, settings, work)
 
@@ -80,8 +83,8 @@ def _advance_of(
 @internal
 def batch(
     user: Any, kind: Any, first: int, last: int, which: Array, lengths: Array,
-    set_points: Array, recorded: Array, noise: Array, initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array,
-    flags: Array, settings: Array, step: float, out: Array,
+    set_points: Array, recorded: Array, noise: Array, initial: Array, first_drive: Array, shares: Array, parts: Array,
+    gains: Array, flags: Array, settings: Array, step: float, out: Array,
 ) -> None:  # fmt: skip
     """Runs first … last − 1; `user` and `kind` are tags that choose the user's effects and the dynamics."""
     n = initial.shape[1]
@@ -166,8 +169,8 @@ def at_rest(
 @entry
 def run_closed_form(
     first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
-    initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array, settings: Array, step: float,
-    out: Array,
+    initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array,
+    settings: Array, step: float, out: Array,
 ) -> None:  # fmt: skip
     """The waist-shoulder-elbow arm of rods with rigid transmissions."""
     batch(
@@ -179,8 +182,8 @@ def run_closed_form(
 @entry
 def run_flexible(
     first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
-    initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array, settings: Array, step: float,
-    out: Array,
+    initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array,
+    settings: Array, step: float, out: Array,
 ) -> None:  # fmt: skip
     """The same arm where a transmission gives or has play."""
     batch(
@@ -192,8 +195,8 @@ def run_flexible(
 @entry
 def run_chain(
     first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
-    initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array, settings: Array, step: float,
-    out: Array,
+    initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array,
+    settings: Array, step: float, out: Array,
 ) -> None:  # fmt: skip
     """Any machine."""
     batch(

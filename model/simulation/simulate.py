@@ -18,7 +18,13 @@ from model.machine_model.model import Model
 from model.simulation.engines import engine_for, is_rod_arm
 from model.simulation.inputs import RunInputs, inputs_of
 from model.simulation.period import (
-    OUT_DRIVE, OUT_ERROR, OUT_POSITION, OUT_POWER, OUT_READING, OUT_SPEED, OUTPUTS,
+    OUT_DRIVE,
+    OUT_ERROR,
+    OUT_POSITION,
+    OUT_POWER,
+    OUT_READING,
+    OUT_SPEED,
+    OUTPUTS,
 )  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -191,6 +197,7 @@ class Prepared:
     first_drive: Floats
     gains: Floats
     settings: NDArray[np.int64]
+    period: float
 
 
 def prepare(model: Model, inputs: RunInputs, options: Options) -> Prepared:
@@ -214,7 +221,7 @@ def prepare(model: Model, inputs: RunInputs, options: Options) -> Prepared:
     initial = inputs.initial if options.initial is None else np.ascontiguousarray(options.initial)
     if noise.shape != set_points.shape:
         raise SpecError(f"noise has shape {noise.shape}; {set_points.shape} is needed")
-    return Prepared(set_points, inputs.drive, noise, initial, inputs.first_drive, inputs.gains, settings)
+    return Prepared(set_points, inputs.drive, noise, initial, inputs.first_drive, inputs.gains, settings, inputs.period)
 
 
 def _counts(model: Model, set_points: Floats) -> Floats:

@@ -4,6 +4,8 @@ numba caches nothing that is given a function as an argument. Tags are named tup
 functions here have one implementation a type.
 """
 
+# ruff: noqa: ARG001 (what an implementation does not need is part of the face all of them share)
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -14,7 +16,7 @@ from numba.extending import overload
 
 from model.dynamics.compilation import inlined
 
-OPTIONS = {"error_model": "numpy", "fastmath": {"contract"}}
+OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}}
 
 
 class ClosedForm(NamedTuple):

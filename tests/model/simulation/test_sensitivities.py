@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from daq.contracts.machine import load_machine
-from model.machine_model.model import Model, base_model
+from model.machine_model.model import base_model
 from model.simulation.simulate import Options, sensitivities, simulate
 from tests.model.simulation.records import ramp_inputs
 
@@ -18,7 +18,7 @@ CASES = {
     "joint2.motor.back_emf_constant": 1e-5,
     "joint2.viscous_friction.coefficient": 1e-6,
     "joint3.load_dependent_friction.arm": 1e-4,
-    "controller.delay": 1e-5,
+    "controller.delay": 2e-4,
 }
 
 
