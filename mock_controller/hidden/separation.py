@@ -187,7 +187,7 @@ def _refitted(
     share = 1.0
     for _ in range(refits):
         step = _step(left, moved, known)
-        trial: NDArray[np.float64] = np.clip(moved + share * step, -known.farthest, known.farthest)
+        trial = np.minimum(np.maximum(moved + share * step, -known.farthest), known.farthest)
         left_there = left_at(trial)
         cost_there = float(left_there @ left_there + trial @ trial)
         if cost_there < cost:
@@ -204,8 +204,7 @@ def _step(left: NDArray[np.float64], moved: NDArray[np.float64], known: Tangents
     """By how much to move on from `moved` where `left` is what is left."""
     matrix = known.matrix
     normal = matrix.T @ matrix + np.eye(matrix.shape[1])
-    step: NDArray[np.float64] = np.linalg.solve(normal, matrix.T @ left - moved)
-    return step
+    return np.asarray(np.linalg.solve(normal, matrix.T @ left - moved), dtype=np.float64)
 
 
 def _told(before: float, left: NDArray[np.float64], moved: NDArray[np.float64], known: Tangents) -> Separation:

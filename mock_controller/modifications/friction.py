@@ -105,7 +105,7 @@ class Stiction:
     def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
         bond = self.breakaway * exp(-((rate / self.speed) ** 2))
         moved = self._step_s * rate
-        if bond < 1e-9 * self.breakaway:
+        if bond <= 1e-9 * self.breakaway:
             self._force = 0.0
         elif moved != 0.0:
             steady = bond if moved > 0.0 else -bond

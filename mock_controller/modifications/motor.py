@@ -84,4 +84,4 @@ class ResistanceDrift:
         current = cold_current * self._cold / resistance
         steady = self.thermal_resistance * resistance * current**2
         self._warmer = steady + (self._warmer - steady) * self._keep
-        return self._torque_per_ampere * (current - cold_current)
+        return -self._torque_per_ampere * cold_current * (1.0 - self._cold / resistance)

@@ -66,11 +66,9 @@ class PotentiometerNonlinearity:
 
     def sensed_angle(self, angle: float) -> float:
         x = (angle - self._start) / self._span
-        if self.loading < 0.0:
-            x = 1.0 - (1.0 - x) / (1.0 - self.loading * x * (1.0 - x))
-        else:
-            x /= 1.0 + self.loading * x * (1.0 - x)
-        return self._start + self._span * x
+        sag = abs(self.loading) * x * (1.0 - x)
+        bend = sag / (1.0 + sag) * (x - 1.0 if self.loading < 0.0 else x)
+        return angle - self._span * bend
 
 
 @dataclass
