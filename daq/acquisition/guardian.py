@@ -130,7 +130,7 @@ class Guardian:
 
     def _serve(self, connection: socket.socket) -> None:
         with connection:
-            answer = self._end(EndCause.STOP).model_dump_json().encode() + b"\n"
+            answer = self._end(EndCause.STOP).to_json()
             connection.settimeout(CLIENT_PATIENCE)
             with contextlib.suppress(OSError):
                 connection.sendall(answer)

@@ -24,12 +24,12 @@ def stop(context: typer.Context, json: JsonOption = False) -> None:
     Ends with 0 when every stop was confirmed by its board, with 3 when one was NOT DELIVERED or NOT CONFIRMED, or there
     was no robot. A program's stop never replaces the hardware's own.
     """
-    from daq.acquisition.stop_socket import request_stop
+    from daq.cli import early_stop
 
-    answers = [_answered(attempt) for attempt in request_stop()]
+    answers = [_answered(attempt) for attempt in early_stop.attempts()]
     answers += _stop_configured(invocation(context), {answer.port for answer in answers})
     if json:
-        print_json([answer.model_dump() for answer in answers])
+        print_json([answer.as_data() for answer in answers])
     elif not answers:
         print("no robot is being moved from here, and none is configured: nothing to stop")
     else:

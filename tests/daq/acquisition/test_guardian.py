@@ -134,7 +134,7 @@ def test_a_client_that_comes_while_the_run_ends_is_still_answered() -> None:
         scene.guardian._closing = True  # it looks at its socket no more
         client.connect(scene.listener.getsockname())
     with client:
-        assert StopAnswer.model_validate_json(client.recv(4096)) == CONFIRMED
+        assert StopAnswer.from_json(client.recv(4096)) == CONFIRMED
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")

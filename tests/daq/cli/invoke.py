@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from daq.cli.main import main
+from daq.cli.command import main
 
 
 @dataclass(frozen=True)

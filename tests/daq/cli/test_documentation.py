@@ -19,7 +19,7 @@ from daq.cli import run_result, stop, traces
 from daq.cli.lazy import SUBCOMMANDS
 from daq.contracts.errors import DaqError
 
-entry = importlib.import_module("daq.cli.main")  # the package exports a function of that name
+entry = importlib.import_module("daq.cli.command")
 PAGE = Path(__file__).parents[3].joinpath("docs", "command-line.md").read_text("utf-8")
 EXAMPLES = [shlex.split(text) for text in re.findall(r"\| `daq ([^`]+)` \|", PAGE)]
 

@@ -37,3 +37,11 @@ def test_help_loads_nothing_that_only_the_work_needs(words: list[str]) -> None:
 def test_a_stop_loads_no_more_than_it_needs() -> None:
     """It must be quick: no numbers, no traces, no colours."""
     assert loaded("stop") & {"numpy", "mcap", "rich", "serial", "scipy", "matplotlib"} == set()
+
+
+def test_a_stop_is_asked_for_before_the_command_line_is_loaded() -> None:
+    program = (
+        "import sys, daq.cli.early_stop as early; early.ask(); print('typer' in sys.modules, 'pydantic' in sys.modules)"
+    )
+    run = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True, timeout=60)
+    assert run.stdout.split() == ["False", "False"]
