@@ -38,7 +38,9 @@ def influences(
     Raises ChainError for a prismatic joint.
     """
     acting = acting_parameters(chain, _states(chain.joint_count, states, waist_still))
-    order = [parameter_name(link, which) for link in range(1, chain.joint_count + 1) for which in range(len(PARAMETERS))]
+    order = [
+        parameter_name(link, which) for link in range(1, chain.joint_count + 1) for which in range(len(PARAMETERS))
+    ]
     return tuple(
         Influence(table=table, joint=j, acting=tuple(a), published=tuple(p for p in order if p in named))
         for j, (a, named) in enumerate(zip(acting, published, strict=True), start=1)

@@ -85,7 +85,9 @@ def torques_of_run(model: Model, trace: Trace) -> TorqueAnalysis:
     run = simulate(model, trace, Options(quantise=False))
     period = float(np.median(np.diff(run.time)))
     acceleration = np.gradient(run.velocity, period, axis=0)
-    return torques_along(model, run.time, run.position, run.velocity, acceleration, f"simulation of {trace.record.trace_id}")
+    return torques_along(
+        model, run.time, run.position, run.velocity, acceleration, f"simulation of {trace.record.trace_id}"
+    )
 
 
 def torques_of_trace(model: Model, trace: Trace, width: float = 2.0) -> TorqueAnalysis:
@@ -129,7 +131,7 @@ def torques_along(
         ),
         speed=tuple(SpeedTorque(joint=i + 1, values=_series(speed_torque[:, i])) for i in range(n)),
         gravity=tuple(
-            GravityTorque(joint=i + 1, whole=_series(gravity[:, i]), by_link=tuple(_series(by_link[k, :, i]) for k in range(n)))
+            GravityTorque(joint=i + 1, whole=_series(gravity[:, i]), by_link=tuple(_series(link[:, i]) for link in by_link))
             for i in range(n)
         ),
     )  # fmt: skip
@@ -138,8 +140,8 @@ def torques_along(
 def _element(i: int, j: int, whole: Floats, translation: Floats, rotor: float) -> InertiaElement:
     moved = translation - rotor
     return InertiaElement(
-        row=i + 1, column=j + 1, whole=_series(whole), translation=_series(moved), rotation=_series(whole - translation),
-        rotor=rotor,
+        row=i + 1, column=j + 1, whole=_series(whole), translation=_series(moved),
+        rotation=_series(whole - translation), rotor=rotor,
     )  # fmt: skip
 
 
@@ -167,5 +169,3 @@ def _series(values: Floats) -> Series:
 def largest(values: Series) -> float:
     """Largest magnitude of a series."""
     return float(np.abs(np.array(values)).max())
-
-

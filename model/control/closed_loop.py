@@ -94,14 +94,15 @@ def control(
         gains[:], estimate = law.gains, law.model.vector()
     else:
         gains[:] = law.amplifier * np.array(law.gains)
-    kept = int(round(duration / (step * every))) + 1
+    kept = round(duration / (step * every)) + 1
     out = np.zeros((kept, 4, 3))
     state = np.zeros((3, 3))
     state[0], state[1] = start, start_speed
     _run(plant.vector(), estimate, gains, isinstance(law, Partitioned), wanted.table(), state, step, every, out)
     if not np.isfinite(out).all():
         raise SpecError("the controlled motion does not stay finite: the loop is unstable at these gains")
-    return ControlledMotion(step * every * np.arange(kept), *(np.ascontiguousarray(out[:, k]) for k in range(4)))
+    time = np.asarray(step * every * np.arange(kept), dtype=np.float64)
+    return ControlledMotion(time, *(np.ascontiguousarray(out[:, k]) for k in range(4)))
 
 
 @compiled

@@ -25,7 +25,7 @@ OTHER_START = (math.pi, math.pi / 2, 0.0)
 AMPLITUDE = math.radians(60)
 PERIOD = 3.0
 PHASE = (0.0, -math.pi / 2, 0.0)
-"""rad. Joint 2's is not given: with this one it starts at the lower end of its sinusoid, at rest, and stays in range."""
+"""rad. Joint 2's is not given: with this one it starts at the lower end of its sinusoid and stays in range."""
 DURATION = 9.0
 """s: three periods; the source does not give it."""
 
@@ -109,13 +109,21 @@ def wanted_motion() -> Sinusoid:
 
 def _runs(plant: DrivenArm) -> tuple[_Run, ...]:
     models: tuple[tuple[str, PublishedModel], ...] = (
-        ("case 1: basic", BASIC_WITH_BACK_EMF), ("case 2: viscous", VISCOUS), ("case 3: complete", VISCOUS_AND_COULOMB),
-    )  # fmt: skip
+        ("case 1: basic", BASIC_WITH_BACK_EMF),
+        ("case 2: viscous", VISCOUS),
+        ("case 3: complete", VISCOUS_AND_COULOMB),
+    )
     partitioned = []
     for name, model in models:
         own = model.arm()
-        partitioned.append(_Run(f"{name}, back-EMF of the plant", Partitioned(replace(own, back_emf=plant.back_emf)),
-                                model.table, "plant"))  # fmt: skip
+        partitioned.append(
+            _Run(
+                f"{name}, back-EMF of the plant",
+                Partitioned(replace(own, back_emf=plant.back_emf)),
+                model.table,
+                "plant",
+            )
+        )
         partitioned.append(_Run(f"{name}, back-EMF as tabled", Partitioned(own), model.table, "tabled"))
     return (*partitioned, _Run("PID", ClassicalPid()), _Run("PID from 90°", ClassicalPid(), start=OTHER_START))
 
@@ -125,12 +133,20 @@ def _case(run: _Run, motion: ControlledMotion, wanted: Sinusoid) -> ControlCase:
     swing = [_triple(np.ptp(motion.position[w], axis=0) / np.ptp(motion.wanted[w], axis=0)) for w in (first, last)]
     error = motion.wanted - motion.position
     return ControlCase(
-        name=run.name, law="partitioned" if isinstance(run.law, Partitioned) else "pid", table=run.table,
-        back_emf=run.back_emf, start=run.start, first_amplitude_ratio=swing[0], amplitude_ratio=swing[1],
-        rms=_triple(np.sqrt((error**2).mean(axis=0))), overshoot=_overshoot(motion, wanted),
-        time=tuple(map(float, motion.time)), wanted=_columns(motion.wanted), position=_columns(motion.position),
+        name=run.name,
+        law="partitioned" if isinstance(run.law, Partitioned) else "pid",
+        table=run.table,
+        back_emf=run.back_emf,
+        start=run.start,
+        first_amplitude_ratio=swing[0],
+        amplitude_ratio=swing[1],
+        rms=_triple(np.sqrt((error**2).mean(axis=0))),
+        overshoot=_overshoot(motion, wanted),
+        time=tuple(map(float, motion.time)),
+        wanted=_columns(motion.wanted),
+        position=_columns(motion.position),
         volts=_columns(motion.volts),
-    )  # fmt: skip
+    )
 
 
 def _overshoot(motion: ControlledMotion, wanted: Sinusoid) -> Triple:
@@ -146,46 +162,93 @@ def _overshoot(motion: ControlledMotion, wanted: Sinusoid) -> Triple:
 
 
 def _checks(cases: dict[str, ControlCase]) -> tuple[Check, ...]:
-    one, two, three = (cases[f"{n}, back-EMF of the plant"] for n in ("case 1: basic", "case 2: viscous", "case 3: complete"))
+    one, two, three = (
+        cases[f"{n}, back-EMF of the plant"] for n in ("case 1: basic", "case 2: viscous", "case 3: complete")
+    )
     tabled = [cases[f"{n}, back-EMF as tabled"] for n in ("case 1: basic", "case 2: viscous")]
     pid, other = cases["PID"], cases["PID from 90°"]
     return (
-        Check(name="case 1: every amplitude is clearly reduced", holds=max(one.first_amplitude_ratio) < 0.85,
-              ours=_ratios(one), published="significant reductions on all joints (figure 8.3)"),
-        Check(name="case 2: every joint is better than in case 1", holds=_all_less(two.rms, one.rms),
-              ours=f"{_ratios(two)}; rms {_rms(one)} → {_rms(two)}", published="noticeably better, amplitude enlarged (figure 8.4)"),
-        Check(name="case 3: good agreement", holds=_all_less(three.rms, two.rms) and max(abs(r - 1) for r in three.amplitude_ratio) < 0.05,
-              ours=f"{_ratios(three)}; rms {_rms(three)}", published="good agreement (figure 8.5)"),
-        Check(name="with the tabled back-EMF constants cases 1 and 2 are damped",
-              holds=all(max(c.amplitude_ratio) < 1 for c in tabled),
-              ours="; ".join(_ratios(c) for c in tabled), published="reduced amplitudes on all joints"),
-        Check(name="PID follows with a lag", holds=min(pid.amplitude_ratio) > 0.9, ours=f"{_ratios(pid)}; rms {_rms(pid)}",
-              published="follows nicely, with a phase lag (figure 8.6)"),
-        Check(name="PID from 90°: joint 2 overshoots", holds=math.degrees(other.overshoot[1]) > 2,
-              ours=f"{math.degrees(other.overshoot[1]):.1f}°", published="considerable overshoot (figure 8.7)"),
-        Check(name="PID from 90°: joint 3 overshoots", holds=math.degrees(other.overshoot[2]) > 2,
-              ours=f"{math.degrees(other.overshoot[2]):.1f}°", published="considerable overshoot (figure 8.7)"),
-    )  # fmt: skip
+        Check(
+            name="case 1: every amplitude is clearly reduced",
+            holds=max(one.first_amplitude_ratio) < 0.85,
+            ours=_ratios(one),
+            published="significant reductions on all joints (figure 8.3)",
+        ),
+        Check(
+            name="case 2: every joint is better than in case 1",
+            holds=_all_less(two.rms, one.rms),
+            ours=f"{_ratios(two)}; rms {_rms(one)} → {_rms(two)}",
+            published="noticeably better, amplitude enlarged (figure 8.4)",
+        ),
+        Check(
+            name="case 3: good agreement",
+            holds=_all_less(three.rms, two.rms) and max(abs(r - 1) for r in three.amplitude_ratio) < 0.05,
+            ours=f"{_ratios(three)}; rms {_rms(three)}",
+            published="good agreement (figure 8.5)",
+        ),
+        Check(
+            name="with the tabled back-EMF constants cases 1 and 2 are damped",
+            holds=all(max(c.amplitude_ratio) < 1 for c in tabled),
+            ours="; ".join(_ratios(c) for c in tabled),
+            published="reduced amplitudes on all joints",
+        ),
+        Check(
+            name="PID follows with a lag",
+            holds=min(pid.amplitude_ratio) > 0.9,
+            ours=f"{_ratios(pid)}; rms {_rms(pid)}",
+            published="follows nicely, with a phase lag (figure 8.6)",
+        ),
+        Check(
+            name="PID from 90°: joint 2 overshoots",
+            holds=math.degrees(other.overshoot[1]) > 2,
+            ours=f"{math.degrees(other.overshoot[1]):.1f}°",
+            published="considerable overshoot (figure 8.7)",
+        ),
+        Check(
+            name="PID from 90°: joint 3 overshoots",
+            holds=math.degrees(other.overshoot[2]) > 2,
+            ours=f"{math.degrees(other.overshoot[2]):.1f}°",
+            published="considerable overshoot (figure 8.7)",
+        ),
+    )
 
 
 CHOICES = (
-    Choice(what="phase of joint 2", value="−90°: up from 45° to 165°", why="only said to differ; +90° would leave the joint's range"),
+    Choice(
+        what="phase of joint 2",
+        value="−90°: up from 45° to 165°",
+        why="only said to differ; +90° would leave the joint's range",
+    ),
     Choice(what="start", value="at rest, on the wanted posture", why="the posture is given, the speeds are not"),
     Choice(what="duration", value=f"{DURATION:g} s", why="not given"),
-    Choice(what="gain between PID and motor", value="28", why="(8.5) and (8.7) put the voltage at the amplifier's input"),
-    Choice(what="amplifier", value="linear, without limit, in continuous time", why="as figure 8.2 has it; the PID asks for "
-           "hundreds of volts when it starts off its path, and sampled at 20 ms it is unstable"),
-    Choice(what="sign of Coulomb friction", value="linear within 0.01 rad/s", why="(7.32) to (7.34) print no sign of speed"),
-    Choice(what="inertia of link 3 with its load", value="(7.28) in plant and law", why="what the tables were made with"),
-)  # fmt: skip
+    Choice(
+        what="gain between PID and motor", value="28", why="(8.5) and (8.7) put the voltage at the amplifier's input"
+    ),
+    Choice(
+        what="amplifier",
+        value="linear, without limit, in continuous time",
+        why="as figure 8.2 has it; the PID asks for "
+        "hundreds of volts when it starts off its path, and sampled at 20 ms it is unstable",
+    ),
+    Choice(
+        what="sign of Coulomb friction", value="linear within 0.01 rad/s", why="(7.32) to (7.34) print no sign of speed"
+    ),
+    Choice(
+        what="inertia of link 3 with its load", value="(7.28) in plant and law", why="what the tables were made with"
+    ),
+)
 
 FINDINGS = (
-    "Table 7.5 has K_b1-3 = 0.0378 and K_b2 = 0.0747, the plant (table 7.9) 0.0334 and 0.0369. A law that compensates "
-    "back-EMF with the former feeds back more than there is: joint 1 (and joint 2) swing further than wanted instead of "
-    "less. With the plant's back-EMF in all three laws the runs come out as described. The source must have done that, "
-    "or something that amounts to it.",
-    "Started 45° off its sinusoid, PID drives joint 2 over it; joint 3 is hardly disturbed at a loop gain with the "
-    "amplifier's 28 in it. The overshoot of joint 3 in figure 8.7 does not come out with the printed numbers.",
+    (
+        "Table 7.5 has K_b1-3 = 0.0378 and K_b2 = 0.0747, the plant (table 7.9) 0.0334 and 0.0369. A law that compensates "
+        "back-EMF with the former feeds back more than there is: joint 1 (and joint 2) swing further than wanted, not "
+        "less. With the plant's back-EMF in all three laws the runs come out as described. The source must have done that, "
+        "or something that amounts to it."
+    ),
+    (
+        "Started 45° off its sinusoid, PID drives joint 2 over it; joint 3 is hardly disturbed at a loop gain with the "
+        "amplifier's 28 in it. The overshoot of joint 3 in figure 8.7 does not come out with the printed numbers."
+    ),
 )
 """What the reproduction shows beyond the source."""
 

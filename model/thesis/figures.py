@@ -16,8 +16,11 @@ from model.kinematics.chain import Chain, Joint, Link, inertia_about
 from model.thesis.check import Check
 from model.thesis.published_models import model_of
 from model.thesis.tables import (
-    INFLUENCE_FAST_WAIST, INFLUENCE_SLOW_WAIST, RODS_INFLUENCE, VISCOUS_AND_COULOMB,
-)  # fmt: skip
+    INFLUENCE_FAST_WAIST,
+    INFLUENCE_SLOW_WAIST,
+    RODS_INFLUENCE,
+    VISCOUS_AND_COULOMB,
+)
 
 
 class TorqueFigures(BaseModel):
@@ -39,15 +42,26 @@ def torque_figures(trace: Trace) -> TorqueFigures:
     return TorqueFigures(
         analysis=analysis,
         checks=(
-            Check(name="D12 and D13 are very small", holds=max(d[1, 2], d[1, 3]) < 1e-3 * d[1, 1],
-                  ours=f"at most {max(d[1, 2], d[1, 3]):.2g} of D11 = {d[1, 1]:.3g} kg·m²", published="very small (figure 7.12)"),
-            Check(name="D22 is much larger than D23", holds=d[2, 2] > 5 * d[2, 3],
-                  ours=f"{d[2, 2]:.3g} against {d[2, 3]:.3g} kg·m²", published="much larger (figure 7.12)"),
-            Check(name="joints interact mainly through gravity", holds=by_gravity > 2 * by_inertia,
-                  ours=f"link 3 weighs on joint 2 with {by_gravity:.3g} N·m, inertia couples with at most {by_inertia:.3g} N·m",
-                  published="mainly gravity torques (figures 7.13, 7.14)"),
+            Check(
+                name="D12 and D13 are very small",
+                holds=max(d[1, 2], d[1, 3]) < 1e-3 * d[1, 1],
+                ours=f"at most {max(d[1, 2], d[1, 3]):.2g} of D11 = {d[1, 1]:.3g} kg·m²",
+                published="very small (figure 7.12)",
+            ),
+            Check(
+                name="D22 is much larger than D23",
+                holds=d[2, 2] > 5 * d[2, 3],
+                ours=f"{d[2, 2]:.3g} against {d[2, 3]:.3g} kg·m²",
+                published="much larger (figure 7.12)",
+            ),
+            Check(
+                name="joints interact mainly through gravity",
+                holds=by_gravity > 2 * by_inertia,
+                ours=f"link 3 weighs {by_gravity:.3g} N·m on joint 2, inertia couples at most {by_inertia:.3g} N·m",
+                published="mainly gravity torques (figures 7.13, 7.14)",
+            ),
         ),
-    )  # fmt: skip
+    )
 
 
 def influence_tables() -> tuple[Influence, ...]:
@@ -86,5 +100,9 @@ def _rods() -> tuple[Influence, ...]:
     for link, named in enumerate(RODS_INFLUENCE, start=1):
         own = parameters_about_joint(chain, link)
         names = [parameter_name(link, k) for k in range(len(PARAMETERS)) if abs(own[k]) > 1e-12]
-        found.append(Influence(table="5.3", joint=link, acting=tuple(n for n in names if n in acting), published=tuple(sorted(named))))
+        found.append(
+            Influence(
+                table="5.3", joint=link, acting=tuple(n for n in names if n in acting), published=tuple(sorted(named))
+            )
+        )
     return tuple(found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict
@@ -18,8 +19,14 @@ from model.simulation.simulate import Options
 from model.thesis.check import Check, Choice
 from model.thesis.published_models import FRICTION_SYMBOLS, PARAMETER, model_of, unfitted
 from model.thesis.tables import (
-    BASIC, DATA_SHEET_BACK_EMF_2, LADDER, RESISTANCE, TORQUE_CONSTANT, UNOPTIMISED, PublishedModel,
-)  # fmt: skip
+    BASIC,
+    DATA_SHEET_BACK_EMF_2,
+    LADDER,
+    RESISTANCE,
+    TORQUE_CONSTANT,
+    UNOPTIMISED,
+    PublishedModel,
+)
 from model.validation.criterion import Fidelity
 from model.validation.expected_deviation import gaussian_share
 from model.validation.fidelity import validate_by_distortion
@@ -77,9 +84,14 @@ class Ladder(_Part):
 
 
 def climb_ladder(
-    traces: Sequence[Trace], method: Method = "nelder_mead", *, published_inertia: bool = True,
-    evaluations: int | None = None, progress: Progress = silent, cancel: Cancel | None = None,
-) -> Ladder:  # fmt: skip
+    traces: Sequence[Trace],
+    method: Method = "nelder_mead",
+    *,
+    published_inertia: bool = True,
+    evaluations: int | None = None,
+    progress: Progress = silent,
+    cancel: Cancel | None = None,
+) -> Ladder:
     """Fit the four models to the traces and validate each by distortion.
 
     Args:
@@ -103,40 +115,74 @@ def climb_ladder(
     start = model_of(UNOPTIMISED, machine, published_inertia=published_inertia)
     before = squared_error(start, traces, (), None, Options(quantise=False))
     return Ladder(
-        method=method, traces=tuple(t.record.trace_id for t in traces),
-        unoptimised_error=float(before.total(start.vector[None, :0])[0]), steps=tuple(steps),
-        checks=ladder_checks(steps), choices=_choices(published_inertia, method),
-    )  # fmt: skip
+        method=method,
+        traces=tuple(t.record.trace_id for t in traces),
+        unoptimised_error=float(before.total(start.vector[None, :0])[0]),
+        steps=tuple(steps),
+        checks=ladder_checks(steps),
+        choices=_choices(published_inertia),
+    )
 
 
 def _step(
-    published: PublishedModel, traces: Sequence[Trace], machine: Machine, method: Method, published_inertia: bool,
-    evaluations: int | None, progress: Progress, cancel: Cancel | None,
-) -> LadderStep:  # fmt: skip
+    published: PublishedModel,
+    traces: Sequence[Trace],
+    machine: Machine,
+    method: Method,
+    published_inertia: bool,
+    evaluations: int | None,
+    progress: Progress,
+    cancel: Cancel | None,
+) -> LadderStep:
     start = unfitted(published, machine, published_inertia=published_inertia)
     names = tuple(PARAMETER[symbol] for symbol in published.free)
     bounds = {PARAMETER[symbol]: _bounds(symbol) for symbol in published.free}
-    priors: dict[str, Prior | None] = {}
-    if method == "least_squares" and "Kb2" in published.values:
-        priors[PARAMETER["Kb2"]] = Prior(expected=DATA_SHEET_BACK_EMF_2, deviation=BACK_EMF_DEVIATION)
+    priors = {PARAMETER[symbol]: _prior(symbol) for symbol in published.free}
     options = PLAIN.model_copy(
-        update={"parameters": names, "bounds": bounds, "priors": priors, "method": method, "most_evaluations": evaluations}
+        update={
+            "parameters": names,
+            "bounds": bounds,
+            "priors": priors,
+            "method": method,
+            "most_evaluations": evaluations,
+        }
     )
     found = fit(start, traces, options, lambda f, text: progress(0.8 * f, text), cancel)
     fidelity = validate_by_distortion(
-        found.model, traces, names, options=Options(quantise=False), curve_points=CURVE_POINTS,
-        progress=lambda f, text: progress(0.8 + 0.2 * f, text), cancel=cancel,
-    )  # fmt: skip
+        found.model,
+        traces,
+        names,
+        options=Options(quantise=False),
+        curve_points=CURVE_POINTS,
+        progress=lambda f, text: progress(0.8 + 0.2 * f, text),
+        cancel=cancel,
+    )
     return LadderStep(
-        name=published.name, table=published.table, values={s: _value(found.model, s) for s in published.free},
-        published_values=published.values, error=fidelity.error, error_by_joint=fidelity.error_by_joint,
-        published_error=published.mean_squared_error, fidelity=fidelity, published_sum=published.sum_lambda or 0.0,
-        evaluations=found.evaluations, seconds=found.seconds,
-    )  # fmt: skip
+        name=published.name,
+        table=published.table,
+        values={s: _value(found.model, s) for s in published.free},
+        published_values=published.values,
+        error=fidelity.error,
+        error_by_joint=fidelity.error_by_joint,
+        published_error=published.mean_squared_error,
+        fidelity=fidelity,
+        published_sum=published.sum_lambda or 0.0,
+        evaluations=found.evaluations,
+        seconds=found.seconds,
+    )
 
 
 def _value(model: Model, symbol: str) -> float:
     return model.parameter(PARAMETER[symbol]).value
+
+
+def _prior(symbol: str) -> Prior:
+    """Where a parameter stays if the record does not move it. Hill climbing takes its first steps from it, no more."""
+    if symbol == "Kb2":
+        return Prior(expected=DATA_SHEET_BACK_EMF_2, deviation=BACK_EMF_DEVIATION)
+    if symbol in FRICTION_SYMBOLS:
+        return Prior(expected=0.0, deviation=_bounds(symbol)[1])
+    return Prior(expected=UNOPTIMISED.values[symbol], deviation=UNOPTIMISED.values[symbol])
 
 
 def _bounds(symbol: str) -> tuple[float, float]:
@@ -157,23 +203,49 @@ def ladder_checks(steps: Sequence[LadderStep]) -> tuple[Check, ...]:
     shares = [c / s.fidelity.sum_of_contributions for s in steps for c in _link_1(s.fidelity)]
     worst_first = 1 + max(range(3), key=lambda j: steps[0].error_by_joint[j])
     return (
-        Check(name="the squared error falls at every step", holds=_falls(errors),
-              ours=" → ".join(f"{e:.4g}" for e in errors), published="1.4651e-3 → 9.988e-4 → 9.494e-4 → 7.488e-4 rad²"),
-        Check(name="Σλ² rises at every step", holds=_falls([-s for s in sums]),
-              ours=" → ".join(f"{s:.4g}" for s in sums), published="0.2449 → 0.4431 → 0.5973 → 0.9313"),
-        Check(name="without friction K_b2 inflates", holds=back_emf[0] > 1.5 * DATA_SHEET_BACK_EMF_2,
-              ours=f"{back_emf[0]:.4f} V·s/rad, {back_emf[0] / DATA_SHEET_BACK_EMF_2:.2f} × the data sheet",
-              published="0.0747 V·s/rad, 2.24 × the data sheet"),
-        Check(name="with viscous friction K_b2 returns", holds=all(abs(b / DATA_SHEET_BACK_EMF_2 - 1) < 0.25 for b in back_emf[1:]),
-              ours=" and ".join(f"{b:.4f}" for b in back_emf[1:]) + " V·s/rad", published="0.0371 and 0.0369 V·s/rad"),
-        Check(name="all damping of joint 2, K_b2 + v_eff2 R/K_T, is the same in every model that fits it",
-              holds=max(damping) < 1.15 * min(damping), ours=" → ".join(f"{d:.4f}" for d in damping) + " V·s/rad",
-              published=" → ".join(f"{joint_2_damping(m.values):.4f}" for m in LADDER[1:]) + " V·s/rad"),
-        Check(name="m1 and R1 are insensitive in every model", holds=max(shares, default=0.0) < 0.01,
-              ours=f"together at most {2 * max(shares, default=0.0):.2g} of Σλ²", published="very large deviations in all four"),
-        Check(name="joint 2 fits worst in the basic model", holds=worst_first == 2, ours=f"joint {worst_first}",
-              published="joint 2"),
-    )  # fmt: skip
+        Check(
+            name="the squared error falls at every step",
+            holds=_falls(errors),
+            ours=" → ".join(f"{e:.4g}" for e in errors),
+            published="1.4651e-3 → 9.988e-4 → 9.494e-4 → 7.488e-4 rad²",
+        ),
+        Check(
+            name="Σλ² rises at every step",
+            holds=_falls([-s for s in sums]),
+            ours=" → ".join(f"{s:.4g}" for s in sums),
+            published="0.2449 → 0.4431 → 0.5973 → 0.9313",
+        ),
+        Check(
+            name="without friction K_b2 inflates",
+            holds=back_emf[0] > 1.5 * DATA_SHEET_BACK_EMF_2,
+            ours=f"{back_emf[0]:.4f} V·s/rad, {back_emf[0] / DATA_SHEET_BACK_EMF_2:.2f} × the data sheet",
+            published="0.0747 V·s/rad, 2.24 × the data sheet",
+        ),
+        Check(
+            name="with viscous friction K_b2 returns",
+            holds=all(abs(b / DATA_SHEET_BACK_EMF_2 - 1) < 0.25 for b in back_emf[1:]),
+            ours=" and ".join(f"{b:.4f}" for b in back_emf[1:]) + " V·s/rad",
+            published="0.0371 and 0.0369 V·s/rad",
+        ),
+        Check(
+            name="all damping of joint 2, K_b2 + v_eff2 R/K_T, is the same in every model that fits it",
+            holds=max(damping) < 1.15 * min(damping),
+            ours=" → ".join(f"{d:.4f}" for d in damping) + " V·s/rad",
+            published=" → ".join(f"{joint_2_damping(m.values):.4f}" for m in LADDER[1:]) + " V·s/rad",
+        ),
+        Check(
+            name="m1 and R1 are insensitive in every model",
+            holds=max(shares, default=0.0) < 0.01,
+            ours=f"together at most {2 * max(shares, default=0.0):.2g} of Σλ²",
+            published="very large deviations in all four",
+        ),
+        Check(
+            name="joint 2 fits worst in the basic model",
+            holds=worst_first == 2,
+            ours=f"joint {worst_first}",
+            published="joint 2",
+        ),
+    )
 
 
 def joint_2_damping(values: dict[str, float]) -> float:
@@ -186,24 +258,39 @@ def _link_1(fidelity: Fidelity) -> list[float]:
 
 
 def _falls(values: Sequence[float]) -> bool:
-    return all(b < a for a, b in zip(values, values[1:], strict=False))
+    return all(b < a for a, b in pairwise(values))
 
 
-def _choices(published_inertia: bool, method: Method) -> tuple[Choice, ...]:
+def _choices(published_inertia: bool) -> tuple[Choice, ...]:
     lengths = ", ".join(f"{s} {UNOPTIMISED.values[s]:g}" for s in BASIC.free[:7])
     return (
-        Choice(what="upper bounds of masses and lengths", value=f"{MASS_AND_LENGTH_FACTOR:g} × table 7.2 ({lengths})",
-               why="the source gives 5 × for link 1 and a torque argument without numbers for the others"),
-        Choice(what="upper bounds of K_b, v_eff, μ̃",
-               value=f"{LARGEST_BACK_EMF} V·s/rad, {LARGEST_VISCOUS} N·m·s/rad, {LARGEST_FRICTION_ARM} m",
-               why="found by trial in the source, not printed"),
-        *(() if method == "nelder_mead" else (Choice(
-            what="expected K_b2", value=f"{DATA_SHEET_BACK_EMF_2} ± {BACK_EMF_DEVIATION:.4f} V·s/rad in every model that fits it",
-            why="least squares needs something to decide between K_b2 and v_eff2, which the record cannot tell apart"),)),
-        Choice(what="inertia of link 3 with its load", value="(7.28)" if published_inertia else "exact",
-               why="(7.28) is what the tables were made with" if published_inertia else "asked for"),
-        Choice(what="where a fit starts", value="table 7.2, K_b2 from the data sheet, friction at zero",
-               why="as in the source. K_b2 and v_eff2 both damp in proportion to speed: voltage in and position out "
-                   "cannot tell one from the other, so where they end between them depends on the start"),
+        Choice(
+            what="upper bounds of masses and lengths",
+            value=f"{MASS_AND_LENGTH_FACTOR:g} × table 7.2 ({lengths})",
+            why="the source gives 5 × for link 1 and a torque argument without numbers for the others",
+        ),
+        Choice(
+            what="upper bounds of K_b, v_eff, μ̃",
+            value=f"{LARGEST_BACK_EMF} V·s/rad, {LARGEST_VISCOUS} N·m·s/rad, {LARGEST_FRICTION_ARM} m",
+            why="found by trial in the source, not printed",
+        ),
+        Choice(
+            what="what parameters do that the record does not move",
+            value=f"K_b2 at {DATA_SHEET_BACK_EMF_2} ± {BACK_EMF_DEVIATION:.4f} V·s/rad, friction at 0 ± its upper bound, "
+            "the others at table 7.2 ± 100 %",
+            why="least squares needs it to decide between K_b2 and v_eff2, which the record cannot tell apart; "
+            "hill climbing takes its first steps from it and no more",
+        ),
+        Choice(
+            what="inertia of link 3 with its load",
+            value="(7.28)" if published_inertia else "exact",
+            why="(7.28) is what the tables were made with" if published_inertia else "asked for",
+        ),
+        Choice(
+            what="where a fit starts",
+            value="table 7.2, K_b2 from the data sheet, friction at zero",
+            why="as in the source. K_b2 and v_eff2 both damp in proportion to speed: voltage in and position out "
+            "cannot tell one from the other, so where they end between them depends on the start",
+        ),
         Choice(what="rounding in the simulated loop", value="left out", why="the source's simulation has none"),
-    )  # fmt: skip
+    )

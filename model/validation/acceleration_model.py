@@ -81,7 +81,9 @@ def _accelerations(model: Model, motion: MeasuredMotion, vector: NDArray[Any]) -
     volts = smoothed(averaged_volts(motion.drive, motion.period, vector), motion.width)
     out = np.zeros(motion.position.shape, dtype=vector.dtype)
     run = _along_rods if rods else _along_chain
-    signals = (np.ascontiguousarray(s, dtype=vector.dtype) for s in (motion.position, motion.speed, motion.friction, volts))
+    signals = (
+        np.ascontiguousarray(s, dtype=vector.dtype) for s in (motion.position, motion.speed, motion.friction, volts)
+    )
     run(*signals, motion.time, np.ascontiguousarray(vector), model.flags, settings, out)
     return out
 

@@ -14,7 +14,14 @@ from daq.contracts.trace import Trace
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 from model.simulation.simulate import Options
-from model.validation.criterion import DAMPING_RATIO, Curve, Fidelity, ParameterDistortion, contribution, required_deviation
+from model.validation.criterion import (
+    DAMPING_RATIO,
+    Curve,
+    Fidelity,
+    ParameterDistortion,
+    contribution,
+    required_deviation,
+)
 from model.validation.doubling import Doubling, doubling_changes
 from model.validation.expected_deviation import Convention, expected_deviation
 from model.validation.squared_error import SquaredError, squared_error
@@ -58,9 +65,7 @@ def validate_by_distortion(
     least, doublings = doubling_changes(
         error.total, best, low, high, expected, lambda f, text: progress(share * f, text), cancel
     )
-    distortions = [
-        _distortion(p, d, convention, damping_ratio) for p, d in zip(parameters, doublings, strict=True)
-    ]
+    distortions = [_distortion(p, d, convention, damping_ratio) for p, d in zip(parameters, doublings, strict=True)]
     curves = _curves(error, parameters, distortions, low, high, curve_points, progress, cancel) if curve_points else ()
     return Fidelity(
         model=model.identity, traces=tuple(t.record.trace_id for t in traces), outputs=error.outputs,
@@ -120,10 +125,9 @@ def _curves(
         progress(0.8 + 0.2 * k / len(parameters), f"error curve of {parameter.name}")
         down, up = distortion.change_down, distortion.change_up
         fallback = up or down or 5 * distortion.expected
-        values = np.linspace(
-            max(low[k], best[k] - CURVE_REACH * (down or fallback)), min(high[k], best[k] + CURVE_REACH * (up or fallback)),
-            points,
-        )  # fmt: skip
+        first = max(low[k], best[k] - CURVE_REACH * (down or fallback))
+        last = min(high[k], best[k] + CURVE_REACH * (up or fallback))
+        values = np.linspace(first, last, points)  # fmt: skip
         sets = np.tile(best, (points, 1))
         sets[:, k] = values
         errors = tuple(float(e) if np.isfinite(e) else None for e in error.total(sets))

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from model.machine_model.model import Model
 from model.analysis.bodies import gravity_loads
+from model.machine_model.model import Model
 from model.validation.measured_motion import Observation
 
 Floats = NDArray[np.float64]

@@ -169,7 +169,7 @@ def _variation(
 
 
 def _alone(residual: Floats, column: Floats, observation: Observation) -> tuple[float, float]:
-    """Shares of the residual's energy, less noise, that one parameter explains: as a constant, as a function of time."""
+    """Shares of the residual's energy, less noise, that one parameter explains: as a constant, and varying."""
     r, j = residual / observation.noise, column / observation.noise
     energy = float((r**2).sum()) - float(observation.usable.sum())
     squares = (j**2).sum(axis=1)

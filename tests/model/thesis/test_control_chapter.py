@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import pytest
 
@@ -19,7 +20,7 @@ def test_better_models_follow_better(chapter: ControlChapter) -> None:
     names = ("case 1: basic", "case 2: viscous", "case 3: complete")
     cases = [chapter.case(f"{n}, back-EMF of the plant") for n in names]
     assert max(cases[0].first_amplitude_ratio) < 0.8
-    for worse, better in zip(cases, cases[1:], strict=False):
+    for worse, better in pairwise(cases):
         assert all(b < w for w, b in zip(worse.rms, better.rms, strict=True))
     assert cases[2].amplitude_ratio == pytest.approx((1, 1, 1), abs=0.01)
 

@@ -31,7 +31,9 @@ def ramp_trace(plant: Model, seconds: float = 1.6, seed: int = 0) -> Trace:
 def swinging_trace(plant: Model, seconds: float = 6.0, seed: int = 0) -> Trace:
     """Two sines a joint, out of step."""
     time = np.maximum(PERIOD * np.arange(round(seconds / PERIOD)) - 0.2, 0)
-    waves = [np.sin(2 * np.pi * (0.4 + 0.13 * j) * time) + 0.5 * np.sin(2 * np.pi * (1.1 + 0.2 * j) * time) for j in range(3)]
+    waves = [
+        np.sin(2 * np.pi * (0.4 + 0.13 * j) * time) + 0.5 * np.sin(2 * np.pi * (1.1 + 0.2 * j) * time) for j in range(3)
+    ]
     return _run(plant, np.array(START) + np.radians(20) * np.stack(waves, axis=1), seed)
 
 

@@ -40,7 +40,9 @@ def test_exact_derivatives_agree_with_finite_differences(model: Model) -> None:
         above, below = (
             expected_accelerations(model.with_values({name: value + s}), motion, ())[0] for s in (step, -step)
         )
-        np.testing.assert_allclose(derivative, (above - below) / (2 * step), rtol=1e-4, atol=1e-4 * np.abs(derivative).max())
+        np.testing.assert_allclose(
+            derivative, (above - below) / (2 * step), rtol=1e-4, atol=1e-4 * np.abs(derivative).max()
+        )
 
 
 def test_too_little_damping_shows_as_that_parameter_and_as_a_constant(model: Model) -> None:
