@@ -131,7 +131,9 @@ def torques_along(
         ),
         speed=tuple(SpeedTorque(joint=i + 1, values=_series(speed_torque[:, i])) for i in range(n)),
         gravity=tuple(
-            GravityTorque(joint=i + 1, whole=_series(gravity[:, i]), by_link=tuple(_series(link[:, i]) for link in by_link))
+            GravityTorque(
+                joint=i + 1, whole=_series(gravity[:, i]), by_link=tuple(_series(link[:, i]) for link in by_link)
+            )
             for i in range(n)
         ),
     )  # fmt: skip

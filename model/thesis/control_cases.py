@@ -240,14 +240,15 @@ CHOICES = (
 
 FINDINGS = (
     (
-        "Table 7.5 has K_b1-3 = 0.0378 and K_b2 = 0.0747, the plant (table 7.9) 0.0334 and 0.0369. A law that compensates "
-        "back-EMF with the former feeds back more than there is: joint 1 (and joint 2) swing further than wanted, not "
-        "less. With the plant's back-EMF in all three laws the runs come out as described. The source must have done that, "
-        "or something that amounts to it."
+        "Table 7.5 has K_b1-3 = 0.0378 and K_b2 = 0.0747, the plant (table 7.9) 0.0334 and 0.0369. A law that "
+        "compensates back-EMF with the former feeds back more than there is: joint 1 (and joint 2) swing further "
+        "than wanted, not less. With the plant's back-EMF in all three laws the runs come out as described. The "
+        "source must have done that, or something that amounts to it."
     ),
     (
-        "Started 45° off its sinusoid, PID drives joint 2 over it; joint 3 is hardly disturbed at a loop gain with the "
-        "amplifier's 28 in it. The overshoot of joint 3 in figure 8.7 does not come out with the printed numbers."
+        "Started 45° off its sinusoid, PID drives joint 2 over it; joint 3 is hardly disturbed at a loop gain "
+        "with the amplifier's 28 in it. The overshoot of joint 3 in figure 8.7 does not come out with the printed "
+        "numbers."
     ),
 )
 """What the reproduction shows beyond the source."""

@@ -276,7 +276,7 @@ def _choices(published_inertia: bool) -> tuple[Choice, ...]:
         ),
         Choice(
             what="what parameters do that the record does not move",
-            value=f"K_b2 at {DATA_SHEET_BACK_EMF_2} ± {BACK_EMF_DEVIATION:.4f} V·s/rad, friction at 0 ± its upper bound, "
+            value=f"K_b2 at {DATA_SHEET_BACK_EMF_2} ± {BACK_EMF_DEVIATION:.4f} V·s/rad, friction 0 ± its upper bound, "
             "the others at table 7.2 ± 100 %",
             why="least squares needs it to decide between K_b2 and v_eff2, which the record cannot tell apart; "
             "hill climbing takes its first steps from it and no more",

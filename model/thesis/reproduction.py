@@ -121,18 +121,19 @@ def _experiment(traces: Sequence[Trace]) -> tuple[Choice, ...]:
 
 FINDINGS = (
     (
-        "The published Σλ² follow from the published tables with τ′ = â/(3√2) for K_b, v_eff and μ̃, not with â/3, which "
-        "the text describes and which gives 42 to 46 % more."
+        "The published Σλ² follow from the published tables with τ′ = â/(3√2) for K_b, v_eff and μ̃, not with "
+        "â/3, which the text describes and which gives 42 to 46 % more."
     ),
     (
-        "Table 5.1 names too many parameters for the waist: the shoulder lies on the waist's axis, so mass and centre of "
-        "link 2 have no arm there, and I*zz of links 2 and 3 acts about axes at right angles to it. Table 5.2 names too many "
-        "for it too: with the waist at rest, links 2 and 3 reach it through products of inertia and offsets along z alone."
+        "Table 5.1 names too many parameters for the waist: the shoulder lies on the waist's axis, so mass and "
+        "centre of link 2 have no arm there, and I*zz of links 2 and 3 acts about axes at right angles to it. "
+        "Table 5.2 names too many for it too: with the waist at rest, links 2 and 3 reach it through products of "
+        "inertia and offsets along z alone."
     ),
     (
-        "K_b2 and v_eff2 cannot be told apart by voltage and position: only K_b2 + v_eff2 R/K_T can. It is 0.0747, 0.0707 "
-        "and 0.0714 V·s/rad in tables 7.5, 7.7 and 7.9; that K_b2 returns to its data sheet once viscous friction is in the "
-        "model is a matter of where the fit starts, not of the record."
+        "K_b2 and v_eff2 cannot be told apart by voltage and position: only K_b2 + v_eff2 R/K_T can. It is "
+        "0.0747, 0.0707 and 0.0714 V·s/rad in tables 7.5, 7.7 and 7.9; that K_b2 returns to its data sheet once "
+        "viscous friction is in the model is a matter of where the fit starts, not of the record."
     ),
 )
 """What the reproduction shows beyond the source."""
