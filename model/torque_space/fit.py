@@ -1,0 +1,133 @@
+"""Parameters from recorded torques, with what the records cannot tell, and the torque that is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from daq.contracts.progress import Cancel, Never, Progress, silent
+from daq.contracts.trace import Trace
+from model.fitting.choice import chosen_unknowns
+from model.fitting.least_squares import Search, solve
+from model.fitting.options import FitOptions
+from model.fitting.problem import whitened
+from model.fitting.records import records_of
+from model.fitting.whitening import fitted_whitener, white
+from model.identifiability.report import IdentifiabilityReport, judged
+from model.machine_model.model import Lineage, Model
+from model.torque_space.problem import TorqueProblem
+from model.torque_space.recorded_motion import CUTOFF, recorded_motion
+
+Floats = NDArray[np.float64]
+
+LONGEST_MEMORY = 40
+"""Samples that the whitening of torques looks back: a low-passed residual is correlated over many."""
+
+
+class TorqueError(BaseModel):
+    """One trace: root mean square of what is left of each joint's torque, and as a share of the torque (0 to …)."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    trace: str
+    held_out: bool
+    rms: tuple[float, ...]
+    torque: tuple[float, ...]
+    share: float
+
+
+class TorqueFit(BaseModel):
+    """What a fit of torques found. `in_sample` and `held_out` are relative torque errors over all joints and samples:
+    √(Σ residual² / Σ torque²)."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    model: Model
+    identifiability: IdentifiabilityReport
+    errors: tuple[TorqueError, ...]
+    in_sample: float
+    held_out: float | None
+    cutoff: float
+    evaluations: int
+    converged: bool
+
+
+def fit_torques(
+    model: Model, traces: Sequence[Trace], held_out: Sequence[Trace] = (), options: FitOptions | None = None, *,
+    cutoff: float = CUTOFF, progress: Progress = silent, cancel: Cancel | None = None,
+) -> TorqueFit:  # fmt: skip
+    """Fit the parameters that the options choose so that the motion needs the torque that was recorded.
+
+    Least squares with priors; the verdicts take the correlation of the residual into account.
+
+    Raises:
+        TraceError, SpecError: for traces or options that cannot give a result. CancelledError: when asked to end.
+    """
+    options, cancel = options or FitOptions(), cancel or Never()
+    records_of([*traces, *held_out], model.machine, "position")
+    unknowns = chosen_unknowns(model, options)
+    progress(0.0, "low-passing the records")
+    records = tuple(recorded_motion(model, t, cutoff) for t in traces)
+    problem = TorqueProblem(model, records, unknowns, np.ones(model.joint_count))
+    begin = np.array([u.start for u in unknowns])
+    scale = _left(problem, begin)
+
+    def tell(count: int, rms: float) -> None:
+        progress(0.9 * (1 - float(np.exp(-count / 10))), f"{count} evaluations, residual {rms:.3g} of the first")
+
+    search = Search(options.robust, options.tolerance, options.most_evaluations or 60, tell)
+    found = solve(problem, [white(float(s)) for s in scale], begin, cancel, search)
+    report = _judged(problem, found.values)
+    fitted = model.with_values({u.name: float(v) for u, v in zip(unknowns, found.values, strict=True)})
+    names = tuple(t.record.trace_id for t in traces)
+    errors = [_error(problem, found.values, t, model, cutoff, held=False) for t in traces]
+    errors += [_error(problem, found.values, t, model, cutoff, held=True) for t in held_out]
+    own = [u.name for u in unknowns]
+    lineage = Lineage(parent=model.identity, traces=names, fit={"fitted": own, "known": list(report.known)})
+    progress(1.0, "done")
+    return TorqueFit(
+        model=fitted.with_lineage(lineage), identifiability=report, errors=tuple(e for e, _, _ in errors),
+        in_sample=_share(errors[: len(traces)]), held_out=_share(errors[len(traces) :]) if held_out else None,
+        cutoff=cutoff, evaluations=found.evaluations, converged=found.converged,
+    )  # fmt: skip
+
+
+def _left(problem: TorqueProblem, values: Floats) -> Floats:
+    every = np.concatenate([e.residual for e in problem.evaluate(values, derivatives=False)])
+    return np.asarray(np.sqrt((every**2).mean(axis=0)))
+
+
+def _judged(problem: TorqueProblem, values: Floats) -> IdentifiabilityReport:
+    evaluations = problem.evaluate(values, derivatives=True)
+    whiteners = [
+        fitted_whitener([e.residual[:, j] for e in evaluations], LONGEST_MEMORY, 1e-9)
+        for j in range(problem.model.joint_count)
+    ]
+    data = whitened(problem, evaluations, whiteners)
+    return judged(data.jacobian.reshape(data.residual.size, -1), values, problem.unknowns)
+
+
+def _error(
+    problem: TorqueProblem, values: Floats, trace: Trace, model: Model, cutoff: float, *, held: bool
+) -> tuple[TorqueError, float, float]:
+    """The error of one trace, and the sums of squares of residual and torque."""
+    record = recorded_motion(model, trace, cutoff)
+    left = problem.with_records([record]).evaluate(values, derivatives=False)[0].residual
+    torque = record.torque[record.kept]
+    squares, whole = float((left**2).sum()), float((torque**2).sum())
+    error = TorqueError(
+        trace=trace.record.trace_id, held_out=held, rms=_rms(left), torque=_rms(torque),
+        share=float(np.sqrt(squares / whole)),
+    )  # fmt: skip
+    return error, squares, whole
+
+
+def _rms(signal: Floats) -> tuple[float, ...]:
+    return tuple(float(v) for v in np.sqrt((signal**2).mean(axis=0)))
+
+
+def _share(errors: Sequence[tuple[TorqueError, float, float]]) -> float:
+    return float(np.sqrt(sum(e[1] for e in errors) / sum(e[2] for e in errors)))

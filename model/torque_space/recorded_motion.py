@@ -1,0 +1,77 @@
+"""A record on an even grid, low-passed without delay, with its accelerations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, filtfilt
+
+from daq.contracts.errors import SpecError, TraceError
+from daq.contracts.trace import Trace
+from model.machine_model import layout as at
+from model.machine_model.model import Model
+from model.simulation.inputs import inputs_of
+from model.validation.acceleration_model import MeasuredMotion
+from model.validation.differentiation import WIDTHS
+
+Floats = NDArray[np.float64]
+
+CUTOFF = 12.0
+"""Hz of the low-pass, by default."""
+ORDER = 4
+EDGE = 0.1
+"""s at both ends of a record that are left out: the low-pass knows nothing beyond them."""
+
+
+@dataclass(frozen=True)
+class RecordedMotion:
+    """Low-passed motion; acceleration and torque (k, n) go with it, and `kept` (k,) are the samples to use."""
+
+    motion: MeasuredMotion
+    acceleration: Floats
+    torque: Floats
+    kept: slice
+
+
+def recorded_motion(model: Model, trace: Trace, cutoff: float = CUTOFF) -> RecordedMotion:
+    """The motion of a trace, low-passed at `cutoff` (Hz) forwards and backwards.
+
+    Accelerations are differences of the measured speed where the trace has one, of the position otherwise.
+
+    Raises:
+        TraceError: for a trace without drive or shorter than a second. SpecError: for a cutoff that the sampling
+            cannot carry.
+    """
+    if trace.drive is None:
+        raise TraceError(f"trace {trace.record.trace_id}: has no recorded drive, which a fit of torques needs")
+    inputs = inputs_of(trace, model.machine)
+    period = inputs.period
+    if trace.time[-1] - trace.time[0] < 1.0:
+        raise TraceError(f"trace {trace.record.trace_id}: shorter than 1 s, too short for a low-pass")
+    if not 0 < cutoff < 0.4 / period:
+        raise SpecError(f"cutoff {cutoff:g} Hz: must lie between 0 and {0.4 / period:g} Hz at this sampling")
+    columns = [trace.column(j) for j in inputs.joints]
+    time = np.arange(trace.time[0], trace.time[-1], period)
+    numerator, denominator = butter(ORDER, 2 * cutoff * period)
+
+    def smooth(signal: Floats) -> Floats:
+        even = np.stack([np.interp(time, trace.time, signal[:, c]) for c in columns], axis=1)
+        return np.asarray(filtfilt(numerator, denominator, even, axis=0))
+
+    position = smooth(trace.position)
+    speed = np.gradient(position, period, axis=0) if trace.velocity is None else smooth(trace.velocity)
+    torque = smooth(trace.drive)
+    edge = int(EDGE / period)
+    motion = MeasuredMotion(time, position, speed, _contact(model, position), torque, period, WIDTHS[0])
+    return RecordedMotion(motion, np.gradient(speed, period, axis=0), torque, slice(edge, len(time) - edge))
+
+
+def _contact(model: Model, position: Floats) -> Floats:
+    """Deflection of the friction contact (k, n) in [−1, 1] that goes with the motion."""
+    presliding = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)[:, at.PRESLIDING]
+    contact = np.zeros_like(position)
+    for k in range(1, len(position)):
+        contact[k] = np.clip(contact[k - 1] + (position[k] - position[k - 1]) / presliding, -1.0, 1.0)
+    return contact
