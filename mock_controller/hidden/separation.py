@@ -50,14 +50,16 @@ _DELAY_STEP_S = 2e-3
 """Change of the computing delay: a step of the plant."""
 
 
-MOST_REFITS = 4
+MOST_REFITS = 8
 """Times that the refit looks where it has got to; each takes a run of the experiment."""
+_FIRST_DAMPING, _LESS_DAMPING, _MORE_DAMPING = 1000.0, 10.0, 4.0
+"""The refit's damping at first (in units of the priors' weight), and how it changes with success and failure."""
 _SMALL_MOVE = 0.5
 """Standard deviations within which the tangents are trusted without looking."""
 _SETTLED = 0.95
 """A refit that leaves more than this share of the cost is the last."""
-_FARTHEST_FRACTION = 0.9
-"""No constant is moved by more than this fraction of its value."""
+_LEAST_FRACTION, _MOST_FRACTION = -0.9, 5.0
+"""Constants are moved by no more than these fractions of their values."""
 _EARLIEST_S = 5e-3
 """The computing delay is moved by no more than this: something is left of it."""
 
@@ -73,19 +75,17 @@ class Tangents:
     matrix: NDArray[np.float64]
     deviations: NDArray[np.float64]
 
-    @property
-    def farthest(self) -> NDArray[np.float64]:
-        """How many standard deviations each may be moved at most."""
-        limits = [
-            math.inf
-            if name.startswith("linearity")
-            else _EARLIEST_S
-            if name == "computing_delay"
-            else _FARTHEST_FRACTION
-            for name in self.names
-        ]
-        farthest: NDArray[np.float64] = np.array(limits) / self.deviations
-        return farthest
+    def within_reach(self, moved: NDArray[np.float64]) -> NDArray[np.float64]:
+        """`moved` (standard deviations), each brought to where its constant can be."""
+        low, high = zip(*(_reach(name) for name in self.names), strict=True)
+        return np.minimum(np.maximum(moved, np.array(low) / self.deviations), np.array(high) / self.deviations)
+
+
+def _reach(name: str) -> tuple[float, float]:
+    """How far a tolerance parameter may be moved: fractions, seconds or counts."""
+    if name.startswith("linearity"):
+        return -math.inf, math.inf
+    return (-_EARLIEST_S, _EARLIEST_S) if name == "computing_delay" else (_LEAST_FRACTION, _MOST_FRACTION)
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ def separation(
     """d′ between `parts` and the same arm with the modifications `without` only (by default none).
 
     The refit goes along the tangents, then looks where that has led and goes on, up to `refits` times: a strong effect
-    that tolerances can imitate is far from where the tangents were taken. A step that does not help is halved.
+    that tolerances can imitate is far from where the tangents were taken.
     """
     one = reading_deviation(parts.board)
     present = readings(parts, experiment)[:, :MODELLED]
@@ -172,7 +172,7 @@ def separation(
 
 def project(difference: NDArray[np.float64], known: Tangents) -> Separation:
     """d′ of a difference of readings (in their standard deviations, periods·3) after one refit along the tangents."""
-    moved = _step(difference, np.zeros(len(known.names)), known)
+    moved = _step(difference, np.zeros(len(known.names)), known.matrix)
     return _told(float(np.linalg.norm(difference)), difference - known.matrix @ moved, moved, known)
 
 
@@ -182,28 +182,35 @@ def _refitted(
     known: Tangents,
     refits: int,
 ) -> Separation:
-    moved: NDArray[np.float64] = np.zeros(len(known.names))
+    """Levenberg–Marquardt with the tangents corrected by what each step has shown (Broyden's update).
+
+    Heavily damped at first: it begins with the directions that explain most, and the others follow where those led.
+    """
+    matrix = known.matrix
+    moved = np.zeros(len(known.names))
     left, cost = start, float(start @ start)
-    share = 1.0
+    damping = _FIRST_DAMPING
     for _ in range(refits):
-        step = _step(left, moved, known)
-        trial = np.minimum(np.maximum(moved + share * step, -known.farthest), known.farthest)
+        trial = known.within_reach(moved + _step(left, moved, matrix, damping))
+        step = trial - moved
         left_there = left_at(trial)
+        matrix = matrix + np.outer(left - left_there - matrix @ step, step) / max(float(step @ step), 1e-12)
         cost_there = float(left_there @ left_there + trial @ trial)
         if cost_there < cost:
-            settled = cost_there > _SETTLED * cost
-            moved, left, cost, share = trial, left_there, cost_there, min(2.0 * share, 1.0)
+            settled = damping < 1.0 and cost_there > _SETTLED * cost
+            moved, left, cost, damping = trial, left_there, cost_there, damping / _LESS_DAMPING
             if settled:
                 break
         else:
-            share *= 0.5
+            damping *= _MORE_DAMPING
     return _told(float(np.linalg.norm(start)), left, moved, known)
 
 
-def _step(left: NDArray[np.float64], moved: NDArray[np.float64], known: Tangents) -> NDArray[np.float64]:
+def _step(
+    left: NDArray[np.float64], moved: NDArray[np.float64], matrix: NDArray[np.float64], damping: float = 0.0
+) -> NDArray[np.float64]:
     """By how much to move on from `moved` where `left` is what is left."""
-    matrix = known.matrix
-    normal = matrix.T @ matrix + np.eye(matrix.shape[1])
+    normal = matrix.T @ matrix + (1.0 + damping) * np.eye(matrix.shape[1])
     return np.asarray(np.linalg.solve(normal, matrix.T @ left - moved), dtype=np.float64)
 
 

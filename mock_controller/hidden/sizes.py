@@ -89,12 +89,12 @@ SHARED_SIZES: tuple[SizeRange, ...] = (
         "backlash",
         "play",
         ((8e-4, 0.012), (1.5e-3, 0.03), (8e-4, 0.02)),
-        per_joint={"stiffness": (2e4, 2e4, 4e3), "damping": (10.0, 10.0, 1.0)},
+        per_joint={"stiffness": (2e4, 2e4, 2e3), "damping": (10.0, 10.0, 1.0)},
     ),
     SizeRange(
         "joint_compliance",
         "compliance",
-        ((8e-5, 8e-4), (8e-5, 1.5e-3), (2.5e-4, 2e-3)),
+        ((8e-5, 8e-4), (8e-5, 1.5e-3), (5e-4, 3e-3)),
         per_joint={"damping": (4.0, 4.0, 0.5)},
     ),
     SizeRange("payload", "mass", ((0.25, 1.2),), also={"offset": (0.0, 0.08)}),
@@ -138,7 +138,7 @@ OPEN_SIZES: tuple[SizeRange, ...] = (
     SizeRange(
         "potentiometer_zero_drift", "drift", _alike(2e-3, 0.06), signed=True, also={"time_constant": (8.0, 30.0)}
     ),
-    SizeRange("converter_bit_weight", "error", _alike(2, 25), signed=True, also={"bit": (5, 8)}),
-    SizeRange("stuck_converter_bit", "bit", _alike(2, 6)),
+    SizeRange("converter_bit_weight", "error", _alike(0.7, 8), signed=True, also={"bit": (5, 8)}),
+    SizeRange("stuck_converter_bit", "bit", _alike(1, 4)),
 )
 """Sizes of the effects that only the mock knows."""

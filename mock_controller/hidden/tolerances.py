@@ -114,6 +114,6 @@ def harmonic_deviation(linearity: float, harmonic: int) -> float:
     """Standard deviation (counts) of one share of a harmonic of curves within `linearity` (fraction of the range).
 
     Curves have three harmonics of random phase and size falling with their order, and are scaled to 40 to 100 % of
-    the limit at their largest; the numbers are those of 20 000 such curves.
+    the limit at their largest; the numbers are those of 4000 such curves.
     """
-    return linearity * ADC_COUNTS * {1: 0.40, 2: 0.20, 3: 0.13}[harmonic]
+    return linearity * ADC_COUNTS * {1: 0.33, 2: 0.17, 3: 0.12}[harmonic]

@@ -1,0 +1,169 @@
+"""d′ of hidden effects, on an experiment short enough for a test."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mock_controller import detectability
+from mock_controller.board import default_board
+from mock_controller.hidden.arm import Kind, Load, compose_seed, draw_arm
+from mock_controller.hidden.closed_loop import LoopParts, reading_deviation, readings
+from mock_controller.hidden.experiment import BUILT_IN, Experiment, ExperimentError, read_experiment
+from mock_controller.hidden.separation import Tangents, project, separation, tangents
+from mock_controller.hidden.tolerances import deviating_plant, tolerances
+from mock_controller.modifications import build_modifications
+from mock_controller.plant import default_plant
+
+
+def short() -> Experiment:
+    """1.2 s: a quick ramp of joints 1 to 3 and back."""
+    there = [(500 + 2 * k, 333 + 2 * k, 500 - 2 * k, 500, 500, 500) for k in range(15)]
+    return Experiment((*there, *[there[-1]] * 15, *there[::-1], *[there[0]] * 15), settle=10)
+
+
+SOUND = LoopParts(default_plant(), default_board(), (), 1)
+
+
+@pytest.fixture(scope="module")
+def known() -> Tangents:
+    return tangents(default_plant(), default_board(), short())
+
+
+def with_effect(name: str, **values: float) -> LoopParts:
+    return replace(SOUND, modifications=build_modifications([(name, values)]))
+
+
+def test_readings_follow_the_set_points_and_repeat() -> None:
+    first, again = readings(SOUND, short()), readings(SOUND, short())
+    assert first.shape == (60, 6)
+    assert np.array_equal(first, again)
+    assert first[-1, 0] == pytest.approx(500 * 4.096, abs=8)
+    assert abs(first[25, 0] - 528 * 4.096) < 25
+
+
+def test_the_loop_without_rounding_is_the_board_s_loop_but_for_rounding() -> None:
+    from firmware_protocol.memory_map import default_memory_map
+    from mock_controller.board import Board
+    from mock_controller.plant import Plant
+
+    experiment = short()
+    plant = Plant(default_plant(), (), experiment.start_angles(default_board().calibrations))
+    board = Board(default_board(), default_memory_map(), plant, 5, (), arm_seed=1)
+    rows = [experiment.set_points[0]] * experiment.settle + list(experiment.set_points)
+    seen = []
+    for tick, row in enumerate(rows):
+        board.run_until(tick * 20_000 + 10_000)  # what this period took is what was written in the one before
+        snapshot = board.snapshots.newest()
+        assert snapshot is not None
+        seen.append(snapshot.positions)
+        if tick + 1 < len(rows):
+            board.write_set_points(dict(enumerate(rows[tick + 1], start=1)))
+        assert row
+    difference = np.array(seen[experiment.settle :]) - readings(SOUND, experiment)
+    assert np.abs(difference[:, :3]).max() < 5
+    assert np.abs(difference[:, :3].mean(axis=0)).max() < 0.5
+
+
+def test_no_effect_is_no_separation(known: Tangents) -> None:
+    nothing = separation(SOUND, short(), known)
+    assert (nothing.d_prime, nothing.before_refit) == (0.0, 0.0)
+
+
+def test_tangents_are_those_of_every_tolerance_and_curve(known: Tangents) -> None:
+    assert known.names[: len(tolerances())] == tuple(tolerance.name for tolerance in tolerances())
+    assert len(known.names) == len(tolerances()) + 3 * 3 * 2
+    assert known.matrix.shape == (60 * 3, len(known.names))
+    sizes = dict(zip(known.names, np.linalg.norm(known.matrix, axis=0), strict=True))
+    assert sizes["back_emf_constant_2"] > 20
+    assert sizes["m1"] < 1, "the source found it insensitive, too"
+
+
+@pytest.mark.parametrize(("name", "fraction"), [("resistance_1", 0.1), ("viscous_friction_2", 0.5), ("m_load", -0.2)])
+def test_what_a_tolerance_can_explain_costs_no_more_than_its_prior(name: str, fraction: float, known: Tangents) -> None:
+    stated = {tolerance.name: tolerance.stated for tolerance in tolerances()}[name]
+    moved = replace(SOUND, plant=deviating_plant(SOUND.plant, {name: fraction}))
+    difference = readings(moved, short())[:, :3] - readings(SOUND, short())[:, :3]
+    found = project((difference / reading_deviation(SOUND.board)).ravel(), known)
+    assert found.d_prime < 1.15 * abs(fraction) / stated + 0.3
+    assert found.before_refit > 2 * found.d_prime
+
+
+def test_a_strong_imitation_of_a_tolerance_is_refitted_where_it_is(known: Tangents) -> None:
+    factor = 1.6
+    strong = with_effect("back_emf_error", joint=3, factor=factor)
+    once = separation(strong, short(), known, refits=0)
+    settled = separation(strong, short(), known)
+    deviations = (factor - 1) / (1 / 3)
+    assert settled.d_prime < 1.4 * deviations
+    assert settled.d_prime < once.d_prime
+    assert settled.before_refit > 20 * settled.d_prime
+
+
+def test_separation_grows_with_the_effect_and_is_large_for_what_no_tolerance_does(known: Tangents) -> None:
+    found = [separation(with_effect("backlash", joint=1, play=play), short(), known) for play in (0.002, 0.02)]
+    assert 0.5 < found[0].d_prime < found[1].d_prime
+    assert found[1].d_prime > 10
+
+
+def test_effects_are_looked_at_while_the_others_act(known: Tangents) -> None:
+    pair = build_modifications([("backlash", {"joint": 1, "play": 0.02}), ("wrong_gain", {"joint": 3, "factor": 1.3})])
+    both = replace(SOUND, modifications=pair)
+    first = separation(both, short(), known, without=pair[1:])
+    alone = separation(replace(SOUND, modifications=pair[:1]), short(), known)
+    assert first.d_prime == pytest.approx(alone.d_prime, rel=0.2)
+
+
+def test_tangents_kept_in_a_folder_are_read_from_there(tmp_path: Path, known: Tangents) -> None:
+    kept = tmp_path / "tangents"
+    tiny = Experiment(short().set_points[:3], settle=1)
+    first = tangents(default_plant(), default_board(), tiny, cache=kept)
+    (file,) = kept.iterdir()
+    written = file.stat().st_mtime_ns
+    again = tangents(default_plant(), default_board(), tiny, cache=kept)
+    assert file.stat().st_mtime_ns == written
+    assert again.names == first.names
+    assert np.array_equal(again.matrix, first.matrix)
+    tangents(default_plant(), default_board(), tiny, "drawn", cache=kept)
+    assert len(list(kept.iterdir())) == 2
+
+
+def test_the_command_prints_a_line_an_arm(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "experiment.csv"
+    rows = [",".join(map(str, row)) for row in short().set_points[:20]]
+    table.write_text("\n".join([",".join(f"set_point_{joint}" for joint in range(1, 7)), *rows]), "utf-8")
+    clean, pair = compose_seed(4, Kind.CLEAN, Load.NOMINAL), compose_seed(4, Kind.PAIR, Load.NOMINAL)
+    assert detectability.main([str(clean), str(pair), "--experiment", str(table), "--refits", "0"]) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert lines[0] == {"seed": clean, "d_prime": 0.0, "effects": []}
+    assert [effect["effect"] for effect in lines[1]["effects"]] == [effect.name for effect in draw_arm(pair).effects]
+    assert lines[1]["d_prime"] >= 0.0
+    assert detectability.main(["99", "--experiment", str(table)]) == 2
+    assert detectability.main([str(clean), "--experiment", str(tmp_path / "missing.csv")]) == 2
+    assert "missing.csv: No such file" in capsys.readouterr().err
+
+
+def test_wrong_experiments_are_refused_in_one_line(tmp_path: Path) -> None:
+    wrong = tmp_path / "wrong.csv"
+    wrong.write_text("set_point_1,set_point_2\n1,2\n", "utf-8")
+    with pytest.raises(ExperimentError, match="no column set_point_3"):
+        read_experiment(wrong)
+    wrong.write_text(",".join(f"set_point_{k}" for k in range(1, 7)) + "\n1,2,3,4,5,6.5\n", "utf-8")
+    with pytest.raises(ExperimentError, match="not whole posture units"):
+        read_experiment(wrong)
+    with pytest.raises(ExperimentError, match="at least 2"):
+        Experiment(((500,) * 6,))
+    with pytest.raises(ExperimentError, match="period 2"):
+        Experiment(((500,) * 6, (500,) * 5 + (1000,)))
+
+
+@pytest.mark.parametrize(("name", "seconds"), [("ramp-step", 8), ("reference-set", 55)])
+def test_built_in_experiments_last_as_long_as_they_say_and_stay_in_range(name: str, seconds: int) -> None:
+    experiment = BUILT_IN[name]()
+    assert len(experiment.set_points) / 50 == pytest.approx(seconds, abs=0.2)
+    steps = np.abs(np.diff(np.array(experiment.set_points), axis=0))
+    assert steps.max() <= 15
