@@ -62,6 +62,9 @@ def fit(
     starts: Annotated[int, typer.Option(min=1, max=100, help="Searches, from different beginnings.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="Of the beginnings.")] = 0,
     open_loop: Annotated[bool, typer.Option("--open-loop", help="Apply the recorded drive.")] = False,
+    torques: Annotated[
+        bool, typer.Option("--torques", help="Compare torques instead of motion: no simulation, needs the drive.")
+    ] = False,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     json: JsonOption = False,
@@ -84,6 +87,11 @@ def fit(
         parameters=patterns(parameters), held=patterns(hold) or (), bounds=bounds(bound or []),
         use_priors=not no_priors, method=method, starts=starts, seed=seed, loop=loop,
     )  # fmt: skip
+    if torques:
+        from daq.cli.fit_torques import fit_recorded_torques
+
+        fit_recorded_torques(begin, fitted_to, held, options, out, as_json=json, report=report)
+        return
     with shown_progress("fitting") as tell:
         found = run_fit(begin, fitted_to, options, lambda f, text: tell(0.9 * f, text))
         comparison = compare(

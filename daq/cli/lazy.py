@@ -25,6 +25,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "validate": ("daq.cli.validate", "What must move for a model to explain traces."),
     "simulate": ("daq.cli.simulate", "What a model does where a trace was recorded."),
     "compare": ("daq.cli.compare", "Several models beside the same traces."),
+    "design": ("daq.cli.design", "Experiments that make parameters best known."),
     "thesis": ("daq.cli.thesis", "The 1991 source reproduced, ours beside the published."),
     "demo": ("daq.cli.demo", "The ramp step on the mock, from command to plot."),
 }

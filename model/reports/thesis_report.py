@@ -79,13 +79,11 @@ def _ladder(ladder: Ladder) -> Section:
         _pairs("Σλ²", [(s.fidelity.sum_of_contributions, s.published_sum) for s in ladder.steps]),
     ]
     for symbol in SYMBOLS:
-        rows.append(
-            _pairs(
-                f"{symbol.name} / {symbol.unit}",
-                [(s.values[symbol.name], s.published_values[symbol.name]) if symbol.name in s.values else None
-                 for s in ladder.steps],
-            )
-        )  # fmt: skip
+        pairs = [
+            (s.values[symbol.name], s.published_values[symbol.name]) if symbol.name in s.values else None
+            for s in ladder.steps
+        ]
+        rows += [_pairs(f"{symbol.name} / {symbol.unit}", pairs)]
     head = ("", *(name for s in ladder.steps for name in (s.name, "published")))
     unoptimised = (
         f"Before any fit the error is {ladder.unoptimised_error:.4g} rad², 2.1428e-3 in the source (table 7.2)."
@@ -106,7 +104,6 @@ def _pairs(name: str, pairs: list[tuple[float, float] | None]) -> tuple[Cell, ..
 
 
 def _ladder_picture(ladder: Ladder) -> Picture:
-    """Each published number over that of the first model, as ours: the mock's arm is not the arm of 1991."""
     steps = ladder.steps
     names = [s.name for s in steps]
 
@@ -123,8 +120,8 @@ def _ladder_picture(ladder: Ladder) -> Picture:
         figure.legend(handles, labels, loc="outside upper right", ncols=2)
 
     caption = (
-        "The error falls and Σλ² rises from model to model; K_b2 inflates where friction is missing. The mock's arm has "
-        "less unmodelled in it than the arm of 1991, so its errors are smaller."
+        "The error falls and Σλ² rises from model to model; K_b2 inflates where friction is missing. The mock's arm "
+        "has less unmodelled in it than the arm of 1991, so its errors are smaller."
     )
     return Picture(drawn(draw, 2.5), caption)
 
@@ -171,9 +168,10 @@ def _control_picture(case: ControlCase) -> Picture:
             axes[j].set_title(f"joint {j + 1}", color=COLOURS[j])
             axes[j].set_xlabel("time / s")
         axes[0].set_ylabel("position / °")
-        axes[0].legend(loc="upper right")
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper right", ncols=2)
 
-    return Picture(drawn(draw, 1.75), f"{case.name}.")
+    return Picture(drawn(draw, 1.95), f"{case.name}.")
 
 
 def _influence(found: Reproduction) -> Table:

@@ -26,13 +26,16 @@ def torque_section(found: TorqueAnalysis) -> Section:
 def _inertia(found: TorqueAnalysis, time: np.ndarray) -> Picture:
     def draw(figure: Figure) -> None:
         columns = 3
+        largest = max(max(map(abs, element.whole)) for element in found.inertia)
         rows = -(-len(found.inertia) // columns)
         axes = panels(figure, rows, columns, sharex=True)
         for place, element in enumerate(found.inertia):
             own = axes.flat[place]
-            own.plot(time, np.array(element.whole) + 0.0, color=COLOURS[0], label="whole")
+            own.plot(time, element.whole, color=COLOURS[0], label="whole")
             own.plot(time, element.translation, color=COLOURS[1], lw=0.9, ls="--", label="translation")
             own.plot(time, element.rotation, color=COLOURS[2], lw=0.9, ls=":", label="rotation")
+            if max(map(abs, element.whole)) < 1e-3 * largest:
+                own.set_ylim(-1e-3 * largest, 1e-3 * largest)
             own.set_title(f"D{element.row}{element.column} / kg·m²")
         for empty in axes.flat[len(found.inertia) :]:
             empty.set_visible(False)
@@ -70,7 +73,7 @@ def _inertial(found: TorqueAnalysis, time: np.ndarray) -> Picture:
             for torque in found.inertial:
                 if torque.at == joint:
                     own.plot(time, torque.values, color=COLOURS[(torque.of - 1) % len(COLOURS)],
-                             label=f"acceleration of joint {torque.of}", lw=1.2 if torque.of == joint else 0.9)  # fmt: skip
+                             label=f"acceleration of joint {torque.of}", lw=1.2)  # fmt: skip
             baseline(own)
             own.set_title(f"joint {joint}")
             own.set_xlabel("time / s")

@@ -72,7 +72,7 @@ def _distortion_table(source: Fidelity, three: Fidelity) -> Table:
         ("parameter", "value", "unit", "doubles the error", "σ needed", "τ′ expected", "λ²", "λ² with â/3"),
         tuple(rows),
         "The change of one parameter alone that doubles the mean squared error gives σ, the standard deviation it "
-        "would need to explain the residual (4.63); λ² = τ′²/σ² (4.92) compares it with the deviation that is expected.",
+        "would need to explain the residual (4.63); λ² = τ′²/σ² (4.92) compares it with the expected one.",
     )  # fmt: skip
 
 

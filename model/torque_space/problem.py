@@ -1,4 +1,4 @@
-"""Residuals of torque and their exact derivatives: D(q̈ − f), f being the model's acceleration at the recorded torque."""
+"""Residuals of torque and their exact derivatives: D(q̈ − f), f the model's acceleration at the recorded torque."""
 
 from __future__ import annotations
 

@@ -1,0 +1,128 @@
+"""`daq design`: experiments that make a model's parameters best known, and what a proposed one would add."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from daq.cli.context import JsonOption, console, print_json
+from daq.cli.effect_choice import patterns
+from daq.cli.model_input import MODEL_HELP, read_model
+from daq.contracts.errors import SafetyError, SpecError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from daq.contracts.experiment import ExperimentSpec
+    from daq.contracts.machine import Machine
+    from model.design.information import InformationGain
+    from model.fitting.result import FitResult
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def design(
+    model: Annotated[str, typer.Argument(help=MODEL_HELP)],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the experiments, one .json each.")] = None,
+    judge: Annotated[
+        list[Path] | None, typer.Option(help="Say what this experiment (.json) would add, instead. May be repeated.")
+    ] = None,
+    parameters: Annotated[
+        str | None, typer.Option(help="What is to be known: names or patterns (default: all uncertain).")
+    ] = None,
+    experiments: Annotated[int, typer.Option(min=1, max=50, help="How many to propose.")] = 4,
+    duration: Annotated[float, typer.Option(min=1.0, max=600.0, help="Of each, in s.")] = 12.0,
+    candidates: Annotated[int, typer.Option(min=1, max=10_000, help="Experiments to choose from.")] = 60,
+    seed: Annotated[int, typer.Option(min=0, help="Of the candidates.")] = 0,
+    json: JsonOption = False,
+) -> None:
+    """Propose experiments within the machine's limits that make chosen parameters best known (D-optimal).
+
+    Nothing is run: `daq run spec FILE` runs a proposed experiment.
+    """
+    from daq.cli.model_progress import shown_progress
+    from model.design.information import information_gain
+    from model.design.search import DesignOptions
+    from model.design.search import design as search
+    from model.fitting.options import FitOptions
+
+    chosen = read_model(model)
+    options = FitOptions(parameters=patterns(parameters))
+
+    def plan(spec: ExperimentSpec) -> NDArray[np.float64]:
+        return planned(spec, chosen.machine)
+
+    if judge:
+        from daq.cli.spec_file import read_spec
+
+        gain = information_gain(
+            chosen, [read_spec(p) for p in judge], plan, options=options, fitted=_fitted(model, parameters)
+        )
+        if json:
+            print_json(gain.model_dump(mode="json"))
+        else:
+            _print_gain(gain)
+        return
+    with shown_progress("designing") as tell:
+        search_options = DesignOptions(experiments=experiments, duration=duration, candidates=candidates, seed=seed)
+        found = search(chosen, plan, search_options, options, tell)
+    files = [] if out is None else _written(found.specs, out)
+    if json:
+        print_json(found.model_dump(mode="json") | {"files": files})
+        return
+    print(f"{len(found.specs)} of {found.considered} candidates, {found.refused} outside the limits")
+    for spec, nats in zip(found.specs, found.nats, strict=True):
+        print(f"  {spec.name}: {spec.trajectory.kind}; with those before it {nats:.1f} nats")
+    _print_gain(found.gain)
+    for file in files:
+        console().print(f"daq run spec {file}")
+
+
+def planned(spec: ExperimentSpec, machine: Machine) -> NDArray[np.float64]:
+    """Set points (k, joints) of an experiment, rad. Raises SpecError, SafetyError where it may not be carried out."""
+    from daq.safety import check_plan
+    from daq.trajectories import plan, start_angles
+
+    motion = plan(spec, machine, start_angles(spec, machine))
+    violations = check_plan(motion, machine, machine.limits)
+    if violations:
+        raise SafetyError(str(violations[0]))
+    return motion.angles
+
+
+def _fitted(model: str, parameters: str | None) -> FitResult | None:
+    """What a fit already knows, where the model is one and the parameters are those it found."""
+    from model.fitting.result import load_result
+
+    if not model.endswith(".json") or parameters is not None:
+        return None
+    return load_result(Path(model))
+
+
+def _written(specs: tuple[ExperimentSpec, ...], folder: Path) -> list[Path]:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        files = []
+        for number, spec in enumerate(specs, start=1):
+            files.append(folder / f"experiment-{number}.json")
+            files[-1].write_text(spec.model_dump_json(indent=1) + "\n", "utf-8")
+    except OSError as error:
+        raise SpecError(f"{folder}: cannot be written: {error.strerror}") from error
+    return files
+
+
+def _print_gain(gain: InformationGain) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, header_style="bold")
+    for name in ("parameter", "95 % width before", "after", "unit", "left"):
+        table.add_column(name, justify="left" if name in ("parameter", "unit") else "right")
+    for p in gain.parameters:
+        table.add_row(p.name, f"{p.before:.3g}", f"{p.after:.3g}", p.unit, f"{100 * p.share:.0f} %")
+    Console(highlight=False, width=120).print(table)
+    print(f"together: {gain.nats:.1f} nats of information more")
