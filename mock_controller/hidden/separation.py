@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from mock_controller.board.parameters import BoardParameters
 from mock_controller.hidden.closed_loop import LoopParts, reading_deviation, readings
 from mock_controller.hidden.experiment import Experiment
+from mock_controller.hidden.imitation import imitation
 from mock_controller.hidden.tolerances import (
     HARMONICS,
     LinearityHarmonic,
@@ -152,7 +153,8 @@ def separation(
     """d′ between `parts` and the same arm with the modifications `without` only (by default none).
 
     The refit goes along the tangents, then looks where that has led and goes on, up to `refits` times: a strong effect
-    that tolerances can imitate is far from where the tangents were taken.
+    that tolerances can imitate is far from where the tangents were taken. Where some can imitate it exactly, the refit
+    also starts from those.
     """
     one = reading_deviation(parts.board)
     present = readings(parts, experiment)[:, :MODELLED]
@@ -163,11 +165,19 @@ def separation(
         left: NDArray[np.float64] = ((present - absent) / one).ravel()
         return left
 
-    start = left_at(np.zeros(len(known.names)))
-    found = project(start, known)
+    nowhere = np.zeros(len(known.names))
+    apart = left_at(nowhere)
+    found = project(apart, known)
     if refits == 0 or max(map(abs, found.moved.values()), default=0.0) < _SMALL_MOVE:
         return found
-    return _refitted(start, left_at, known, refits)
+    refitted = _refitted(apart, nowhere, left_at, known, refits)
+    hidden = [effect for effect in parts.modifications if effect not in without]
+    imitating = imitation(parts.plant, hidden)
+    if imitating:
+        there = known.within_reach(np.array([imitating.get(name, 0.0) for name in known.names]) / known.deviations)
+        again = _refitted(left_at(there), there, left_at, known, refits)
+        refitted = min(refitted, again, key=lambda each: each.d_prime)
+    return replace(refitted, before_refit=found.before_refit)
 
 
 def project(difference: NDArray[np.float64], known: Tangents) -> Separation:
@@ -177,18 +187,19 @@ def project(difference: NDArray[np.float64], known: Tangents) -> Separation:
 
 
 def _refitted(
-    start: NDArray[np.float64],
+    left: NDArray[np.float64],
+    moved: NDArray[np.float64],
     left_at: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     known: Tangents,
     refits: int,
 ) -> Separation:
-    """Levenberg–Marquardt with the tangents corrected by what each step has shown (Broyden's update).
+    """Levenberg–Marquardt from `moved`, where `left` is what is left.
 
+    The tangents are corrected by what each step has shown (Broyden's update).
     Heavily damped at first: it begins with the directions that explain most, and the others follow where those led.
     """
     matrix = known.matrix
-    moved = np.zeros(len(known.names))
-    left, cost = start, float(start @ start)
+    cost = float(left @ left + moved @ moved)
     damping = _FIRST_DAMPING
     for _ in range(refits):
         trial = known.within_reach(moved + _step(left, moved, matrix, damping))
@@ -203,7 +214,7 @@ def _refitted(
                 break
         else:
             damping *= _MORE_DAMPING
-    return _told(float(np.linalg.norm(start)), left, moved, known)
+    return _told(0.0, left, moved, known)
 
 
 def _step(

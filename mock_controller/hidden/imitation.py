@@ -1,0 +1,59 @@
+"""Deviations that imitate an effect exactly, where there are any: the refit looks there, too."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from mock_controller.hidden.tolerances import tolerances
+from mock_controller.modifications.friction import LoadDependentFriction, ViscousFriction
+from mock_controller.modifications.interface import Modification
+from mock_controller.modifications.load import LinkMass, Payload
+from mock_controller.modifications.motor import BackEmfError
+from mock_controller.plant import PlantParameters
+
+
+def imitation(parameters: PlantParameters, modifications: Iterable[Modification]) -> dict[str, float]:
+    """Deviations (fractions) of the arm `parameters` that do what the modifications do, where some can."""
+    found: dict[str, float] = {}
+    for effect in modifications:
+        for name, fraction in _of_one(parameters, effect).items():
+            found[name] = found.get(name, 0.0) + fraction
+    return found
+
+
+def _of_one(parameters: PlantParameters, effect: Modification) -> dict[str, float]:
+    body = parameters.rigid_body
+    match effect:
+        case Payload():
+            return {"m_load": effect.mass / body.m_load}
+        case LinkMass():
+            name = f"m{effect.joint}"
+            return {name: effect.mass / float(getattr(body, name))}
+        case LoadDependentFriction():
+            return {f"coulomb_arm_{effect.joint}": effect.arm / parameters.friction.effective_arm}
+        case ViscousFriction():
+            return _damping(parameters, effect.joint, effect.coefficient)
+        case BackEmfError():
+            return _damping(parameters, effect.joint, (effect.factor - 1.0) * _dampings(parameters, effect.joint)[0])
+        case _:
+            return {}
+
+
+def _dampings(parameters: PlantParameters, number: int) -> tuple[float, float]:
+    """Damping (N·m·s/rad) of a joint by its back-EMF and by its viscous friction."""
+    joint = parameters.joints[number - 1]
+    squared = joint.gear_ratio**2
+    electrical = squared * joint.torque_constant * joint.back_emf_constant / joint.resistance
+    return electrical, squared * joint.viscous_friction
+
+
+def _damping(parameters: PlantParameters, number: int, more: float) -> dict[str, float]:
+    """`more` damping, shared by the two that can give it so that their priors ask the least."""
+    stated = {tolerance.name: tolerance.stated for tolerance in tolerances()}
+    names = (f"back_emf_constant_{number}", f"viscous_friction_{number}")
+    present = _dampings(parameters, number)
+    weights = [(stated[name] * damping) ** 2 for name, damping in zip(names, present, strict=True)]
+    return {
+        name: more * weight / sum(weights) / damping
+        for name, weight, damping in zip(names, weights, present, strict=True)
+    }
