@@ -120,7 +120,7 @@ class DirectionDependentFriction:
     name: ClassVar[str] = "direction_dependent_friction"
     shared: ClassVar[bool] = True
     line: ClassVar[str] = "level + |D| in the direction of D only, through a bristle of its own"
-    source: ClassVar[str] = "Armstrong (1988), Stanford arm: friction that differs between left and right"
+    source: ClassVar[str] = "Armstrong-Hélouvry (1991), Control of Machines with Friction"
     joint: int = joint_parameter()
     torque: float = parameter(-50.0, 50.0, unit="N·m", null=0.0)
 
