@@ -62,7 +62,7 @@ def _alike(low: float, high: float) -> tuple[Range, ...]:
 _TURN: Range = (0.0, 2.0 * pi)
 
 SHARED_SIZES: tuple[SizeRange, ...] = (
-    SizeRange("viscous_friction", "coefficient", ((12, 80), (30, 90), (5, 40))),
+    SizeRange("viscous_friction", "coefficient", ((12, 60), (30, 80), (5, 30))),
     SizeRange("coulomb_friction", "torque", ((0.3, 5), (0.7, 9), (0.15, 1.8))),
     SizeRange("load_dependent_friction", "arm", _alike(0.1, 0.8)),
     SizeRange("stribeck_friction", "torque", ((0.4, 5), (0.6, 10), (0.15, 2.5)), also={"speed": (0.05, 0.3)}),
