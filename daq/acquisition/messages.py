@@ -32,6 +32,8 @@ class Job(_Message):
     memory_map: str | None = None
     """Text of a memory map file; None for the one that ships."""
     moves_real_arm: bool = False
+    late_stop_window: Annotated[float, Field(ge=0)] = 10.0
+    """s after the loss of the link in which the stop is still tried: an assumption, time enough to push a plug in."""
     report_samples: bool = False
 
 

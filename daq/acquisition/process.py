@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import sys
 from contextlib import ExitStack
+from dataclasses import replace
 
 from daq.acquisition.freezer import Freezer
 from daq.acquisition.guardian import EndCause, Guardian
 from daq.acquisition.job_input import read_job
+from daq.acquisition.late_stop import deliver_late_stop
 from daq.acquisition.messages import Failed, Finished, Job
 from daq.acquisition.speaker import Speaker
 from daq.acquisition.stop_socket import stop_listener
 from daq.contracts.errors import DaqError
 from daq.driver import Controller
+from daq.link import LinkState
 from daq.runner import (
     ArmControl,
     Arrangement,
@@ -94,4 +97,10 @@ def run_job(job: Job, speaker: Speaker) -> RunResult:
         run = Arrangement(
             controller, control, job.spec, job.machine, job.limits, job.folder, speaker, outside, job.robot
         )
-        return run_experiment(run, Consent(job.moves_real_arm))
+        result = run_experiment(run, Consent(job.moves_real_arm))
+        if controller.link.state is LinkState.LOST and controller.link.control is None:
+            # A mock of our own has gone for good; anything else may come back.
+            speaker.progress(1.0, "the link is lost: trying to deliver the stop")
+            line = deliver_late_stop(controller, job.late_stop_window)
+            result = replace(result, reason=f"{result.reason}; {line}")
+        return result

@@ -28,6 +28,11 @@ from daq.trajectories import Plan
 
 AFTERMATH = 1.0
 """Seconds recorded after a stop, a fault or the loss of the parent."""
+ARRIVED_WITHIN = 40.0
+"""ADC counts from its set point at which a joint counts as arrived at the start: an assumption, that of a joint at rest
+(gravity and friction leave some counts)."""
+ARRIVAL_TIME = 1.0
+"""s that a joint may take for it after its last set point: an assumption."""
 PATIENCE_IN_LOCK_STEP = 5.0
 """s that a fast run waits for the disk; in real time nothing waits."""
 
@@ -109,6 +114,8 @@ def _move_to_start(run: Arrangement, prepared: Prepared) -> None:
         every_period=False,
     )  # fmt: skip
     ending = approach.follow(prepared.move, lambda _index: None)
+    if ending.kind == "finished":
+        ending = approach.arrive(prepared.move.moving, ARRIVED_WITHIN, round(ARRIVAL_TIME / run.controller.period_s))
     if ending.kind != "finished":
         line = f"the move to the start ended before it was there: {ending.cause}; nothing was recorded"
         raise StoppedError(line) if ending.kind == "stopped" else RunFaultError(line)

@@ -75,13 +75,36 @@ class Follower:
         self._retries = controller.counters.retries
         self.last: SampleRow | None = None
 
+    def arrive(self, joints: tuple[int, ...], within_counts: float, periods: int) -> Ending:
+        """Waits until `joints` are at their set points, at most so many periods; a joint that is not by then trips."""
+        scale = {joint: abs(self._machine.calibration(joint).rad_per_count) for joint in joints}
+        late: dict[int, float] = {}
+        try:
+            for _ in range(periods):
+                outside = self._ended()
+                if outside is not None:
+                    return self._stopped(outside)
+                row, _ = self._next({})
+                errors = dict(zip(self._joints, row.error, strict=True))
+                late = {j: errors[j] / scale[j] for j in joints if abs(errors[j]) > within_counts * scale[j]}
+                if not late:
+                    return Ending("finished")
+        except (LinkError, NoSampleError) as error:
+            return self._halted(Event.LINK_LOST, "link_lost", "lost", str(error))
+        except ControllerRestartedError as error:
+            return self._halted(Event.TRIP, "restart", "fault", str(error))
+        told_late = ", ".join(f"joint {joint} is {counts:.0f} ADC counts away" for joint, counts in late.items())
+        return self._halted(Event.TRIP, "fault", "fault", f"{told_late} from its set point and does not come nearer")
+
     def observe(self, periods: int) -> None:
         """Records so many periods without sending anything, as far as the robot still answers."""
         try:
             for _ in range(periods):
                 row, _ = self._next({})
                 self._observer.row(row)
-        except (LinkError, ControllerRestartedError, NoSampleError) as error:
+        except ControllerRestartedError as error:
+            self.tell("restart", str(error))
+        except (LinkError, NoSampleError) as error:
             self.tell("link_lost", str(error))
 
     def follow(self, plan: Plan, progress: Callable[[int], None]) -> Ending:

@@ -54,6 +54,7 @@ def prepare(
     _require_period(controller, machine)
     if StatusFlag.FROZEN in controller.status().flags:
         raise SafetyError("the arm has been stopped and holds its posture; `daq reset` ends that")
+    _require_driven(controller, spec, machine)
     here = _look(controller, machine)
     _require_still(here, machine, limits)
     target = start_angles(spec, machine)
@@ -91,6 +92,15 @@ def _require_period(controller: Controller, machine: Machine) -> None:
             f"{controller.link.url} has a control period of {controller.period_s * 1e3:g} ms, the machine file "
             f"{machine.name} says {planned * 1e3:g} ms: speeds would be wrong; correct controller.period there"
         )
+
+
+def _require_driven(controller: Controller, spec: ExperimentSpec, machine: Machine) -> None:
+    """A joint whose P is 0 has no drive: it would fall, or lag, instead of following."""
+    gains = controller.gains() | spec.gains
+    limp = [joint for joint in range(1, len(machine.joints) + 1) if gains[joint][0] == 0]
+    if limp:
+        names = ", ".join(map(str, limp))
+        raise SafetyError(f"joints {names} have gain P = 0 and no drive: support the arm, then `daq gains set` them")
 
 
 def _look(controller: Controller, machine: Machine) -> SampleRow:

@@ -35,10 +35,6 @@ class RunningGuards:
         verdict = self.freshness.check(row) | _frozen(row) | self.unexpected_motion.check(row)
         return verdict | self.following_error.check(row, planned) | self.missed_set_points.check(row, expected)
 
-    def silent(self, now: float) -> Verdict:
-        """After waiting in vain for a sample; `now` (s) is the clock of `SampleRow.host_time`."""
-        return self.freshness.silent(now)
-
 
 class RestGuards:
     """Guards of an arm that nothing is sent to. `led` joints are moved by hand and may move."""
@@ -51,10 +47,6 @@ class RestGuards:
     def check(self, row: SampleRow) -> Verdict:
         """After a sample."""
         return self.freshness.check(row) | _frozen(row) | self.unexpected_motion.check(row)
-
-    def silent(self, now: float) -> Verdict:
-        """After waiting in vain for a sample; `now` (s) is the clock of `SampleRow.host_time`."""
-        return self.freshness.silent(now)
 
 
 def _frozen(row: SampleRow) -> Verdict:

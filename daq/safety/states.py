@@ -1,4 +1,7 @@
-"""The states of an arm under this host, and what each event does to them. Pure: events in, state and actions out."""
+"""The states of an arm under this host, and what each event does to them. Pure: events in, state and actions out.
+
+A freeze on the board is ended by an explicit reset alone: arming never releases, so it cannot undo anybody's stop.
+"""
 
 from __future__ import annotations
 
@@ -66,16 +69,15 @@ Outcome = tuple[Arm, tuple[Action, ...]]
 
 _HALT = (Action.CEASE, Action.FREEZE)
 _ORDERLY: dict[tuple[State, Event], tuple[State, tuple[Action, ...]]] = {
-    (State.IDLE, Event.ARM): (State.ARMED, (Action.RELEASE,)),
-    (State.STOPPED, Event.ARM): (State.ARMED, (Action.RELEASE,)),
+    (State.IDLE, Event.ARM): (State.ARMED, ()),
     (State.ARMED, Event.DISARM): (State.IDLE, ()),
     (State.ARMED, Event.START): (State.RUNNING, (Action.SEND,)),
     (State.RUNNING, Event.FINISHED): (State.ARMED, (Action.CEASE,)),
-    (State.STOPPED, Event.RESET): (State.IDLE, ()),
+    (State.STOPPED, Event.RESET): (State.IDLE, (Action.RELEASE,)),
 }
 _ADVICE = {
     Event.CONNECTED: "the link is up already",
-    Event.ARM: "possible when idle or stopped; reset a fault first, connect when disconnected",
+    Event.ARM: "possible when idle; reset a stop or a fault first, connect when disconnected",
     Event.DISARM: "possible when armed",
     Event.START: "arm first",
     Event.FINISHED: "nothing is running",
@@ -99,7 +101,7 @@ def advance(arm: Arm, event: Event, cause: str | None = None) -> Outcome:
         case Event.CONNECTED if not arm.connected:
             return _connected(arm)
         case Event.RESET if arm.state is State.FAULT:
-            return Arm(State.IDLE if arm.connected else State.DISCONNECTED, arm.connected), ()
+            return _reset(arm)
     if (arm.state, event) not in _ORDERLY:
         raise IllegalEventError(f"cannot {event} while {arm.state}: {_ADVICE[event]}")
     state, actions = _ORDERLY[arm.state, event]
@@ -107,8 +109,10 @@ def advance(arm: Arm, event: Event, cause: str | None = None) -> Outcome:
 
 
 def _stop(arm: Arm, cause: str) -> Outcome:
-    if arm.state in (State.FAULT, State.DISCONNECTED):
+    if arm.state is State.FAULT:
         return arm, _HALT
+    if arm.state is State.DISCONNECTED:
+        return replace(arm, cause=arm.cause or cause), _HALT
     return replace(arm, state=State.STOPPED, cause=_first(arm, cause)), _HALT
 
 
@@ -117,13 +121,23 @@ def _link_lost(arm: Arm, cause: str) -> Outcome:
         return Arm(State.FAULT, False, cause), _HALT
     if arm.state is State.FAULT:
         return replace(arm, connected=False), ()
-    return Arm(), ()
+    return Arm(cause=arm.cause), ()
 
 
 def _connected(arm: Arm) -> Outcome:
     if arm.state is State.FAULT:
         return replace(arm, connected=True), (Action.FREEZE,)
+    if arm.cause is not None:
+        # Stopped before, or while there was no link: the stop may never have arrived.
+        return replace(arm, state=State.STOPPED, connected=True), (Action.FREEZE,)
     return Arm(State.IDLE, True), ()
+
+
+def _reset(arm: Arm) -> Outcome:
+    if not arm.connected:
+        # The board's freeze cannot be ended without a link: the arm comes back as stopped.
+        return replace(arm, state=State.DISCONNECTED), ()
+    return Arm(State.IDLE, connected=True), (Action.RELEASE,)
 
 
 def _first(arm: Arm, cause: str) -> str:

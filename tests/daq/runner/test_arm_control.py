@@ -38,8 +38,10 @@ def make() -> tuple[ArmControl, Written]:
 def test_a_stop_while_the_release_is_on_its_way_is_not_undone_by_it() -> None:
     control, written = make()
     written.during_release = lambda: control.stop("now")
+    control.stop("before")
+    written.requests.clear()
     with pytest.raises(StoppedError, match="now"):
-        control.handle(Event.ARM)
+        control.handle(Event.RESET)
     assert written.requests == ["release", "stop", "stop"]
 
 

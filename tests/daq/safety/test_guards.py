@@ -154,27 +154,6 @@ def test_a_board_frozen_by_somebody_else_stops_the_run() -> None:
     assert not verdict.trips
 
 
-def test_silence_holds_at_once_and_trips_when_it_lasts() -> None:
-    guards = running()
-    guards.check(row(0, host_time=100.0), {})
-    assert guards.silent(100.1).hold
-    assert not guards.silent(100.19).trips
-    assert guards.silent(100.25).trips == ("no fresh sample for 0.25 s, allowed are 0.2 s",)
-
-
-def test_silence_of_an_arm_at_rest_trips_too() -> None:
-    guards = RestGuards(MA2000, LIMITS, (1, 2, 3))
-    guards.check(row(0, host_time=100.0))
-    assert not guards.silent(100.19).trips
-    assert guards.silent(100.25).trips == ("no fresh sample for 0.25 s, allowed are 0.2 s",)
-
-
-def test_silence_from_the_start_counts_from_the_first_wait() -> None:
-    guards = running()
-    assert not guards.silent(50.0).trips
-    assert guards.silent(50.3).trips
-
-
 def test_a_joint_that_should_stand_still_must_stay_at_its_set_point() -> None:
     guards = running(moving=(1,))
     assert not guards.check(row(0, error=(100, 40, 0)), {}).trips

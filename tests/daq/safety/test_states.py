@@ -18,7 +18,7 @@ TRANSITIONS = {
     (State.DISCONNECTED, Event.STOP): (State.DISCONNECTED, HALT),
     (State.DISCONNECTED, Event.TRIP): (State.FAULT, HALT),
     (State.IDLE, Event.LINK_LOST): (State.DISCONNECTED, ()),
-    (State.IDLE, Event.ARM): (State.ARMED, (Action.RELEASE,)),
+    (State.IDLE, Event.ARM): (State.ARMED, ()),
     (State.IDLE, Event.STOP): (State.STOPPED, HALT),
     (State.IDLE, Event.TRIP): (State.FAULT, HALT),
     (State.ARMED, Event.LINK_LOST): (State.FAULT, HALT),
@@ -31,12 +31,11 @@ TRANSITIONS = {
     (State.RUNNING, Event.STOP): (State.STOPPED, HALT),
     (State.RUNNING, Event.TRIP): (State.FAULT, HALT),
     (State.STOPPED, Event.LINK_LOST): (State.DISCONNECTED, ()),
-    (State.STOPPED, Event.ARM): (State.ARMED, (Action.RELEASE,)),
-    (State.STOPPED, Event.RESET): (State.IDLE, ()),
+    (State.STOPPED, Event.RESET): (State.IDLE, (Action.RELEASE,)),
     (State.STOPPED, Event.STOP): (State.STOPPED, HALT),
     (State.STOPPED, Event.TRIP): (State.FAULT, HALT),
     (State.FAULT, Event.LINK_LOST): (State.FAULT, ()),
-    (State.FAULT, Event.RESET): (State.IDLE, ()),
+    (State.FAULT, Event.RESET): (State.IDLE, (Action.RELEASE,)),
     (State.FAULT, Event.STOP): (State.FAULT, HALT),
     (State.FAULT, Event.TRIP): (State.FAULT, HALT),
 }
@@ -55,7 +54,7 @@ def test_transition(before: State, event: Event) -> None:
 def test_a_refusal_says_what_to_do() -> None:
     with pytest.raises(IllegalEventError, match=r"^cannot start while idle: arm first$"):
         advance(UP[State.IDLE], Event.START)
-    with pytest.raises(IllegalEventError, match=r"cannot arm while fault: .*reset a fault first"):
+    with pytest.raises(IllegalEventError, match=r"cannot arm while fault: .*reset a stop or a fault first"):
         advance(UP[State.FAULT], Event.ARM)
 
 
@@ -65,10 +64,24 @@ def test_a_fault_is_latched_when_the_link_comes_back_and_the_arm_is_frozen_again
     assert (back.state, back.connected, actions) == (State.FAULT, True, (Action.FREEZE,))
 
 
-def test_reset_without_a_link_is_disconnected() -> None:
-    lost, _ = advance(UP[State.RUNNING], Event.LINK_LOST)
-    arm, _ = advance(lost, Event.RESET)
-    assert arm == Arm(State.DISCONNECTED, connected=False)
+def test_a_stop_outlives_a_lost_link_and_is_sent_again_when_it_is_back() -> None:
+    stopped, _ = advance(UP[State.RUNNING], Event.STOP, "somebody")
+    lost, _ = advance(stopped, Event.LINK_LOST)
+    back, actions = advance(lost, Event.CONNECTED)
+    assert (back.state, back.cause, actions) == (State.STOPPED, "somebody", (Action.FREEZE,))
+
+
+def test_arming_releases_nobodys_stop() -> None:
+    with pytest.raises(IllegalEventError, match="cannot arm while stopped"):
+        advance(UP[State.STOPPED], Event.ARM)
+
+
+def test_a_reset_without_a_link_cannot_end_the_boards_freeze_so_the_arm_comes_back_stopped() -> None:
+    lost, _ = advance(UP[State.RUNNING], Event.LINK_LOST, "cable")
+    arm, actions = advance(lost, Event.RESET)
+    assert (arm, actions) == (Arm(State.DISCONNECTED, connected=False, cause="cable"), ())
+    arm, actions = advance(arm, Event.CONNECTED)
+    assert (arm.state, actions) == (State.STOPPED, (Action.FREEZE,))
 
 
 def test_the_first_cause_of_a_fault_is_kept_until_the_reset() -> None:
