@@ -20,7 +20,18 @@ TracesArgument = Annotated[
     list[str], typer.Argument(help="Files (.mcap, .csv), beginnings of traces' numbers or names, or `last`.")
 ]
 TraceFolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (default: the configured one).")]
-ReportOption = Annotated[Path | None, typer.Option("--report", help="Write a self-contained page, an .html file.")]
+
+
+def _page(path: Path | None) -> Path | None:
+    """Refuses another kind of file before anything is computed."""
+    if path is not None and path.suffix != ".html":
+        raise SpecError(f"report {path}: is written as .html")
+    return path
+
+
+ReportOption = Annotated[
+    Path | None, typer.Option("--report", callback=_page, help="Write a self-contained page, an .html file.")
+]
 
 MODEL_HELP = "A model (.json, as `daq fit` writes it), a machine file (.toml), or a machine that ships (ma2000)."
 
