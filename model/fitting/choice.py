@@ -27,7 +27,11 @@ SLIDING_FRICTION = (
     "stiction",
 )  # fmt: skip
 PRESLIDING_SHARE = 0.5
-"""Standard deviation of the presliding distance as a share of what the model assumes."""
+"""Standard deviation of the presliding distance as a share of what the model assumes: an assumption."""
+CREEPING_SPEED = 0.05
+"""rad/s over which the part of friction that belongs to creeping dies out: an assumption."""
+CREEPING_SHARE = 0.1
+"""Standard deviation of that part as a share of Coulomb friction: an assumption."""
 
 
 def chosen_unknowns(model: Model, options: FitOptions) -> tuple[Unknown, ...]:
@@ -87,22 +91,47 @@ def start_postures(machine: Machine, records: Sequence[Record], bends: bool) -> 
     return tuple(found)
 
 
-def presliding(model: Model) -> tuple[Unknown, ...]:
-    """One unknown a joint with friction: the distance over which friction builds up when motion starts or turns.
+def friction_forms(model: Model) -> tuple[Model, tuple[Unknown, ...]]:
+    """The model with room for a law of friction other than its own near zero speed, and that room as nuisances.
 
-    It lies below the sensor's resolution and no machine file gives it, but it decides a little of every reversal.
+    Two unknowns a joint with sliding friction: the distance over which friction builds up when motion starts or turns,
+    and a part of it that is there at creeping speed only, of either sign. Neither is in any machine file, the sensor
+    cannot show them, and laws of friction differ in them; both decide a little of every reversal.
     """
+    joints = tuple(
+        j
+        for j in model.machine.modelled_joints
+        if any(use.name in SLIDING_FRICTION and j in use.joints for use in model.effects)
+    )
+    taken = {j for use in model.effects if use.name == "stribeck_friction" for j in use.joints}
+    creeping = tuple(j for j in joints if j not in taken)
     found = []
-    for joint in model.machine.modelled_joints:
-        if any(use.name in SLIDING_FRICTION and joint in use.joints for use in model.effects):
-            start = float(model.vector[at.slot(joint, at.PRESLIDING)])
+    for joint in joints:
+        start = float(model.vector[at.slot(joint, at.PRESLIDING)])
+        found.append(
+            Unknown(
+                presliding_name(joint), "rad", start, 0.05 * start, 10 * start, start, PRESLIDING_SHARE * start,
+                nuisance=True,
+            )
+        )  # fmt: skip
+    if not creeping:
+        return model, tuple(found)
+    wider = model.with_effect("stribeck_friction", creeping, {"speed": CREEPING_SPEED})
+    for joint in creeping:
+        name, level = f"joint{joint}.stribeck_friction.torque", friction_level(model, joint)
+        if level > 0:
             found.append(
-                Unknown(
-                    presliding_name(joint), "rad", start, 0.05 * start, 10 * start, start, PRESLIDING_SHARE * start,
-                    nuisance=True,
-                )
-            )  # fmt: skip
-    return tuple(found)
+                Unknown(name, "N·m", 0.0, -level, level, 0.0, CREEPING_SHARE * level, nuisance=True, torque=1)
+            )
+    return wider, tuple(found)
+
+
+def friction_level(model: Model, joint: int) -> float:
+    """Largest Coulomb friction of a joint, N·m: the constant part, and the arm under all the weight beyond the joint."""
+    column = {c: float(model.vector[at.slot(joint, c)]) for c in (at.COULOMB, at.COULOMB_ARM)}
+    beyond = sum(float(model.vector[at.slot(j, at.MASS)]) for j in model.machine.modelled_joints if j >= max(joint, 2))
+    weight = 9.81 * (beyond + float(model.vector[at.LOAD]))
+    return column[at.COULOMB] + column[at.COULOMB_ARM] * weight
 
 
 def _linearity(machine: Machine, joint: int) -> float | None:

@@ -13,11 +13,11 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
 from daq.contracts.trace import Trace
-from model.fitting.choice import chosen_unknowns, presliding, start_postures, with_bends
+from model.fitting.choice import chosen_unknowns, friction_forms, start_postures, with_bends
 from model.fitting.covariance import sandwich
 from model.fitting.least_squares import Search, Solution, solve
 from model.fitting.nelder_mead import climb
-from model.fitting.noise import replicas, with_noise
+from model.fitting.noise import expected_residual
 from model.fitting.options import FitOptions
 from model.fitting.problem import Evaluation, whitened
 from model.fitting.records import Signal, noise_floor, records_of
@@ -36,6 +36,8 @@ INTERVAL = 1.959964
 SETTLED = 0.1
 """Rounds end when no value moves by more than this share of its deviation."""
 LEAST_SQUARES_EVALUATIONS = 60
+FIRST_TOLERANCE = 100.0
+"""Times the tolerance of the rounds: the first search only has to come near."""
 SIMPLEX_EVALUATIONS = 400
 """A parameter."""
 
@@ -47,8 +49,8 @@ def fit(
     """The parameters with which the model best repeats the traces, and how far each can be trusted.
 
     Output error: the model's own loop follows the recorded set points, and its readings are compared with the recorded
-    ones. A first search weighs every sample by the sensor's noise. Then, in rounds, the noise that the residual shows is
-    given to the simulated controller, residual and Jacobian are whitened, and the search goes on from where it was.
+    ones. A first search weighs every sample by the sensor's noise. Then, in rounds, what the noise does on average is
+    taken off, residual and Jacobian are whitened, and the search goes on from where it was.
 
     Raises:
         TraceError, SpecError: for traces or options that cannot give a result; one line says why.
@@ -60,13 +62,14 @@ def fit(
     solution = _first_search(problem, options, progress, cancel)
     evaluations = solution.evaluations
     whiteners: list[Whitener] = [white(d) for d in problem.floor]
+    search = Search(options.robust, options.tolerance, options.most_evaluations or LEAST_SQUARES_EVALUATIONS)
     for number in range(options.rounds):
         last = solution
         progress(0.5 + 0.4 * number / options.rounds, f"round {number + 1}: noise and whitening")
         problem, whiteners = _with_noise(problem, solution.values, options)
         if options.method == "nelder_mead":
             break
-        solution = solve(problem, whiteners, solution.values, cancel, _search(options))
+        solution = solve(problem, whiteners, solution.values, cancel, search)
         evaluations += solution.evaluations
         if _settled(problem, whiteners, last.values, solution.values):
             break
@@ -92,10 +95,10 @@ def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> S
     postures = ()
     if options.start_posture and signal == "position" and not simple:
         postures = start_postures(model.machine, records, bool(bends))
-    contacts = presliding(model) if options.presliding and not simple else ()
+    wider, forms = friction_forms(wider) if options.friction_form and not simple else (wider, ())
     loop = options.loop or ("open" if isinstance(model.machine.controller, NoController) else "closed")
     return SimulatedProblem(
-        wider, records, (*unknowns, *bends, *contacts, *postures), noise_floor(records, model.machine, signal), signal, loop,
+        wider, records, (*unknowns, *bends, *forms, *postures), noise_floor(records, model.machine, signal), signal, loop,
         options.step,
     )  # fmt: skip
 
@@ -111,14 +114,6 @@ def _signal(model: Model, options: FitOptions) -> Signal:
 
 def _starts(problem: SimulatedProblem) -> Floats:
     return np.array([u.start for u in problem.unknowns])
-
-
-def _search(options: FitOptions, robust: bool | None = None, tell: Search | None = None) -> Search:
-    return Search(
-        robust=options.robust if robust is None else robust, tolerance=options.tolerance,
-        most_evaluations=options.most_evaluations or LEAST_SQUARES_EVALUATIONS,
-        tell=None if tell is None else tell.tell,
-    )  # fmt: skip
 
 
 def _first_search(problem: SimulatedProblem, options: FitOptions, progress: Progress, cancel: Cancel) -> Solution:
@@ -138,7 +133,8 @@ def _first_search(problem: SimulatedProblem, options: FitOptions, progress: Prog
                 most = options.most_evaluations or SIMPLEX_EVALUATIONS * len(problem.unknowns)
                 found.append(climb(problem, begin, cancel, most, options.tolerance, tell))
             else:
-                search = Search(False, options.tolerance, options.most_evaluations or LEAST_SQUARES_EVALUATIONS, tell)
+                most = options.most_evaluations or LEAST_SQUARES_EVALUATIONS
+                search = Search(False, FIRST_TOLERANCE * options.tolerance, most, tell)
                 found.append(solve(problem, whiteners, begin, cancel, search))
         except SpecError as error:
             failure = failure or error
@@ -162,13 +158,9 @@ def _beginnings(problem: SimulatedProblem, options: FitOptions) -> list[Floats]:
 def _with_noise(
     problem: SimulatedProblem, values: Floats, options: FitOptions
 ) -> tuple[SimulatedProblem, list[Whitener]]:
-    """The problem with the noise that its residual shows, and the whitening that its residual then asks for."""
-    if problem.loop == "closed" and problem.signal == "position":
-        if options.noise_feedback:
-            problem = with_noise(problem.with_offset(None), values)
-        if options.replicas:
-            drawn = replicas(problem, values, options.replicas, options.seed, options.noise_feedback)
-            problem = problem.with_offset([np.mean(each, axis=0) for each in zip(*drawn, strict=True)])
+    """The problem less what the noise does on average, and the whitening that its residual then asks for."""
+    if options.replicas and problem.loop == "closed" and problem.signal == "position":
+        problem = problem.with_offset(expected_residual(problem, values, options.replicas, options.seed))
     evaluations = problem.evaluate(values, derivatives=False)
     whiteners = []
     for column, floor in enumerate(problem.floor):
@@ -182,9 +174,11 @@ def _with_noise(
 
 @dataclass(frozen=True)
 class _Estimate:
+    """At the solution; `after` is without what the noise does on average: simulated − measured as anybody would see it."""
+
     covariance: Floats
     report: IdentifiabilityReport
-    evaluations: list[Evaluation]
+    after: list[Evaluation]
     mean_square: float
 
 
@@ -200,7 +194,8 @@ def _estimate(
     prior = np.maximum(prior_precision(problem.unknowns) * scale**2, 1e-12)
     covariance = sandwich(scaled.information, scaled.scores(cut), prior) * np.outer(scale, scale)
     report = judged(data.jacobian.reshape(data.residual.size, -1), values, problem.unknowns)
-    return _Estimate(covariance, report, evaluations, float(np.mean(data.residual**2)))
+    after = problem.with_offset(None).evaluate(values, derivatives=False)
+    return _Estimate(covariance, report, after, float(np.mean(data.residual**2)))
 
 
 def _settled(problem: SimulatedProblem, whiteners: Sequence[Whitener], last: Floats, now: Floats) -> bool:
@@ -216,7 +211,7 @@ def _result(
     names = tuple(u.name for u in problem.unknowns)
     own = {u.name: float(v) for u, v in zip(problem.unknowns, solution.values, strict=True) if not u.nuisance}
     identities = tuple(record.name for record in problem.records)
-    errors = _errors(model, problem, before, estimate.evaluations)
+    errors = _errors(model, problem, before, estimate.after)
     summary = {
         "rmse": [e.after for e in errors], "whitened_mean_square": estimate.mean_square,
         "converged": solution.converged, "fitted": list(own), "known": list(estimate.report.known),

@@ -33,9 +33,8 @@ class FitOptions(BaseModel):
     starts: searches from different beginnings, the model's own values and seeded draws from the priors.
     start_posture: let the arm start off the posture it was read at, by the sensor's error.
     sensor_bend: let the potentiometers bend within their stated linearity; None: where the machine states one.
-    presliding: let friction build up over a distance of its own on every joint.
-    noise_feedback: give the simulated controller the noise that the record shows. whiten: take out the correlation
-        of the residual before weighing it.
+    friction_form: leave open how friction behaves near zero speed, where laws of friction differ.
+    whiten: take out the correlation of the residual before weighing it.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -51,8 +50,7 @@ class FitOptions(BaseModel):
     seed: Annotated[int, Field(ge=0)] = 0
     start_posture: bool = True
     sensor_bend: bool | None = None
-    presliding: bool = True
-    noise_feedback: bool = True
+    friction_form: bool = True
     whiten: bool = True
     replicas: Annotated[int, Field(ge=0, le=1000)] = 16
     """Simulations with drawn noise that tell what the noise does on average; 0 for none."""
@@ -60,7 +58,7 @@ class FitOptions(BaseModel):
     """Samples that the whitening looks back, at most."""
     rounds: Annotated[int, Field(ge=1, le=20)] = 4
     """Of noise, whitening and search, at most."""
-    tolerance: Annotated[FiniteFloat, Field(gt=0)] = 1e-6
+    tolerance: Annotated[FiniteFloat, Field(gt=0)] = 1e-5
     most_evaluations: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
     """Of one search; None: 60 for least squares, 400 a parameter for Nelder and Mead."""
     loop: Literal["closed", "open"] | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -19,6 +19,9 @@ Signal = Literal["position", "velocity"]
 
 LEAST_SAMPLES = 10
 """A trace shorter than this says nothing about motion."""
+SETTLING = 0.4
+"""s at the start of a record that are simulated but not compared: how friction holds the arm there is not known, and
+the little jump of a simulation that finds its own balance would pass for inertia."""
 LEAST_MOTION_COUNTS = 4.0
 """Counts of the sensor that at least one joint of at least one trace must move: less is rounding and noise."""
 WILD_COUNTS = 400.0
@@ -104,10 +107,23 @@ def _record(trace: Trace, machine: Machine, signal: Signal) -> Record:
         raise TraceError(f"trace {name}: has no velocity, which is what is to be fitted")
     source = trace.velocity if signal == "velocity" and trace.velocity is not None else trace.position
     _check_same_unit(trace, machine)
+    inputs = _calm_start(inputs, trace, columns)
+    begin = int(np.searchsorted(inputs.rows * inputs.period, SETTLING))
+    begin = begin if begin <= len(trace) // 4 else 0
     breaks = np.flatnonzero(np.diff(inputs.rows) > 1.5) + 1
-    edges = [0, *(int(b) for b in breaks), len(trace)]
+    edges = [begin, *(int(b) for b in breaks if b > begin), len(trace)]
     runs = tuple(slice(a, b) for a, b in zip(edges, edges[1:], strict=False))
     return Record(inputs, np.ascontiguousarray(source[:, columns]), runs, name)
+
+
+def _calm_start(inputs: RunInputs, trace: Trace, columns: list[int]) -> RunInputs:
+    """The drive before the record as the mean over the rest at its start: one sample of it is mostly noise."""
+    if trace.set_point is None or trace.drive is None:
+        return inputs
+    changed = np.abs(trace.set_point[:, columns] - trace.set_point[0, columns]).max(axis=1) > 1e-9
+    rest = int(np.argmax(changed)) if changed.any() else len(trace)
+    rest = max(1, min(rest, round(SETTLING / inputs.period)))
+    return replace(inputs, first_drive=np.ascontiguousarray(trace.drive[:rest, columns].mean(axis=0)))
 
 
 def _check_same_unit(trace: Trace, machine: Machine) -> None:

@@ -31,8 +31,6 @@ class SimulatedProblem:
     """Simulated − measured for records of one machine.
 
     Args:
-        noise: per record (k, n) noise of the readings, rad, that the simulated controller is given; None for none.
-            It is taken out again of the simulated readings, so that a residual is always against the arm itself.
         offset: per record (m, n) residual, rad, that the model itself would leave on average; None for none.
     """
 
@@ -43,17 +41,12 @@ class SimulatedProblem:
     signal: Signal = "position"
     loop: Literal["closed", "open"] = "closed"
     step: float = LONGEST_STEP
-    noise: tuple[Floats, ...] | None = None
     offset: tuple[Floats, ...] | None = None
 
     @property
     def runs(self) -> Sequence[Sequence[slice]]:
         """Per trace, the stretches of samples without a gap."""
         return [record.runs for record in self.records]
-
-    def with_noise(self, noise: Sequence[Floats] | None) -> SimulatedProblem:
-        """The problem with other noise in the simulated controllers' readings."""
-        return replace(self, noise=None if noise is None else tuple(noise))
 
     def with_offset(self, offset: Sequence[Floats] | None) -> SimulatedProblem:
         """The problem with another expected residual."""
@@ -86,20 +79,9 @@ class SimulatedProblem:
         ]
 
     @cached_property
-    def _counts(self) -> Floats:
-        """(n,) rad a count of the noise that a simulation takes, signed; 1 where a joint has no converter."""
-        sensors = [self.model.machine.joint(j).sensor for j in self.model.machine.modelled_joints]
-        return np.array([1.0 if s is None else s.direction * s.range.value / 2**s.bits for s in sensors])
-
-    @cached_property
     def _prepared(self) -> list[Prepared]:
         options = Options(loop=self.loop, quantise=False, step=self.step)
-        prepared = [prepare(self.model, record.inputs, options) for record in self.records]
-        if self.noise is None:
-            return prepared
-        return [
-            replace(p, noise=np.ascontiguousarray(n / self._counts)) for p, n in zip(prepared, self.noise, strict=True)
-        ]
+        return [prepare(self.model, record.inputs, options) for record in self.records]
 
     @cached_property
     def _places(self) -> list[tuple[NDArray[np.int64], tuple[int, int] | None]]:
@@ -135,8 +117,6 @@ class SimulatedProblem:
             simulated = signal[own[0], : len(record.inputs)].real
             if not np.isfinite(simulated).all():
                 raise SpecError(f"the simulation of {record.name} does not stay finite: the loop is unstable")
-            if self.noise is not None and self.signal == "position":
-                simulated = simulated - self.noise[t]
             residual = at_rows(simulated, record.inputs.rows) - record.measured
             if self.offset is not None:
                 residual = residual - self.offset[t]

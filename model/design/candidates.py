@@ -1,0 +1,101 @@
+"""Experiments drawn at random within the limits: what a search for good ones chooses from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from daq.contracts.experiment import (
+    Cubic,
+    ExperimentSpec,
+    Gain,
+    Multisine,
+    Pause,
+    Ramp,
+    Segment,
+    Sequence,
+    SlowRamp,
+)
+from daq.contracts.machine import BoardPid, Machine
+
+MARGIN = math.radians(5.0)
+"""Distance that start postures keep from the limits of a joint."""
+AMPLITUDES = (math.radians(4.0), math.radians(25.0))
+HIGHEST_FREQUENCIES = (0.5, 2.0)
+"""Hz; the slowest joint follows to about 0.8 Hz at full amplitude, small motion goes further."""
+SLOW_SPEEDS = (math.radians(2.0), math.radians(8.0))
+
+
+def drawn_experiment(machine: Machine, number: int, duration: float, seed: int) -> ExperimentSpec:
+    """Candidate `number` of a seed: a multisine, slow ramps, or a sequence, at a posture and with gains of its own.
+
+    It may lie outside the limits; whoever plans it refuses it then.
+    """
+    rng = np.random.default_rng([seed, number])
+    kind = KINDS[number % len(KINDS)]
+    joints = machine.modelled_joints
+    spec = ExperimentSpec(
+        trajectory=kind(rng, joints, duration), joints=joints, start=_start(rng, machine), gains=_gains(rng, machine),
+        settle=0.5, hold=0.5, name=f"candidate-{seed}-{number}",
+    )  # fmt: skip
+    return ExperimentSpec.model_validate(spec.model_dump())
+
+
+def _start(rng: np.random.Generator, machine: Machine) -> dict[int, float]:
+    start = {}
+    for joint in machine.modelled_joints:
+        limits = machine.limits.joint(joint)
+        if limits.low is not None and limits.high is not None:
+            start[joint] = float(rng.uniform(limits.low + MARGIN, limits.high - MARGIN))
+        elif machine.rest_posture is not None:
+            start[joint] = machine.rest_posture[joint - 1]
+    return start
+
+
+def _gains(rng: np.random.Generator, machine: Machine) -> dict[int, Gain]:
+    """The machine's own gains, or one step less or more of P on some joints: enough to tell gain from load."""
+    if not isinstance(machine.controller, BoardPid):
+        return {}
+    gains = {}
+    for joint in machine.modelled_joints:
+        p, i, d = machine.controller.gains[joint - 1]
+        change = int(rng.integers(-1, 2))
+        if change and 1 <= p + change <= 20:
+            gains[joint] = (p + change, i, d)
+    return gains
+
+
+def _amplitudes(rng: np.random.Generator, joints: tuple[int, ...], share: float = 1.0) -> dict[int, float]:
+    low, high = AMPLITUDES
+    return {j: share * float(rng.choice((-1, 1)) * math.exp(rng.uniform(math.log(low), math.log(high)))) for j in joints}
+
+
+def _multisine(rng: np.random.Generator, joints: tuple[int, ...], duration: float) -> Multisine:
+    return Multisine(
+        amplitude=_amplitudes(rng, joints), duration=duration, lowest=0.1, highest=float(rng.uniform(*HIGHEST_FREQUENCIES)),
+        tones=12, seed=int(rng.integers(1, 10_000)),
+    )  # fmt: skip
+
+
+def _slow_ramps(rng: np.random.Generator, joints: tuple[int, ...], duration: float) -> Sequence:
+    amplitude, speed = _amplitudes(rng, joints, 0.4), float(rng.uniform(*SLOW_SPEEDS))
+    leg = max(abs(a) for a in amplitude.values()) / speed
+    reversals = int(np.clip(duration / leg - 1, 1, 20))
+    return Sequence(segments=(Segment(move=SlowRamp(amplitude=amplitude, speed=speed, reversals=reversals)),))
+
+
+def _sequence(rng: np.random.Generator, joints: tuple[int, ...], duration: float) -> Sequence:
+    segments, left = [], duration
+    while left > 0:
+        amplitude, time = _amplitudes(rng, joints), float(rng.uniform(0.5, 1.5))
+        for sign in (1.0, -1.0):
+            moved = {j: sign * a for j, a in amplitude.items()}
+            move = Ramp(amplitude=moved, duration=time) if rng.random() < 0.5 else Cubic(amplitude=moved, duration=time)
+            segments += [Segment(move=move), Segment(move=Pause(duration=0.3))]
+            left -= time + 0.3
+    return Sequence(segments=tuple(segments))
+
+
+KINDS: tuple[Callable[..., Multisine | Sequence], ...] = (_multisine, _sequence, _slow_ramps)

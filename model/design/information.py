@@ -1,0 +1,153 @@
+"""What an experiment tells about a model's parameters, before it is made: Fisher information of simulated records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.machine import NoController
+from daq.contracts.trace import Trace, TraceRecord
+from model.fitting.fit import INTERVAL, fit_problem
+from model.fitting.options import FitOptions
+from model.fitting.problem import whitened
+from model.fitting.result import FitResult
+from model.fitting.simulated import SimulatedProblem
+from model.fitting.unknowns import Unknown, prior_precision, scales
+from model.fitting.whitening import white
+from model.machine_model.model import Model
+
+Floats = NDArray[np.float64]
+
+Planner = Callable[[ExperimentSpec], Floats]
+"""Set points (k, joints of the machine) in rad, one row a control period, of an experiment. It raises a DaqError (one
+line) for an experiment that the limits of the machine do not allow. Given from above: planning belongs to `daq`."""
+
+CORRELATION = 3.0
+"""Samples that count as one, since the residual of a closed loop is correlated: a cautious round number."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ParameterGain(_Part):
+    """Width of a parameter's 95 % interval (high − low, in its unit) without and with the proposed experiments."""
+
+    name: str
+    unit: str
+    before: float
+    after: float
+
+    @property
+    def share(self) -> float:
+        """What is left of the width."""
+        return self.after / self.before
+
+
+class InformationGain(_Part):
+    """What proposed experiments would add. `nats` is half the log of the ratio of the volumes of uncertainty."""
+
+    parameters: tuple[ParameterGain, ...]
+    nats: float
+
+
+def information_gain(
+    model: Model, specs: Sequence[ExperimentSpec], plan: Planner, *, options: FitOptions | None = None,
+    fitted: FitResult | None = None,
+) -> InformationGain:  # fmt: skip
+    """How much narrower the intervals would be after the proposed experiments.
+
+    Args:
+        model: the arm as it is believed to be; it takes the real one's place.
+        options: which parameters count (`FitOptions.parameters`). fitted: what is known already; None: the priors.
+
+    Raises SpecError when the experiments are not possible, or the fit was of other parameters.
+    """
+    if not specs:
+        raise SpecError("no experiments: there is nothing to judge")
+    options = options or (fitted.options if fitted is not None else FitOptions())
+    added = [experiment_information(model, spec, plan, options) for spec in specs]
+    unknowns = added[0][0]
+    known = prior_information(unknowns) if fitted is None else _fitted_information(unknowns, fitted)
+    total = known + sum(information for _, information in added)
+    natural = scales(unknowns)
+    before, after = np.linalg.inv(known), np.linalg.inv(total)
+    parameters = tuple(
+        ParameterGain(name=u.name, unit=u.unit, before=2 * INTERVAL * s * b**0.5, after=2 * INTERVAL * s * a**0.5)
+        for u, s, b, a in zip(unknowns, natural, np.diag(before), np.diag(after), strict=True)
+    )
+    nats = 0.5 * float(np.linalg.slogdet(total)[1] - np.linalg.slogdet(known)[1])
+    return InformationGain(parameters=parameters, nats=nats)
+
+
+def prior_information(unknowns: Sequence[Unknown]) -> Floats:
+    """(p, p) information of the priors in natural sizes; where nothing is claimed, that of a hundred natural sizes."""
+    precision = prior_precision(tuple(unknowns)) * scales(tuple(unknowns)) ** 2
+    return np.diag(np.maximum(precision, 1e-4))
+
+
+def experiment_information(
+    model: Model, spec: ExperimentSpec, plan: Planner, options: FitOptions
+) -> tuple[tuple[Unknown, ...], Floats]:
+    """Unknowns (nuisances of the experiment itself marginalised) and their information (p, p) in natural sizes.
+
+    Raises SpecError or SafetyError from the planner, and SpecError when the loop is unstable under it.
+    """
+    trace = imagined_trace(model, spec, plan)
+    problem = fit_problem(model, [trace], options)
+    values = np.array([u.start for u in problem.unknowns])
+    floor = [white(d * CORRELATION**0.5) for d in problem.floor]
+    data = whitened(problem, problem.evaluate(values, derivatives=True), floor)
+    natural = scales(problem.unknowns)
+    information = replace(data, jacobian=data.jacobian * natural).information
+    return _marginal(problem, information)
+
+
+def imagined_trace(model: Model, spec: ExperimentSpec, plan: Planner) -> Trace:
+    """The record that the experiment would give on this model without noise. Raises as the planner does."""
+    machine = model.machine
+    if isinstance(machine.controller, NoController):
+        raise SpecError(f"machine {machine.name} has no controller: no experiment with set points can be imagined on it")
+    angles = np.asarray(plan(spec), dtype=np.float64)
+    period = machine.controller.period.value
+    record = TraceRecord(
+        trace_id=spec.name or spec.trajectory.kind, created=datetime(2000, 1, 1, tzinfo=UTC), software="imagined",
+        source="imported", robot=machine.name, spec=spec, gains=spec.gains or None, period=period,
+    )  # fmt: skip
+    joints = machine.modelled_joints
+    wanted = np.ascontiguousarray(angles[:, [j - 1 for j in joints]])
+    return Trace(
+        record, joints, period * np.arange(len(wanted)), wanted, set_point=wanted, drive=np.zeros_like(wanted),
+        tick=np.arange(len(wanted)),
+    )  # fmt: skip
+
+
+def _marginal(problem: SimulatedProblem, information: Floats) -> tuple[tuple[Unknown, ...], Floats]:
+    """Information about what is not a nuisance, nuisances known as far as their priors say."""
+    nuisance = np.array([u.nuisance for u in problem.unknowns])
+    own = tuple(u for u in problem.unknowns if not u.nuisance)
+    if not nuisance.any():
+        return own, information
+    inner = information[np.ix_(nuisance, nuisance)] + np.eye(int(nuisance.sum()))
+    cross = information[np.ix_(nuisance, ~nuisance)]
+    left = information[np.ix_(~nuisance, ~nuisance)] - cross.T @ np.linalg.solve(inner, cross)
+    return own, 0.5 * (left + left.T)
+
+
+def _fitted_information(unknowns: Sequence[Unknown], fitted: FitResult) -> Floats:
+    """Information (p, p) in natural sizes that a fit left behind, its priors included."""
+    rows = []
+    for u in unknowns:
+        if u.name not in fitted.names:
+            raise SpecError(f"{u.name}: the fit did not find it; fitted were {', '.join(p.name for p in fitted.parameters)}")
+        rows.append(fitted.names.index(u.name))
+    natural = scales(tuple(unknowns))
+    covariance = fitted.covariance_matrix[np.ix_(rows, rows)] / np.outer(natural, natural)
+    return np.asarray(np.linalg.inv(covariance))

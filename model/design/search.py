@@ -1,0 +1,130 @@
+"""D-optimal choice of experiments: the set that makes the ellipsoid of uncertainty smallest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
+from model.design.candidates import drawn_experiment
+from model.design.information import (
+    InformationGain,
+    ParameterGain,
+    Planner,
+    experiment_information,
+    prior_information,
+)
+from model.fitting.fit import INTERVAL
+from model.fitting.options import FitOptions
+from model.fitting.unknowns import scales
+from model.machine_model.model import Model
+
+Floats = NDArray[np.float64]
+
+
+class DesignOptions(BaseModel):
+    """How to search. `experiments` of `duration` s each are chosen from `candidates` drawn with `seed`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    experiments: Annotated[int, Field(ge=1, le=50)] = 4
+    duration: Annotated[float, Field(ge=1.0, le=600.0)] = 12.0
+    candidates: Annotated[int, Field(ge=1, le=10_000)] = 60
+    seed: Annotated[int, Field(ge=0)] = 0
+
+
+class DesignedExperiments(BaseModel):
+    """The experiments chosen, in the order in which they add most, and what they give together.
+
+    `gains[i]` is what the first i+1 experiments give. `refused` counts candidates outside the limits.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    specs: tuple[ExperimentSpec, ...]
+    gain: InformationGain
+    nats: tuple[float, ...]
+    """Information after each, over the priors alone."""
+    refused: int
+    considered: int
+    options: DesignOptions
+
+
+def design(
+    model: Model, plan: Planner, options: DesignOptions | None = None, fit_options: FitOptions | None = None,
+    progress: Progress = silent, cancel: Cancel | None = None,
+) -> DesignedExperiments:  # fmt: skip
+    """Experiments within the limits that make the parameters of `fit_options` best known together.
+
+    Greedy choice of the candidate that adds most to log det of the information (priors included), then exchanges as
+    long as one helps (Fedorov 1972). The same seed gives the same experiments.
+
+    Raises:
+        SpecError: when no candidate is within the limits. CancelledError: when asked to end.
+    """
+    options, fit_options, cancel = options or DesignOptions(), fit_options or FitOptions(), cancel or Never()
+    specs, informations, refused = [], [], 0
+    unknowns = ()
+    last_refusal = ""
+    for number in range(options.candidates):
+        if cancel.is_set():
+            raise CancelledError("the design was cancelled")
+        progress(0.95 * number / options.candidates, f"candidate {number + 1} of {options.candidates}, {refused} refused")
+        spec = drawn_experiment(model.machine, number, options.duration, options.seed)
+        try:
+            unknowns, information = experiment_information(model, spec, plan, fit_options)
+        except DaqError as error:
+            refused, last_refusal = refused + 1, str(error)
+            continue
+        specs.append(spec)
+        informations.append(information)
+    if not specs:
+        raise SpecError(f"none of {options.candidates} candidates can be carried out; the last: {last_refusal}")
+    prior = prior_information(unknowns)
+    chosen = best_set(prior, informations, options.experiments)
+    totals = [prior + sum(informations[k] for k in chosen[: i + 1]) for i in range(len(chosen))]
+    nats = tuple(_log_det(total) - _log_det(prior) for total in totals)
+    widths = [np.sqrt(np.diag(np.linalg.inv(m))) for m in (prior, totals[-1])]
+    gains = tuple(
+        ParameterGain(name=u.name, unit=u.unit, before=2 * INTERVAL * s * b, after=2 * INTERVAL * s * a)
+        for u, s, b, a in zip(unknowns, scales(unknowns), *widths, strict=True)
+    )
+    progress(1.0, "done")
+    return DesignedExperiments(
+        specs=tuple(specs[k] for k in chosen), gain=InformationGain(parameters=gains, nats=nats[-1]), nats=nats,
+        refused=refused, considered=options.candidates, options=options,
+    )  # fmt: skip
+
+
+def best_set(prior: Floats, informations: Sequence[Floats], count: int) -> list[int]:
+    """Indices of `count` different experiments (fewer where there are fewer) with the largest log det together."""
+    chosen: list[int] = []
+    for _ in range(min(count, len(informations))):
+        total = prior + sum(informations[k] for k in chosen)
+        chosen.append(_best_addition(total, informations, chosen))
+    improved = True
+    while improved:
+        improved = False
+        for place in range(len(chosen)):
+            others = [k for i, k in enumerate(chosen) if i != place]
+            total = prior + sum(informations[k] for k in others)
+            better = _best_addition(total, informations, others)
+            if _log_det(total + informations[better]) > _log_det(total + informations[chosen[place]]) + 1e-9:
+                chosen[place], improved = better, True
+    return chosen
+
+
+def _best_addition(total: Floats, informations: Sequence[Floats], taken: Sequence[int]) -> int:
+    free = [k for k in range(len(informations)) if k not in taken]
+    return max(free, key=lambda k: _log_det(total + informations[k]))
+
+
+def _log_det(information: Floats) -> float:
+    """Half of the logarithm of the determinant, in nats."""
+    return 0.5 * float(np.linalg.slogdet(information)[1])
