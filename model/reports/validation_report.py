@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels, thinned
-from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, cells, listed
+from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, Tone, cells, listed
 from model.validation.criterion import Curve, Fidelity
 from model.validation.time_domain import TimeDomain, Variation
 
@@ -159,7 +159,7 @@ def _variation_table(one: TimeDomain) -> Table:
     rows = []
     for v in one.parameters:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in v.against if c.significant][:2]
-        tone = "plain" if v.within_expectation else "warning"
+        tone: Tone = "plain" if v.within_expectation else "warning"
         rows.append((
             Cell(v.name), Cell(f"{v.deviation:.3g}", tone, number=True), Cell(f"{v.expected:.3g}", number=True),
             Cell(v.unit), Cell(f"{100 * v.significant:.0f} %", number=True),
