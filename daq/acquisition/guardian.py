@@ -30,7 +30,7 @@ class EndCause(Enum):
     """Why a run is ended from outside."""
 
     STOP = "stopped from another terminal"
-    PARENT = "stopped by whoever started the run"
+    PARENT = "stopped by Ctrl-C, or by the program that started the run"
     SIGNAL = "stopped by a signal"
     ORPHANED = "the process that started this run is gone"
     DEAF = "this run could no longer be stopped from outside"

@@ -25,7 +25,7 @@ def console() -> Console:
     """For people: progress, questions, remarks, on standard error. Results go to standard output."""
     from rich.console import Console
 
-    return Console(stderr=True, highlight=False)
+    return Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 @dataclass

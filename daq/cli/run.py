@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable
 from pathlib import Path
 from types import NoneType
@@ -37,6 +38,19 @@ _IN_SHORT = {
     "sine": "A sine about the start posture.",
     "multisine": "Many sines at once, with seeded phases.",
     "cubic": "Cubic in time, at rest at both ends.",
+}
+_HELP = {
+    "duration": "Seconds.",
+    "period": "Seconds.",
+    "dwell": "Seconds on each step.",
+    "steps": "Number of steps one way.",
+    "back": "Down again afterwards.",
+    "reversals": "Changes of direction.",
+    "cycles": "Periods of the sine.",
+    "lowest": "Lowest frequency in Hz.",
+    "highest": "Highest frequency in Hz.",
+    "tones": "Number of sines.",
+    "seed": "Of the phases.",
 }
 _ANGLES = {"phase": "degrees", "speed": "degrees/s"}
 
@@ -83,11 +97,11 @@ def _option(name: str, field: FieldInfo) -> tuple[Any, Any]:
     kind = field.annotation
     if NoneType in get_args(kind):
         raise TypeError(f"trajectory field {name}: optional fields have no option")
-    return Annotated[kind, typer.Option()], default
+    return Annotated[kind, typer.Option(help=_HELP.get(name, ""))], default
 
 
 def _degrees(radians: float) -> float:
-    return round(radians * 180 / 3.141592653589793, 6)
+    return round(math.degrees(radians), 6)
 
 
 def _trajectory(kind: type[BaseModel], values: dict[str, Any]) -> dict[str, Any]:

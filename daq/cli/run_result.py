@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
+from daq.cli.consent import agreed, can_be_asked
 from daq.cli.context import Invocation, console, print_json
 from daq.cli.stop_keys import StopKeys
 from daq.contracts.errors import SafetyError
@@ -62,18 +62,13 @@ def acquire(call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Pa
         moves_real_arm=consent,
     )
     end = _shown(job)
-    if not isinstance(end, Finished) and end.needs_consent and _can_be_asked():
-        if not typer.confirm(f"{job.url} is a real arm and will move. Is its workspace clear?", err=True):
+    if not isinstance(end, Finished) and end.needs_consent and can_be_asked():
+        if not agreed(job.url):
             raise AcquisitionFailedError("not agreed: nothing moved", end.exit_code)
         end = _shown(job.model_copy(update={"moves_real_arm": True}))
     if not isinstance(end, Finished):
         raise AcquisitionFailedError(end.message, end.exit_code)
     return end
-
-
-def _can_be_asked() -> bool:
-    """Consent is a person's: what comes through a pipe is nobody's word."""
-    return console().is_terminal and sys.stdin.isatty()
 
 
 def _shown(job: Job) -> Finished | Failed:
@@ -84,6 +79,10 @@ def _shown(job: Job) -> Finished | Failed:
     from daq.acquisition import messages
     from daq.acquisition.parent import Acquisition
 
+    # A sequence has dozens of marks; they are in the trace.
+    quiet = {"start", "end"} | (
+        {"note", "ramp_start", "ramp_end", "reversal"} if job.spec.trajectory.kind == "sequence" else set()
+    )
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[text]}"), TimeElapsedColumn())
     with (
         StopKeys() as keys,
@@ -95,10 +94,10 @@ def _shown(job: Job) -> Finished | Failed:
         for report in process:
             if isinstance(report, messages.Progress):
                 bar.update(task, completed=report.fraction, text=report.text)
-            elif isinstance(report, messages.EventHappened) and report.event.kind not in ("start", "end"):
+            elif isinstance(report, messages.EventHappened) and report.event.kind not in quiet:
                 event = report.event
                 line = escape(f"{event.kind.replace('_', ' ')}: {event.message}")
-                bar.console.print(f"[dim]{event.time:8.2f} s[/dim]  {line}")
+                bar.console.print(f"[dim]{event.time:8.2f} s[/dim]  {line}", soft_wrap=True)
             elif isinstance(report, messages.Finished | messages.Failed):
                 return report
     raise AssertionError("an acquisition always ends with a report")

@@ -21,6 +21,8 @@ TraceArgument = Annotated[
 FolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (default: the configured one).")]
 
 EXIT_NOT_TRUSTWORTHY = 5
+SHOWN_DIGITS = 8
+"""Of a trace's number in the list, which then fits into 80 columns; the beginning of a number names the trace."""
 
 
 def _folder(call: Invocation, folder: Path | None) -> Path:
@@ -48,17 +50,17 @@ def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOpti
         return
     from rich.table import Table
 
-    table = Table(
-        "number", "recorded (UTC)", "what", "joints", "samples", "s", "outcome", box=None, header_style="bold"
-    )
+    table = Table(box=None, header_style="bold")
+    for title in ("number", "recorded (UTC)", "what", "joints", "samples", "s", "outcome"):
+        table.add_column(title, no_wrap=True)
     for one in summaries:
-        moment = one.created.strftime("%Y-%m-%d %H:%M:%S") if one.created else "?"
+        moment = one.created.strftime("%Y-%m-%d %H:%M") if one.created else "?"
         ended = one.outcome or one.state
         table.add_row(
-            one.trace_id or one.path.name,
+            (one.trace_id or one.path.name)[:SHOWN_DIGITS],
             moment,
             f"{one.name or one.kind or one.source or one.problem}",
-            ",".join(map(str, one.joints)),
+            joints_text(one.joints),
             "?" if one.samples is None else str(one.samples),
             "?" if one.duration is None else f"{one.duration:.2f}",
             f"[green]{ended}[/green]" if ended == "complete" else f"[bold red]{ended}[/bold red]",
@@ -66,6 +68,13 @@ def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOpti
     from rich.console import Console
 
     Console(highlight=False).print(table)
+
+
+def joints_text(joints: tuple[int, ...]) -> str:
+    """`1-3` where joints follow each other, else `1,3`."""
+    if len(joints) > 1 and joints == tuple(range(joints[0], joints[-1] + 1)):
+        return f"{joints[0]}-{joints[-1]}"
+    return ",".join(map(str, joints))
 
 
 @app.command()
@@ -214,3 +223,5 @@ def salvage(context: typer.Context, folder: FolderOption = None, json: JsonOptio
         print(f"{result.path}: salvaged from {result.part.name}" if result.path else f"{result.part}: {result.problem}")
     if not results:
         console().print("nothing to salvage")
+    if any(result.path is None for result in results):
+        raise typer.Exit(EXIT_NOT_TRUSTWORTHY)

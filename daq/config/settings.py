@@ -107,7 +107,7 @@ def load_settings(explicit: Path | None = None) -> tuple[Settings, Path | None]:
         if path.is_file():
             return _parse(path), path
         if asked_for:
-            raise SpecError(f"configuration {path}: no such file")
+            raise SpecError(f"configuration {path}: {'is not a file' if path.exists() else 'no such file'}")
     return _validated({}, "environment"), None
 
 
@@ -134,7 +134,8 @@ def _validated(data: dict[str, Any], origin: str) -> Settings:
         if first["type"] == "extra_forbidden":
             message = f"no such key; allowed here: {', '.join(_keys_at(first['loc'][:-1]))}"
         where = _variable_of(first["loc"]) or f"configuration {origin}"
-        raise SpecError(f"{where}: {key} = {first['input']!r}: {message}") from error
+        value = "" if isinstance(first["input"], dict) else f" = {first['input']!r}"
+        raise SpecError(f"{where}: {key}{value}: {message}") from error
 
 
 def _variable_of(where: tuple[int | str, ...]) -> str | None:

@@ -11,6 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError,
 from daq.contracts.errors import SpecError
 
 JOINTS = 6
+GAIN_PLACE = 3
+"""Length of the place of one gain: the field, the joint, which of P, I, D."""
 DEFAULT_AMPLITUDE = math.radians(21.6)
 """21.6°, that is 80 posture units (section 6.5 of the source)."""
 DEFAULT_RAMP_TIME = 0.65
@@ -198,10 +200,29 @@ def parse_spec(data: object, origin: str = "experiment") -> ExperimentSpec:
     try:
         return ExperimentSpec.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or origin
-        value = "" if isinstance(first["input"], dict | BaseModel) else f" (got {first['input']!r})"
-        raise SpecError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}{value}") from error
+        raise SpecError(f"{origin}: {_one_line(error)}") from error
+
+
+def _one_line(error: ValidationError) -> str:
+    """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
+    first = error.errors()[0]
+    where, value = [str(part) for part in first["loc"]], first["input"]
+    # Names that pydantic gives to the branches of a union are not the user's.
+    where = [
+        part
+        for i, part in enumerate(where)
+        if not part.startswith("constrained-") and (i != 1 or where[0] != "trajectory")
+    ]
+    message = first["msg"].removeprefix("Value error, ")
+    if "gains" in where[:1] and len(where) == GAIN_PLACE:
+        where = [f"gains of joint {where[1]}", "PID"[int(where[2])]]
+    bound = next((first.get("ctx", {})[key] for key in ("le", "ge") if key in first.get("ctx", {})), None)
+    if bound is not None and math.isclose(abs(bound), 2 * math.pi) and isinstance(value, int | float):
+        message, value = "must lie between -360° and 360°", f"{math.degrees(value):g}°"
+    elif not isinstance(value, str):
+        value = repr(value)
+    given = "" if isinstance(first["input"], dict | BaseModel) else f" (got {value})"
+    return f"{': '.join(['.'.join(where)] * bool(where) + [message])}{given}"
 
 
 def parse_joints(text: str) -> tuple[int, ...]:
@@ -218,5 +239,8 @@ def parse_joints(text: str) -> tuple[int, ...]:
         for joint in (first, last):
             if not 1 <= joint <= JOINTS:
                 raise SpecError(f"joints {text!r}: there is no joint {joint}, joints are 1 to {JOINTS}")
-        joints.update(range(first, last + 1))
+        for joint in range(first, last + 1):
+            if joint in joints:
+                raise SpecError(f"joints {text!r}: joint {joint} is given twice")
+            joints.add(joint)
     return tuple(sorted(joints))

@@ -24,6 +24,12 @@ class TransportError(DaqError):
     exit_code = 3
 
 
+class PortUrlError(TransportError):
+    """A port URL that cannot be understood."""
+
+    exit_code = 2
+
+
 @dataclass(frozen=True)
 class SerialPort:
     """A serial port or pseudo-terminal of this machine."""
@@ -71,21 +77,21 @@ def parse_port_url(text: str) -> PortUrl:
     """The port that a URL names. Raises TransportError with one line: what is wrong and what is allowed."""
     if "://" not in text:
         hint = f"; for a device write serial://{text}" if text.startswith("/") else ""
-        raise TransportError(f"port {text!r}: must begin with serial://, tcp:// or mock://{hint}")
+        raise PortUrlError(f"port {text!r}: must begin with serial://, tcp:// or mock://{hint}")
     try:
         parts = urlsplit(text)
         options = parse_qsl(parts.query, keep_blank_values=True)
     except ValueError as error:
-        raise TransportError(f"port {text!r}: no URL: {error}") from error
+        raise PortUrlError(f"port {text!r}: no URL: {error}") from error
     if parts.scheme == "serial":
         return _serial(text, parts.netloc + parts.path, _single(text, options, _SERIAL_OPTIONS))
     if parts.scheme == "tcp":
         return _tcp(text, parts.netloc, parts.path, _single(text, options, _TCP_OPTIONS))
     if parts.scheme == "mock":
         if parts.netloc or parts.path not in ("", "/"):
-            raise TransportError(f"port {text!r}: mock:// takes no address, only options after '?'")
+            raise PortUrlError(f"port {text!r}: mock:// takes no address, only options after '?'")
         return _mock(text, options)
-    raise TransportError(f"port {text!r}: scheme {parts.scheme!r} is unknown: serial, tcp or mock")
+    raise PortUrlError(f"port {text!r}: scheme {parts.scheme!r} is unknown: serial, tcp or mock")
 
 
 def _single(text: str, options: list[tuple[str, str]], known: tuple[str, ...]) -> dict[str, str]:
@@ -93,28 +99,28 @@ def _single(text: str, options: list[tuple[str, str]], known: tuple[str, ...]) -
     for name, value in options:
         _check_known(text, name, known)
         if name in found:
-            raise TransportError(f"port {text!r}: option {name!r} is given twice")
+            raise PortUrlError(f"port {text!r}: option {name!r} is given twice")
         found[name] = value
     return found
 
 
 def _check_known(text: str, name: str, known: tuple[str, ...]) -> None:
     if name not in known:
-        raise TransportError(f"port {text!r}: unknown option {name!r}: allowed are {', '.join(known)}")
+        raise PortUrlError(f"port {text!r}: unknown option {name!r}: allowed are {', '.join(known)}")
 
 
 def _serial(text: str, device: str, options: Mapping[str, str]) -> SerialPort:
     if not device.startswith("/") or device == "/":
-        raise TransportError(f"port {text!r}: needs a device with its path, as in serial:///dev/ttyUSB0")
+        raise PortUrlError(f"port {text!r}: needs a device with its path, as in serial:///dev/ttyUSB0")
     return SerialPort(device, _baud(text, options))
 
 
 def _tcp(text: str, address: str, path: str, options: Mapping[str, str]) -> TcpPort:
     host, _, port = address.rpartition(":")
     if not host or path not in ("", "/"):
-        raise TransportError(f"port {text!r}: needs a host and a port number, as in tcp://127.0.0.1:4000")
+        raise PortUrlError(f"port {text!r}: needs a host and a port number, as in tcp://127.0.0.1:4000")
     if not port.isdecimal() or not 1 <= int(port) <= 65535:
-        raise TransportError(f"port {text!r}: port number {port!r}: allowed are 1 to 65535")
+        raise PortUrlError(f"port {text!r}: port number {port!r}: allowed are 1 to 65535")
     return TcpPort(
         host.strip("[]"), int(port), _baud(text, options), _flag(text, "lock_step", options.get("lock_step"))
     )
@@ -126,12 +132,12 @@ def _mock(text: str, options: list[tuple[str, str]]) -> MockPort:
     once = _single(text, [option for option in options if option[0] not in REPEATABLE], MOCK_FLAGS + MOCK_VALUES)
     flags = {name: _flag(text, name, once.get(name)) for name in MOCK_FLAGS}
     if "seed" in once and not once["seed"].isdecimal():
-        raise TransportError(f"port {text!r}: seed {once['seed']!r}: must be a whole number, 0 or more")
+        raise PortUrlError(f"port {text!r}: seed {once['seed']!r}: must be a whole number, 0 or more")
     arguments = [f"--{name.replace('_', '-')}" for name in ("lock_step", "no_sample") if flags[name]]
     for name, value in options:
         if name in MOCK_VALUES:
             if not value:
-                raise TransportError(f"port {text!r}: option {name!r} needs a value")
+                raise PortUrlError(f"port {text!r}: option {name!r} needs a value")
             arguments += [f"--{name.replace('_', '-')}", value]
     return MockPort(tuple(arguments), _baud(text, once), flags["lock_step"], flags["pty"])
 
@@ -140,11 +146,11 @@ def _baud(text: str, options: Mapping[str, str]) -> int:
     baud = options.get("baud", str(DEFAULT_BAUD))
     if not baud.isdecimal() or int(baud) not in BAUD_RATES:
         allowed = ", ".join(str(rate) for rate in BAUD_RATES)
-        raise TransportError(f"port {text!r}: baud {baud!r}: allowed are {allowed}")
+        raise PortUrlError(f"port {text!r}: baud {baud!r}: allowed are {allowed}")
     return int(baud)
 
 
 def _flag(text: str, name: str, value: str | None) -> bool:
     if value not in (None, "0", "1"):
-        raise TransportError(f"port {text!r}: {name} {value!r}: allowed are 0 and 1")
+        raise PortUrlError(f"port {text!r}: {name} {value!r}: allowed are 0 and 1")
     return value == "1"

@@ -20,7 +20,7 @@ from tests.daq.cli.invoke import CommandLine
         ("run ramp --joints 3-1", ("3-1 runs backwards", "write 1-3")),
         ("run ramp --joints two", ("joints 'two'", "write 1-3, 1,3 or 2")),
         ("run ramp --amplitude nan", ("amplitude 'nan'", "write an angle")),
-        ("run ramp --amplitude 400", ("amplitude", "less than or equal to")),
+        ("run ramp --amplitude 400", ("trajectory.amplitude", "between -360° and 360°", "400°")),
         ("run ramp --amplitude 1=10,2=10", ("amplitude is given for joints [1, 2]", "[1, 2, 3]")),
         ("run ramp --duration nan", ("duration", "finite")),
         ("run ramp --duration 0", ("duration", "greater than 0")),
@@ -45,7 +45,7 @@ def test_a_command_that_cannot_be_meant(daq: CommandLine, words: str, expected: 
 
 
 def test_a_port_that_is_no_url(daq: CommandLine) -> None:
-    daq("--port", "/dev/ttyUSB0", "run", "ramp").complains(3, "must begin with serial://", "serial:///dev/ttyUSB0")
+    daq("--port", "/dev/ttyUSB0", "run", "ramp").complains(2, "must begin with serial://", "serial:///dev/ttyUSB0")
 
 
 @pytest.mark.parametrize(
