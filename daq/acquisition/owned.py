@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -42,6 +43,7 @@ def owned_robot(robot: str, url: str, memory_map: MemoryMap, consent: Consent) -
         stop_listener(robot) as listener,
         Guardian(listener, None, freezer.freeze) as guardian,
     ):
+        closed_last.enter_context(_stopped_by_ctrl_z())
         controller = closed_last.enter_context(Controller.connect(url, memory_map))
         if not controller.identity.simulated and not consent.moves_real_arm:
             raise MissingConsentError(f"{url} is a real arm: it moves only with the operator's consent (--yes)")
@@ -53,3 +55,14 @@ def owned_robot(robot: str, url: str, memory_map: MemoryMap, consent: Consent) -
             raise StoppedError(f"the arm has been stopped: {guardian.cause.value}")
         with control.frozen_on_error():
             yield OwnedRobot(controller, control, guardian)
+
+
+@contextmanager
+def _stopped_by_ctrl_z() -> Iterator[None]:
+    """Ctrl-Z stops the arm like Ctrl-C: put aside, this process could not be asked for a stop. With a handler of
+    Python's own the guardian hears of it."""
+    before = signal.signal(signal.SIGTSTP, lambda _number, _frame: None)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTSTP, before)

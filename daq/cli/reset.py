@@ -2,20 +2,49 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
-from daq.cli.context import invocation
+from daq.cli.context import console, invocation
+from daq.cli.limp import limp_line
 from daq.cli.robot import connected
+from daq.contracts.errors import DaqError
 
 app = typer.Typer(add_completion=False)
 
 
+class NotFrozenError(DaqError):
+    """The board has not confirmed that it took the measured posture as its set points."""
+
+    exit_code = 3
+
+
 @app.command()
-def reset(context: typer.Context) -> None:
-    """End the freeze of a stop. Nothing moves: set points stay where the stop put them."""
+def reset(
+    context: typer.Context,
+    here: Annotated[
+        bool,
+        typer.Option("--here", help="First make the measured posture the set points: of limp joints, or to yield."),
+    ] = False,
+) -> None:
+    """End the freeze of a stop. Set points stay where the stop put them, or with --here become the present posture."""
     from firmware_protocol.commands import StatusFlag
 
     with connected(invocation(context)) as controller:
         frozen = StatusFlag.FROZEN in controller.status().flags
+        if here:
+            # A second stop would change nothing: the board measures the posture when a stop begins.
+            controller.release()
+            stopped = controller.stop()
+            if not stopped.acknowledged:
+                raise NotFrozenError(f"reset --here: {stopped.problem}; the set points are not known to be here")
         controller.release()
-    print("released: the arm holds its posture and takes set points again" if frozen else "was not stopped")
+        limp = limp_line(controller.gains())
+    if limp:
+        console().print(limp)
+    if not frozen and not here:
+        print("was not stopped")
+    else:
+        holds = "takes set points again" if limp else "the arm holds its posture and takes set points again"
+        print(f"released: {holds}" + ("; the set points are the posture measured now" if here else ""))

@@ -8,6 +8,7 @@ from dataclasses import asdict
 import typer
 
 from daq.cli.context import JsonOption, invocation, print_json
+from daq.cli.limp import limp_joints, limp_line
 from daq.cli.robot import connected
 
 app = typer.Typer(add_completion=False)
@@ -22,6 +23,7 @@ def status(context: typer.Context, json: JsonOption = False) -> None:
         found = controller.status()
         snapshot = controller.next_snapshot()
         identity = controller.identity
+        gains = controller.gains()
     joints = []
     for joint, reading in snapshot.joints:
         own = machine.calibration(joint)
@@ -32,7 +34,7 @@ def status(context: typer.Context, json: JsonOption = False) -> None:
     if json:
         board = {"tick": found.tick, "flags": found.flags.name, "boots": found.boots, "missed": found.missed}
         link = {"link": found.link, "counters": asdict(found.counters)}
-        print_json({"simulated": identity.simulated, **board, **link, "joints": joints})
+        print_json({"simulated": identity.simulated, **board, **link, "limp": limp_joints(gains), "joints": joints})
         return
     kind = "mock" if identity.simulated else "REAL ARM"
     state = ", ".join(flag.name.lower().replace("_", " ") for flag in found.flags if flag.name) or "no flags"
@@ -40,3 +42,5 @@ def status(context: typer.Context, json: JsonOption = False) -> None:
     for row in joints:
         position, error, aim = (math.degrees(row[name]) for name in ("position", "error", "set_point"))
         print(f"  joint {row['joint']}: {position:8.2f}°   set point {aim:8.2f}°   error {error:6.2f}°")
+    if limp_joints(gains):
+        print(limp_line(gains))

@@ -11,6 +11,7 @@ from daq.contracts.errors import DaqError
 
 if TYPE_CHECKING:
     from daq.acquisition.stop_socket import StopAnswer, StopAttempt
+    from daq.link import Link
 
 app = typer.Typer(add_completion=False)
 
@@ -62,6 +63,7 @@ def _stop_at(name: str, url: str) -> StopAnswer:
     try:
         with Link.open(url) as link:
             stopped = link.stop()
+            limp = _limp(link)
     except LinkError as error:
         return StopAnswer(robot=name, port=url, delivered=error.sent, confirmed=False, text=str(error))
     except RequestRefusedError as error:
@@ -69,8 +71,22 @@ def _stop_at(name: str, url: str) -> StopAnswer:
     except DaqError as error:
         return _undelivered(name, url, str(error))
     return StopAnswer(
-        robot=name, port=url, delivered=True, confirmed=True, tick=stopped.tick, postures=tuple(stopped.postures)
-    )
+        robot=name, port=url, delivered=True, confirmed=True, tick=stopped.tick, postures=tuple(stopped.postures),
+        text=limp,
+    )  # fmt: skip
+
+
+def _limp(link: Link) -> str:
+    """Which joints nothing holds; a board that does not say so has been stopped all the same."""
+    from daq.cli.limp import limp_line
+    from daq.link import LinkError, RequestRefusedError
+    from firmware_protocol.commands import Gains, ReportGains
+
+    try:
+        gains = link.request(ReportGains(), Gains).gains
+    except (LinkError, RequestRefusedError):
+        return ""
+    return limp_line(dict(enumerate(gains, start=1)))
 
 
 def _answered(attempt: StopAttempt) -> StopAnswer:
@@ -85,7 +101,8 @@ def _undelivered(robot: str, port: str, why: str) -> StopAnswer:
 
 def _told(answer: StopAnswer) -> str:
     if answer.confirmed:
-        return f"{answer.robot}: stopped, confirmed by the board: set points frozen at tick {answer.tick}"
+        told = f"{answer.robot}: stopped, confirmed by the board: set points frozen at tick {answer.tick}"
+        return f"{told}. {answer.text}" if answer.text else told
     if answer.delivered:
         return f"{answer.robot}: stop sent, NOT CONFIRMED by the board: {answer.text}. Use the emergency stop."
     return f"{answer.robot}: stop NOT DELIVERED: {answer.text}. Use the emergency stop."

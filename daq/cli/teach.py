@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-import math
-import time
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from daq.cli.consent import agreed
 from daq.cli.context import Invocation, JsonOption, YesOption, console, invocation
+from daq.cli.limp import require_drive
 from daq.cli.quantities import parse_angle, parse_per_joint_angles
 from daq.contracts.errors import SafetyError, SpecError
 
 if TYPE_CHECKING:
     from daq.acquisition.owned import OwnedRobot
+    from daq.contracts.machine import Machine
+    from daq.contracts.sample import SampleRow
+    from daq.teaching.controller_arm import ControllerArm
     from daq.teaching.jog import JogCommand
 
 app = typer.Typer(
@@ -23,93 +27,74 @@ app = typer.Typer(
     help="Jog, lead by the nose, steps, and playing back. Needs a configured robot, or --port.",
     no_args_is_help=True,
 )
-HELP = "1-6 joint   ← → drive while held   + - speed   o c gripper   p keep this posture   q end   Ctrl-C stop"
 
 
-def _owned(call: Invocation, consent: bool) -> AbstractContextManager[OwnedRobot]:
+@contextmanager
+def _owned(call: Invocation, consent: bool) -> Iterator[OwnedRobot]:
+    """The robot, held by this process. Where a real arm waits for consent and a person can be asked, asks."""
     from daq.acquisition.owned import owned_robot
     from daq.config.robot_files import load_memory_map
-    from daq.runner import Consent
+    from daq.runner import Consent, MissingConsentError
 
-    memory_map = load_memory_map(call.settings.robot.memory_map)
-    return owned_robot(call.settings.robot.name, call.port, memory_map, Consent(consent))
+    robot, memory_map = call.settings.robot.name, load_memory_map(call.settings.robot.memory_map)
+    with ExitStack() as held:
+        try:
+            owned = held.enter_context(owned_robot(robot, call.port, memory_map, Consent(consent)))
+        except MissingConsentError:
+            if not agreed(call.port):
+                raise
+            owned = held.enter_context(owned_robot(robot, call.port, memory_map, Consent(True)))
+        require_drive(owned.controller.gains())
+        yield owned
+
+
+def _arm(robot: OwnedRobot, machine: Machine) -> ControllerArm:
+    from daq.teaching.controller_arm import ControllerArm
+
+    return ControllerArm(robot.controller, robot.control, machine, robot.ended)
 
 
 @app.command()
 def jog(
     context: typer.Context,
-    speed: Annotated[str, typer.Option(help="Degrees/s to begin with.")] = "10",
+    speed: Annotated[str, typer.Option(help="Degrees/s to begin with, up to 20.")] = "10",
     program: Annotated[Path | None, typer.Option(help="Where postures kept with `p` go (a program, .json).")] = None,
     yes: YesOption = False,
 ) -> None:
     """Drive joints with the keys, as the teach pendant did; a joint moves only while its key repeats."""
     from daq.cli.keyboard import keys
+    from daq.cli.pendant import HELP, Pendant, StatusLine, require_jog_speed
     from daq.teaching import jog as jog_arm
-    from daq.teaching.controller_arm import ControllerArm
     from daq.teaching.program import Absolute, Program, save_program
 
     call = invocation(context)
     machine = call.settings.machine()
+    pendant = Pendant(machine, require_jog_speed(parse_angle(speed, "speed")))
     kept: list[Absolute] = []
-    with _owned(call, yes) as robot, keys() as keyboard:
-        arm = ControllerArm(robot.controller, machine)
-        pendant = Pendant(parse_angle(speed, "speed"))
-        console().print(HELP)
+    line = StatusLine()
+    try:
+        with keys() as keyboard, _owned(call, yes) as robot:
+            arm = _arm(robot, machine)
+            line.tell(HELP)
 
-        def commands() -> JogCommand | None:
-            command = pendant.command(keyboard.pressed())
-            if pendant.gripper is not None:
-                robot.controller.set_gripper(closed=pendant.gripper)
-                pendant.gripper = None
-            if pendant.keep:
-                pendant.keep = False
-                row = arm.next_sample()
-                kept.append(Absolute(angles=dict(zip(arm.joints, row.set_point, strict=True))))
-                console().print(f"posture {len(kept)} kept")
-            return command
+            def commands(row: SampleRow) -> JogCommand | None:
+                command = pendant.command(keyboard.pressed(), robot.controller.clock.now())
+                if pendant.gripper is not None:
+                    robot.controller.set_gripper(closed=pendant.gripper)
+                    pendant.gripper = None
+                if pendant.keep:
+                    pendant.keep = False
+                    kept.append(Absolute(angles=dict(zip(arm.joints, row.set_point, strict=True))))
+                    line.tell(f"posture {len(kept)} kept")
+                line.show(pendant)
+                return command
 
-        reason = jog_arm(
-            arm, machine, machine.limits, commands, lambda: pendant.ended or robot.ended() is not None, console().print
-        )
-    if program is not None and kept:
-        save_program(Program(name=program.stem, machine=machine.name, instructions=tuple(kept)), program)
-        print(program)
-    if reason is not None:
-        raise SafetyError(f"the arm was stopped: {reason}")
-
-
-class Pendant:
-    """What keys mean: which joint, which way, how fast. Time is the computer's own clock."""
-
-    def __init__(self, speed: float) -> None:
-        self.joint = 1
-        self.speed = speed
-        self.ended = False
-        self.keep = False
-        self.gripper: bool | None = None
-        self._command: JogCommand | None = None
-
-    def command(self, typed: str) -> JogCommand | None:
-        """The newest command after the keys `typed`; the one before when they drive nothing."""
-        from daq.cli.keyboard import LEFT, RIGHT
-        from daq.teaching.jog import JOG_SPEED, JogCommand
-
-        direction = typed.count(RIGHT) - typed.count(LEFT)
-        for key in typed.replace(RIGHT, "").replace(LEFT, ""):
-            if key in "123456":
-                self.joint, self._command = int(key), None
-            elif key in "+-":
-                self.speed = min(JOG_SPEED, self.speed * (1.25 if key == "+" else 0.8))
-            elif key in "oc":
-                self.gripper = key == "c"
-            elif key == "p":
-                self.keep = True
-            elif key == "q":
-                self.ended = True
-        if direction:
-            velocity = math.copysign(self.speed, direction)
-            self._command = JogCommand({self.joint: velocity}, time.monotonic())
-        return self._command
+            jog_arm(arm, machine, machine.limits, commands, lambda: pendant.ended, line.tell)
+    finally:
+        line.close()
+        if program is not None and kept:
+            save_program(Program(name=program.stem, machine=machine.name, instructions=tuple(kept)), program)
+            print(program)
 
 
 @app.command()
@@ -148,7 +133,6 @@ def run_file(
 
 
 def _perform(call: Invocation, program: object, consent: bool) -> None:
-    from daq.teaching.controller_arm import ControllerArm
     from daq.teaching.performer import FollowingPerformer
     from daq.teaching.program import Program
     from daq.teaching.program_plan import check_program, plan_program, run_program
@@ -156,7 +140,7 @@ def _perform(call: Invocation, program: object, consent: bool) -> None:
     assert isinstance(program, Program)
     machine = call.settings.machine()
     with _owned(call, consent) as robot:
-        here = ControllerArm(robot.controller, machine).next_sample()
+        here = _arm(robot, machine).next_sample()
         planned = plan_program(program, machine, here.set_point)
         against = check_program(planned, machine, machine.limits)
         if against:
@@ -164,6 +148,7 @@ def _perform(call: Invocation, program: object, consent: bool) -> None:
         tell = console().print
         performer = FollowingPerformer(robot.controller, robot.control, machine, machine.limits, robot.ended, tell)
         run_program(planned, machine, performer, tell)
+        performer.finish()
     print(f"done: {len(planned)} instructions")
 
 
@@ -180,13 +165,22 @@ def lead(
     import sys
 
     from daq.contracts.experiment import parse_joints
-    from daq.teaching import lead_by_nose
-    from daq.teaching.controller_arm import ControllerArm
+    from daq.teaching import RecordedPath, lead_by_nose
 
     if seconds is None and not sys.stdin.isatty():
         raise SpecError("lead: give --seconds, or a terminal in which Enter ends it")
+    if not output.absolute().parent.is_dir():
+        raise SpecError(f"lead: {output}: its folder does not exist; nothing was begun")
     call = invocation(context)
     machine = call.settings.machine()
+
+    def keep(path: RecordedPath) -> None:
+        try:
+            output.write_text(path.model_dump_json(indent=1) + "\n", "utf-8")
+        except OSError as error:
+            raise SpecError(f"{output}: cannot be written: {error.strerror}") from error
+        print(f"{output}: {path.duration:.2f} s on joints {', '.join(map(str, path.joints))}")
+
     with _owned(call, yes) as robot:
         begun = robot.controller.clock.now()
 
@@ -196,11 +190,7 @@ def lead(
             return bool(select.select([sys.stdin], [], [], 0)[0])
 
         console().print("recording: lead the arm" + ("; Enter ends it" if seconds is None else f" for {seconds:g} s"))
-        path = lead_by_nose(
-            ControllerArm(robot.controller, machine), machine, machine.limits, parse_joints(joints), ended
-        )
-    output.write_text(path.model_dump_json(indent=1) + "\n", "utf-8")
-    print(f"{output}: {path.duration:.2f} s on joints {', '.join(map(str, path.joints))}")
+        lead_by_nose(_arm(robot, machine), machine, machine.limits, parse_joints(joints), ended, keep)
 
 
 @app.command()

@@ -1,43 +1,62 @@
-"""What teaching needs of an arm: the driver has it, and so has whatever stands in for it in a test."""
+"""What teaching needs of an arm: the motor controller has it, and so has whatever stands in for it in a test."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from typing import Protocol
 
 from daq.contracts.errors import DaqError
 from daq.contracts.experiment import Gain
 from daq.contracts.sample import SampleRow
+from daq.runner import StoppedError
 
 
 class TeachingError(DaqError):
     """Teaching had to end, or what was taught cannot be used."""
 
+    exit_code = 5
+
 
 class TeachableArm(Protocol):
-    """An arm, one control period at a time. Every method may raise a DaqError of the link."""
+    """An arm, one control period at a time. Every method may raise StoppedError (somebody has stopped it) and
+    TeachingError (a fault, a lost link): it is frozen then."""
 
     @property
     def joints(self) -> tuple[int, ...]:
         """Joints (from 1) in every sample, in its order."""
         ...
 
+    @property
+    def lateness(self) -> float:
+        """Time (s) by which the last sample came later than the quickest ones."""
+        ...
+
+    def driven(self) -> AbstractContextManager[None]:
+        """Only within it are set points taken. Leaving it is the end of the work, unless it has been stopped; whatever
+        else ends it freezes the arm before anything else is done."""
+        ...
+
     def next_sample(self) -> SampleRow:
         """Waits for the next control period and returns it; every period comes once."""
         ...
 
-    def set_points(self, postures: Mapping[int, int]) -> object:
+    def set_points(self, postures: Mapping[int, int]) -> None:
         """Sends set points: joint → posture units 0–999."""
-        ...
-
-    def stop(self) -> object:
-        """Freezes the set points at the measured posture."""
         ...
 
     def gains(self) -> Mapping[int, Gain]:
         """Joint → (P, I, D)."""
         ...
 
-    def set_gains(self, joint: int, p: int, i: int, d: int) -> object:
+    def set_gains(self, joint: int, p: int, i: int, d: int) -> None:
         """Writes the gains of a joint."""
+        ...
+
+    def stopped(self, cause: str) -> StoppedError:
+        """Freezes the arm, which somebody wants stopped; what is to be raised then says what became of it."""
+        ...
+
+    def tripped(self, cause: str) -> TeachingError:
+        """Freezes the arm because of a fault; what is to be raised then says what became of it."""
         ...

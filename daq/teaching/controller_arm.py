@@ -2,37 +2,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 
 from daq.contracts.experiment import Gain
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
-from daq.driver import Controller
+from daq.driver import Controller, ControllerRestartedError, NoSampleError
+from daq.link import LinkError, RequestRefusedError
+from daq.runner import ArmControl, StoppedError
 from daq.runner.rows import RowMaker
+from daq.safety import Event
+from daq.teaching import halting
+from daq.teaching.arm import TeachingError
 
 
 class ControllerArm:
-    """A `TeachableArm` over the driver. Raises what the driver raises."""
+    """A `TeachableArm` over the driver, in the states of `ArmControl` like every run.
 
-    def __init__(self, controller: Controller, machine: Machine) -> None:
+    ended: says why somebody outside wants the end; None while nobody does
+    """
+
+    def __init__(
+        self, controller: Controller, control: ArmControl, machine: Machine, ended: Callable[[], str | None]
+    ) -> None:
         self.joints = tuple(range(1, len(machine.joints) + 1))
+        self.lateness = 0.0
         self._controller = controller
+        self._control = control
+        self._ended = ended
         self._rows = RowMaker(machine, self.joints, controller.period_s)
         self._last: int | None = None
 
+    @contextmanager
+    def driven(self) -> Iterator[None]:
+        """Armed and running within, idle afterwards."""
+        with self._control.frozen_on_error():
+            self._step(Event.ARM)
+            self._step(Event.START)
+            yield
+            self._require_going_on()
+            self._step(Event.FINISHED)
+            self._step(Event.DISARM)
+
     def next_sample(self) -> SampleRow:
         """The next control period; none is left out."""
-        snapshot = self._controller.next_snapshot(self._last, self.joints)
-        self._last = snapshot.tick
+        self._require_going_on()
+        try:
+            snapshot = self._controller.next_snapshot(self._last, self.joints)
+        except (LinkError, NoSampleError) as error:
+            raise halting.tripped(self._control, str(error), Event.LINK_LOST) from error
+        except ControllerRestartedError as error:
+            raise self.tripped(str(error)) from error
+        self._last, self.lateness = snapshot.tick, snapshot.jitter
         return self._rows.row(snapshot)
 
     def set_points(self, postures: Mapping[int, int]) -> None:
-        """Joint → posture units 0–999, taken together."""
-        self._controller.set_points(postures)
-
-    def stop(self) -> None:
-        """Freezes the set points at the measured posture."""
-        self._controller.stop()
+        """Joint → posture units 0–999, taken together; only while driven."""
+        self._require_going_on()
+        if not self._control.may_send:
+            raise TeachingError(f"set points are sent only while the arm is driven: it is {self._control.arm.state}")
+        try:
+            self._controller.set_points(postures)
+        except RequestRefusedError as error:
+            raise self.stopped(self._ended() or str(error)) from error
 
     def gains(self) -> Mapping[int, Gain]:
         """Joint → (P, I, D)."""
@@ -40,4 +73,24 @@ class ControllerArm:
 
     def set_gains(self, joint: int, p: int, i: int, d: int) -> None:
         """Writes the gains of a joint and reads them back."""
+        self._require_going_on()
         self._controller.set_gains(joint, p, i, d)
+
+    def stopped(self, cause: str) -> StoppedError:
+        """Freezes the arm for whoever wants it stopped."""
+        return halting.stopped(self._control, cause)
+
+    def tripped(self, cause: str) -> TeachingError:
+        """Freezes the arm because of a fault."""
+        return halting.tripped(self._control, cause)
+
+    def _require_going_on(self) -> None:
+        cause = self._ended() or self._control.halted
+        if cause is not None:
+            raise self.stopped(cause)
+
+    def _step(self, event: Event) -> None:
+        try:
+            self._control.handle(event)
+        except StoppedError as error:  # in this very moment: it still says what became of the stop
+            raise self.stopped(self._ended() or self._control.halted or str(error)) from error

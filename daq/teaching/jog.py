@@ -12,6 +12,7 @@ from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import Floats
+from daq.runner.lag import Lag
 from daq.safety import RunningGuards, check_move_to_start
 from daq.teaching.arm import TeachableArm
 from daq.trajectories import control_period, make_plan
@@ -40,6 +41,12 @@ class JogStep:
     refused: tuple[str, ...] = ()
 
 
+def top_speed(limits: Limits, joint: int) -> float:
+    """Highest speed (rad/s) at which `joint` may be jogged."""
+    own = limits.joint(joint).speed
+    return JOG_SPEED if own is None else min(JOG_SPEED, own)
+
+
 class Jogger:
     """Works out one set point a period. Pure but for the angles it has accepted.
 
@@ -55,11 +62,6 @@ class Jogger:
         self._joints = joints
         self._period = control_period(machine)
         self._driven: dict[int, float] = {}
-
-    def top_speed(self, joint: int) -> float:
-        """Highest speed (rad/s) at which `joint` may be jogged."""
-        own = self._limits.joint(joint).speed
-        return JOG_SPEED if own is None else min(JOG_SPEED, own)
 
     def step(self, row: SampleRow, command: JogCommand | None) -> JogStep:
         """What to send after `row`. Nothing moves without a command, or when it is older than DEAD_MAN."""
@@ -88,7 +90,7 @@ class Jogger:
         for joint, velocity in command.velocities.items():
             if joint not in self._joints:
                 raise SpecError(f"jog: joint {joint}: allowed are {list(self._joints)}")
-            top = self.top_speed(joint)
+            top = top_speed(self._limits, joint)
             if not abs(velocity) <= top:
                 raise SpecError(f"jog: joint {joint}: velocity of {velocity} rad/s: allowed are up to ±{top:g} rad/s")
 
@@ -102,31 +104,32 @@ def jog(
     arm: TeachableArm,
     machine: Machine,
     limits: Limits,
-    commands: Callable[[], JogCommand | None],
+    commands: Callable[[SampleRow], JogCommand | None],
     ended: Callable[[], bool],
     tell: Callable[[str], None],
-) -> str | None:
-    """Lets `commands` drive the arm until `ended`. `commands` gives the newest command, `tell` takes lines for the
-    operator.
+) -> None:
+    """Lets `commands` drive the arm until `ended`. `commands` gives the newest command after each sample, `tell` takes
+    lines for the operator.
 
-    Returns None when it was ended, else why the arm was stopped: a guard tripped, or somebody stopped it elsewhere.
+    Raises StoppedError when somebody stopped the arm, TeachingError when a guard tripped; it is frozen then.
     """
     jogger = Jogger(machine, limits, arm.joints)
     guards = RunningGuards(machine, limits, arm.joints, moving=arm.joints)
+    lag = Lag(control_period(machine))
     told: tuple[str, ...] = ()
-    while not ended():
-        row = arm.next_sample()
-        step = jogger.step(row, commands())
-        verdict = guards.check(row, step.postures)
-        if verdict.trips or verdict.stop:
+    with arm.driven():
+        while not ended():
+            row = arm.next_sample()
+            step = jogger.step(row, commands(row))
+            verdict = guards.check(row, step.postures) | lag.check(row.tick, arm.lateness)
+            if verdict.stop is not None:
+                raise arm.stopped(verdict.stop)
             if verdict.trips:
-                arm.stop()
-            return "; ".join(verdict.trips) or verdict.stop
-        if step.refused != told:
-            told = step.refused
-            for line in told:
-                tell(line)
-        if step.postures and not verdict.hold:
-            arm.set_points(step.postures)
-            jogger.accept(step)
-    return None
+                raise arm.tripped("; ".join(verdict.trips))
+            if step.refused != told:
+                told = step.refused
+                for line in told:
+                    tell(line)
+            if step.postures and not verdict.hold:
+                arm.set_points(step.postures)
+                jogger.accept(step)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from daq.contracts.errors import DaqError
+from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.experiment import Gain
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
+from daq.runner import StoppedError
+from daq.runner.lag import OLDEST_TO_ACT_ON
 from daq.safety import RestGuards
 from daq.teaching.arm import TeachableArm, TeachingError
 from daq.teaching.recording import RecordedPath
@@ -19,44 +21,81 @@ STILL_WITHIN = 8
 """ADC counts of error up to which the gains of a led joint come back: an assumption, a pull of half a degree."""
 STILL_FOR = 0.2
 """Time (s) for which it must be so without a break: an assumption. A hand that turns round is still for a moment."""
+SHORTEST = 2
+"""Samples that make a path."""
 PATIENCE = 10.0
 """Time (s) that a led arm has to come to rest before its gains come back: an assumption."""
 
 
 def lead_by_nose(
-    arm: TeachableArm, machine: Machine, limits: Limits, joints: tuple[int, ...], ended: Callable[[], bool]
-) -> RecordedPath:
+    arm: TeachableArm,
+    machine: Machine,
+    limits: Limits,
+    joints: tuple[int, ...],
+    ended: Callable[[], bool],
+    keep: Callable[[RecordedPath], None],
+) -> None:
     """Records the positions of `joints` (rad, once a period) while they are led by hand, until `ended`.
 
     The gains of the led joints are 0 meanwhile: **the arm must be held, it may sink under its weight.** Their set
     points follow the hand, so that nothing pulls when the gains come back; they come back when the arm is at rest.
-    Joints not led hold their place and are watched. Raises TeachingError when the arm was stopped or a guard tripped,
-    with the gains still 0: nothing is ever made stiff that may be moving or frozen elsewhere.
+    Joints not led hold their place and are watched. `keep` is given what was recorded, however it ended.
+
+    Raises StoppedError when somebody stopped the arm, TeachingError when a guard tripped: the led joints are limp then,
+    and the line says so: nothing is ever made stiff that may be moving or frozen elsewhere.
     """
     missing = [joint for joint in joints if joint not in arm.joints]
     if missing or not joints:
-        raise TeachingError(f"lead: joints {list(joints)}: those sampled are {list(arm.joints)}")
-    before = {joint: arm.gains()[joint] for joint in joints}
-    guards = RestGuards(machine, limits, arm.joints, led=joints)
+        raise SpecError(f"lead: joints {list(joints)}: those sampled are {list(arm.joints)}")
     rows: list[SampleRow] = []
+    limp: dict[int, Gain] = {}
     try:
-        _follow_the_hand(arm, machine, joints, arm.next_sample())
-        for joint in joints:
-            arm.set_gains(joint, 0, 0, 0)
-        while not ended():
-            row = arm.next_sample()
-            _require_calm(arm, guards, row, joints)
-            rows.append(row)
-            _follow_the_hand(arm, machine, joints, row)
-    except TeachingError:
-        raise
+        try:
+            with arm.driven():
+                _lead(arm, machine, limits, joints, ended, rows, limp)
+        finally:
+            if len(rows) >= SHORTEST:
+                keep(_path(rows, arm.joints, joints, control_period(machine)))
+    except StoppedError as error:
+        raise StoppedError(f"lead: {error}{_told(limp)}") from error
     except DaqError as error:
-        raise TeachingError(f"lead: {error}; the gains of joints {list(joints)} may be 0 now") from error
-    except BaseException:
-        _restore(arm, machine, guards, before)
-        raise
-    _restore(arm, machine, guards, before)
-    return _path(rows, arm.joints, joints, control_period(machine))
+        raise TeachingError(f"lead: {error}{_told(limp)}") from error
+    if len(rows) < SHORTEST:
+        raise TeachingError(f"lead: {len(rows)} samples are no path, at least {SHORTEST} are needed")
+
+
+def _lead(
+    arm: TeachableArm,
+    machine: Machine,
+    limits: Limits,
+    joints: tuple[int, ...],
+    ended: Callable[[], bool],
+    rows: list[SampleRow],
+    limp: dict[int, Gain],
+) -> None:
+    """Fills `rows`; `limp` holds at every moment the joints without drive, with the gains that they had."""
+    guards = RestGuards(machine, limits, arm.joints, led=joints)
+    before = arm.gains()
+    _follow_the_hand(arm, machine, joints, arm.next_sample())
+    for joint in joints:
+        limp[joint] = before[joint]
+        arm.set_gains(joint, 0, 0, 0)
+    while not ended():
+        row = arm.next_sample()
+        _require_calm(arm, guards, row)
+        rows.append(row)
+        _follow_the_hand(arm, machine, joints, row)
+    _restore(arm, machine, guards, limp)
+
+
+def _told(limp: Mapping[int, Gain]) -> str:
+    if not limp:
+        return ""
+    gains = ",".join(f"{joint}={'/'.join(map(str, gain))}" for joint, gain in limp.items())
+    return (
+        f". JOINTS {', '.join(map(str, limp))} ARE LIMP (gains 0): hold the arm, make its posture the set points with "
+        f"`daq reset --here`, then `daq gains set {gains}`"
+    )
 
 
 def _follow_the_hand(arm: TeachableArm, machine: Machine, joints: tuple[int, ...], row: SampleRow) -> None:
@@ -71,35 +110,34 @@ def _measured(arm: TeachableArm, machine: Machine, joints: tuple[int, ...], row:
     }
 
 
-def _require_calm(arm: TeachableArm, guards: RestGuards, row: SampleRow, joints: tuple[int, ...]) -> None:
+def _require_calm(arm: TeachableArm, guards: RestGuards, row: SampleRow) -> None:
     verdict = guards.check(row)
+    if verdict.stop is not None:
+        raise arm.stopped(verdict.stop)
     if verdict.trips:
-        arm.stop()
-    reason = "; ".join(verdict.trips) or verdict.stop
-    if reason:
-        raise TeachingError(f"lead: {reason}; the gains of joints {list(joints)} are still 0: set them when it is safe")
+        raise arm.tripped("; ".join(verdict.trips))
 
 
-def _restore(arm: TeachableArm, machine: Machine, guards: RestGuards, gains: Mapping[int, Gain]) -> None:
-    """Set points := present posture; when the controller has taken them and the arm stays at rest, the gains."""
-    joints = tuple(gains)
+def _restore(arm: TeachableArm, machine: Machine, guards: RestGuards, limp: dict[int, Gain]) -> None:
+    """Set points := present posture; when the controller has taken them and the arm stays at rest, the gains. Empties
+    `limp` joint by joint."""
+    joints = tuple(limp)
     period = control_period(machine)
     sent: dict[int, int] = {}
     still = 0
     for _ in range(round(PATIENCE / period)):
         row = arm.next_sample()
-        _require_calm(arm, guards, row, joints)
-        still = still + 1 if sent and _at_rest(arm, machine, row, sent) else 0
+        _require_calm(arm, guards, row)
+        calm = bool(sent) and arm.lateness <= OLDEST_TO_ACT_ON and _at_rest(arm, machine, row, sent)
+        still = still + 1 if calm else 0
         if still * period >= STILL_FOR:
-            for joint, (p, i, d) in gains.items():
-                arm.set_gains(joint, p, i, d)
+            for joint in joints:
+                arm.set_gains(joint, *limp[joint])
+                del limp[joint]
             return
         sent = _measured(arm, machine, joints, row)
         arm.set_points(sent)
-    raise TeachingError(
-        f"lead: the arm did not come to rest within {PATIENCE:g} s; the gains of joints {list(joints)} are still 0: "
-        "hold the arm still and set them"
-    )
+    raise arm.tripped(f"the arm did not come to rest within {PATIENCE:g} s")
 
 
 def _at_rest(arm: TeachableArm, machine: Machine, row: SampleRow, sent: Mapping[int, int]) -> bool:
@@ -114,8 +152,6 @@ def _at_rest(arm: TeachableArm, machine: Machine, row: SampleRow, sent: Mapping[
 
 
 def _path(rows: list[SampleRow], sampled: tuple[int, ...], joints: tuple[int, ...], period: float) -> RecordedPath:
-    if len(rows) < 2:
-        raise TeachingError(f"lead: {len(rows)} samples are no path, at least 2 are needed")
     columns = [sampled.index(joint) for joint in sorted(joints)]
     return RecordedPath(
         joints=tuple(sorted(joints)),

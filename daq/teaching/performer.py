@@ -9,10 +9,10 @@ from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import EventKind
 from daq.driver import EVERY_JOINT, Controller
-from daq.runner import ArmControl
+from daq.runner import ArmControl, StoppedError
 from daq.runner.follower import Follower
 from daq.safety import Event
-from daq.teaching.arm import TeachingError
+from daq.teaching import halting
 from daq.trajectories import Plan
 
 
@@ -50,22 +50,24 @@ class FollowingPerformer:
             controller, control, machine, limits, EVERY_JOINT, _Teller(tell), ended, every_period=False
         )
         self._ended = ended
-        control.handle(Event.ARM)
+        self._step(Event.ARM)
 
     def follow(self, plan: Plan) -> None:
-        """Plays a plan to its end. Raises TeachingError when it does not get there; the arm is frozen then."""
-        self._control.handle(Event.START)
+        """Plays a plan to its end. Raises StoppedError or TeachingError when it does not get there; the arm is frozen
+        then."""
+        self._step(Event.START)
         ending = self._follower.follow(plan, lambda _index: None)
+        if ending.kind == "stopped":
+            raise halting.stopped(self._control, ending.cause)
         if ending.kind != "finished":
-            raise TeachingError(f"the motion ended before it was there: {ending.cause}")
-        self._control.handle(Event.FINISHED)
+            raise halting.tripped(self._control, ending.cause)
+        self._step(Event.FINISHED)
 
     def observe(self, periods: int) -> None:
-        """Lets so many control periods pass. Raises TeachingError when somebody wants the end."""
-        self._follower.observe(periods)
-        cause = self._ended()
-        if cause is not None:
-            raise TeachingError(f"the program was ended: {cause}")
+        """Lets so many control periods pass. Raises StoppedError when somebody wants the end, also in between."""
+        for _ in range(periods):
+            self._follower.observe(1)
+            self._require_going_on()
 
     def input_is_on(self, line: int) -> bool:
         """State of a process input."""
@@ -78,3 +80,19 @@ class FollowingPerformer:
     def set_gripper(self, *, closed: bool) -> None:
         """Switches the gripper."""
         self._controller.set_gripper(closed=closed)
+
+    def finish(self) -> None:
+        """After the last instruction. Raises StoppedError when the arm has been stopped before."""
+        self._require_going_on()
+        self._step(Event.DISARM)
+
+    def _require_going_on(self) -> None:
+        cause = self._ended() or self._control.halted
+        if cause is not None:
+            raise halting.stopped(self._control, cause)
+
+    def _step(self, event: Event) -> None:
+        try:
+            self._control.handle(event)
+        except StoppedError as error:
+            raise halting.stopped(self._control, self._control.halted or str(error)) from error

@@ -3,7 +3,8 @@
 A joint whose gains are 0 goes where a hand leads it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from daq.contracts.errors import DaqError
 from daq.contracts.experiment import Gain
 from daq.contracts.machine import load_machine
 from daq.contracts.sample import SampleRow
+from daq.runner import StoppedError
+from daq.teaching import TeachingError
 from firmware_protocol.commands import StatusFlag
 
 MA2000 = load_machine("ma2000")
@@ -38,6 +41,20 @@ class StandIn:
         self.frozen = False
         self.broken_from: int | None = None
         self.push: dict[int, float] = {}
+        self.lateness = 0.0
+        self.running = False
+
+    @contextmanager
+    def driven(self) -> Iterator[None]:
+        self.running = True
+        try:
+            yield
+        except BaseException:
+            if not self.frozen:
+                self._freeze()
+            raise
+        finally:
+            self.running = False
 
     def next_sample(self) -> SampleRow:
         if self.broken_from is not None and self.tick >= self.broken_from:
@@ -60,12 +77,21 @@ class StandIn:
         )  # fmt: skip
 
     def set_points(self, postures: Mapping[int, int]) -> None:
+        assert self.running
         for joint, posture in postures.items():
             assert 0 <= posture <= 999
             self.postures[joint - 1] = posture
         self.log.append("set points")
 
-    def stop(self) -> None:
+    def stopped(self, cause: str) -> StoppedError:
+        self._freeze()
+        return StoppedError(cause)
+
+    def tripped(self, cause: str) -> TeachingError:
+        self._freeze()
+        return TeachingError(cause)
+
+    def _freeze(self) -> None:
         self.frozen = True
         self.log.append("stop")
 

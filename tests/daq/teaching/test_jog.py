@@ -7,26 +7,28 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq.contracts.errors import SpecError
-from daq.teaching import DEAD_MAN, JOG_SPEED, JogCommand, Jogger, jog
+from daq.contracts.sample import SampleRow
+from daq.runner import StoppedError
+from daq.teaching import DEAD_MAN, JOG_SPEED, JogCommand, Jogger, TeachingError, jog
 from tests.daq.teaching.stand_in import CALIBRATIONS, MA2000, PERIOD, REST, StandIn
 
 LIMITS = MA2000.limits
 
 
-def driven(arm: StandIn, velocities: dict[int, float], held_until: int, periods: int) -> tuple[str | None, list[str]]:
-    """Jogs with a key held down for the first `held_until` periods."""
+def driven(arm: StandIn, velocities: dict[int, float], held_until: int, periods: int) -> list[str]:
+    """Jogs with a key held down for the first `held_until` periods; what the operator was told."""
     told: list[str] = []
 
-    def commands() -> JogCommand:
+    def commands(_row: SampleRow) -> JogCommand:
         return JogCommand(velocities, min(arm.tick, held_until) * PERIOD)
 
-    return jog(arm, MA2000, LIMITS, commands, arm.run_for(periods), told.append), told
+    jog(arm, MA2000, LIMITS, commands, arm.run_for(periods), told.append)
+    return told
 
 
 def test_a_joint_moves_at_the_speed_asked_for_while_the_key_is_held() -> None:
     arm = StandIn()
-    reason, _ = driven(arm, {1: 0.2}, held_until=100, periods=100)
-    assert reason is None
+    driven(arm, {1: 0.2}, held_until=100, periods=100)
     assert arm.position[0] - REST[0] == pytest.approx(0.2 * 100 * PERIOD, abs=0.02)
     assert arm.position[1:] == pytest.approx(REST[1:], abs=0.005)
 
@@ -46,7 +48,7 @@ def test_it_stops_when_the_key_is_no_longer_refreshed() -> None:
 
 def test_nothing_is_sent_without_a_key() -> None:
     arm = StandIn()
-    assert jog(arm, MA2000, LIMITS, lambda: None, arm.run_for(20), print) is None
+    jog(arm, MA2000, LIMITS, lambda _row: None, arm.run_for(20), print)
     assert arm.log == []
 
 
@@ -59,8 +61,7 @@ def test_slow_jogging_adds_up_across_posture_units() -> None:
 
 def test_it_goes_to_the_limit_and_no_further_and_says_so_once() -> None:
     arm = StandIn()
-    reason, told = driven(arm, {4: JOG_SPEED}, held_until=500, periods=500)
-    assert reason is None
+    told = driven(arm, {4: JOG_SPEED}, held_until=500, periods=500)
     assert arm.position[3] == pytest.approx(1.56, abs=0.01)
     assert len(told) == 1
     assert told[0].startswith("joint 4: 89.")
@@ -78,7 +79,7 @@ def test_a_slow_jog_does_not_creep_past_the_limit() -> None:
 
 def test_the_floor_ends_a_jog_too() -> None:
     arm = StandIn()
-    _, told = driven(arm, {2: -JOG_SPEED}, held_until=400, periods=400)
+    told = driven(arm, {2: -JOG_SPEED}, held_until=400, periods=400)
     assert "height of -30" in told[0]
     assert arm.position[1] == pytest.approx(-math.asin(0.30 / (0.285755 + 0.16841)), abs=0.02)
 
@@ -87,6 +88,7 @@ def test_the_floor_ends_a_jog_too() -> None:
 def test_no_key_drives_the_arm_out_of_its_limits(velocities: dict[int, float], periods: int) -> None:
     jogger = Jogger(MA2000, LIMITS, StandIn.joints)
     arm = StandIn()
+    arm.running = True
     for _ in range(periods // 20):
         row = arm.next_sample()
         step = jogger.step(row, JogCommand(velocities, row.host_time))
@@ -124,17 +126,39 @@ def test_set_points_never_run_further_ahead_than_the_following_error_limit() -> 
     arm = StandIn()
     arm.push = {1: 0.0}
     arm.gain[1] = (0, 0, 0)  # joint 1 does not follow
-    reason, _ = driven(arm, {1: JOG_SPEED}, held_until=300, periods=300)
+    with pytest.raises(TeachingError, match="joint 1: next set point is"):
+        driven(arm, {1: JOG_SPEED}, held_until=300, periods=300)
     ahead = CALIBRATIONS[0].posture_to_rad(arm.postures[0]) - arm.position[0]
     assert ahead / CALIBRATIONS[0].rad_per_count <= 127
-    assert reason is not None
-    assert "joint 1: next set point is" in reason
     assert arm.log[-1] == "stop"
 
 
 def test_a_stop_from_elsewhere_ends_it() -> None:
     arm = StandIn()
     arm.frozen = True
-    reason, _ = driven(arm, {1: 0.1}, held_until=10, periods=10)
-    assert reason == "stopped on the board at tick 1"
-    assert arm.log == []
+    with pytest.raises(StoppedError, match="stopped on the board at tick 1"):
+        driven(arm, {1: 0.1}, held_until=10, periods=10)
+    assert arm.log == ["stop"]
+
+
+def test_keys_wait_while_samples_come_late_and_drive_again_afterwards() -> None:
+    arm = StandIn()
+    sent_late = []
+
+    def commands(row: SampleRow) -> JogCommand:
+        sent_late.append(len(arm.log) if 20 < row.tick <= 40 else None)
+        arm.lateness = 0.1 if 20 <= row.tick < 40 else 0.0
+        return JogCommand({1: 0.2}, row.host_time)
+
+    jog(arm, MA2000, LIMITS, commands, arm.run_for(60), print)
+    counts = {count for count in sent_late[21:40] if count is not None}
+    assert len(counts) == 1
+    assert arm.log.count("set points") == 40
+
+
+def test_samples_that_stay_late_end_the_jog() -> None:
+    arm = StandIn()
+    arm.lateness = 0.1
+    with pytest.raises(TeachingError, match="the line too slow"):
+        driven(arm, {1: 0.1}, held_until=100, periods=100)
+    assert "set points" not in arm.log

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from daq.contracts.errors import SpecError
+from daq.runner import StoppedError
 from daq.teaching import RecordedPath, TeachingError, lead_by_nose
 from tests.daq.teaching.stand_in import CALIBRATIONS, MA2000, REST, StandIn
 
@@ -19,7 +21,10 @@ def waving(tick: int) -> Mapping[int, float]:
 
 
 def led(arm: StandIn, joints: tuple[int, ...] = (1, 3), periods: int = 120) -> RecordedPath:
-    return lead_by_nose(arm, MA2000, LIMITS, joints, arm.run_for(periods))
+    kept: list[RecordedPath] = []
+    lead_by_nose(arm, MA2000, LIMITS, joints, arm.run_for(periods), kept.append)
+    (path,) = kept
+    return path
 
 
 def test_the_path_is_where_the_hand_led_the_arm() -> None:
@@ -64,30 +69,45 @@ def test_gains_wait_until_the_hand_keeps_still() -> None:
 
 def test_an_arm_that_never_comes_to_rest_stays_limp_and_says_so() -> None:
     arm = StandIn(lambda tick: {1: REST[0] + 0.2 * math.sin(tick)})
-    with pytest.raises(TeachingError, match=r"did not come to rest within 10 s; the gains of joints \[1\] are still 0"):
+    with pytest.raises(TeachingError, match=r"did not come to rest within 10 s\. JOINTS 1 ARE LIMP"):
         led(arm, joints=(1,), periods=100)
     assert arm.gain[1] == (0, 0, 0)
 
 
-def test_ctrl_c_brings_the_gains_back_too() -> None:
+def test_a_stop_from_elsewhere_leaves_the_joints_limp_says_so_and_keeps_the_path() -> None:
+    """The board holds its set points where the stop was: stiff again, the arm would be pulled back there."""
+    arm = StandIn(waving)
+    arm.gain[3] = (5, 1, 2)
+    original = arm.hand
+    arm.hand = lambda tick: setattr(arm, "frozen", tick >= 50) or original(tick)
+    kept: list[RecordedPath] = []
+    with pytest.raises(StoppedError, match=r"at tick 50\. JOINTS 1, 3 ARE LIMP .* `daq gains set 1=2/0/0,3=5/1/2`"):
+        lead_by_nose(arm, MA2000, LIMITS, (1, 3), arm.run_for(120), kept.append)
+    assert arm.gain[1] == (0, 0, 0)
+    assert [len(path.times) for path in kept] == [48]
+
+
+def test_a_fault_of_the_program_freezes_before_the_path_is_kept() -> None:
     arm = StandIn(waving)
 
     def ended() -> bool:
-        if arm.tick >= 110:
-            raise KeyboardInterrupt
+        if arm.tick >= 50:
+            raise ZeroDivisionError
         return False
 
-    with pytest.raises(KeyboardInterrupt):
-        lead_by_nose(arm, MA2000, LIMITS, (1, 3), ended)
-    assert arm.gain[1] == (2, 0, 0)
+    def keep(_path: RecordedPath) -> None:
+        arm.log.append("kept")
+
+    with pytest.raises(ZeroDivisionError):
+        lead_by_nose(arm, MA2000, LIMITS, (1, 3), ended, keep)
+    assert arm.log[-2:] == ["stop", "kept"]
+    assert arm.gain[1] == (0, 0, 0)
 
 
-def test_a_stop_from_elsewhere_ends_it_and_leaves_the_joints_limp() -> None:
-    """The board holds its set points where the stop was: stiff again, the arm would be pulled back there."""
+def test_gains_do_not_come_back_on_samples_that_are_too_old() -> None:
     arm = StandIn(waving)
-    original = arm.hand
-    arm.hand = lambda tick: setattr(arm, "frozen", tick >= 50) or original(tick)
-    with pytest.raises(TeachingError, match=r"stopped on the board at tick 50; the gains of joints \[1, 3\] are"):
+    arm.lateness = 0.1
+    with pytest.raises(TeachingError, match="did not come to rest"):
         led(arm)
     assert arm.gain[1] == (0, 0, 0)
 
@@ -109,14 +129,14 @@ def test_a_joint_that_is_not_led_must_not_move() -> None:
 def test_a_lost_link_says_that_the_joints_may_be_limp() -> None:
     arm = StandIn(waving)
     arm.broken_from = 50
-    with pytest.raises(TeachingError, match=r"the link is lost; the gains of joints \[1, 3\] may be 0 now"):
+    with pytest.raises(TeachingError, match=r"the link is lost\. JOINTS 1, 3 ARE LIMP"):
         led(arm)
 
 
 @pytest.mark.parametrize("joints", [(), (7,)])
 def test_joints_that_are_not_sampled_cannot_be_led(joints: tuple[int, ...]) -> None:
     arm = StandIn()
-    with pytest.raises(TeachingError, match="those sampled are"):
+    with pytest.raises(SpecError, match="those sampled are"):
         led(arm, joints=joints)
     assert arm.log == []
 

@@ -6,7 +6,8 @@ import pytest
 
 from daq.contracts.sample import SampleRow
 from daq.driver import Controller
-from daq.teaching import JogCommand, jog, lead_by_nose
+from daq.runner import ArmControl, StoppedError
+from daq.teaching import JogCommand, RecordedPath, TeachingError, jog, lead_by_nose
 from daq.teaching.controller_arm import ControllerArm
 from tests.daq.teaching.stand_in import MA2000
 
@@ -20,8 +21,9 @@ def controller() -> Iterator[Controller]:
 class WatchedArm(ControllerArm):
     """Keeps what it has delivered."""
 
-    def __init__(self, controller: Controller) -> None:
-        super().__init__(controller, MA2000)
+    def __init__(self, controller: Controller, control: ArmControl) -> None:
+        super().__init__(controller, control, MA2000, lambda: None)
+        self.control = control
         self.seen: list[SampleRow] = []
 
     def next_sample(self) -> SampleRow:
@@ -31,17 +33,16 @@ class WatchedArm(ControllerArm):
 
 @pytest.fixture
 def arm(controller: Controller) -> WatchedArm:
-    return WatchedArm(controller)
+    return WatchedArm(controller, ArmControl(controller))
 
 
 def test_a_jog_drives_the_arm_and_stops_when_the_key_is_let_go(arm: WatchedArm) -> None:
     first = arm.next_sample()
 
-    def commands() -> JogCommand:
+    def commands(_row: SampleRow) -> JogCommand:
         return JogCommand({1: 0.2}, min(arm.seen[-1].host_time, first.host_time + 1.0))
 
-    reason = jog(arm, MA2000, MA2000.limits, commands, lambda: len(arm.seen) >= 150, print)
-    assert reason is None
+    jog(arm, MA2000, MA2000.limits, commands, lambda: len(arm.seen) >= 150, print)
     assert arm.seen[-1].position[0] - first.position[0] == pytest.approx(0.2 * 1.3, abs=0.03)
     assert arm.seen[-1].position[0] == pytest.approx(arm.seen[-10].position[0], abs=0.005)
 
@@ -49,9 +50,34 @@ def test_a_jog_drives_the_arm_and_stops_when_the_key_is_let_go(arm: WatchedArm) 
 def test_a_limp_joint_is_recorded_and_held_again_where_it_is(arm: WatchedArm, controller: Controller) -> None:
     before = controller.gains()
     asked = iter(range(60))
-    path = lead_by_nose(arm, MA2000, MA2000.limits, (3,), lambda: next(asked) >= 50)
+    kept: list[RecordedPath] = []
+    lead_by_nose(arm, MA2000, MA2000.limits, (3,), lambda: next(asked) >= 50, kept.append)
+    (path,) = kept
     assert len(path.times) == 50
     assert controller.gains() == before
     row = arm.next_sample()
     assert row.position[2] == pytest.approx(path.positions[-1][0], abs=0.1)
     assert abs(row.error[2] / MA2000.calibration(3).rad_per_count) <= 10
+
+
+def test_set_points_are_sent_only_while_driven(arm: WatchedArm, controller: Controller) -> None:
+    before = controller.next_snapshot().set_points
+    with pytest.raises(TeachingError, match="only while the arm is driven: it is idle"):
+        arm.set_points({1: 600})
+    assert controller.next_snapshot().set_points == before
+
+
+def test_a_stop_in_the_moment_of_the_end_is_not_taken_for_a_good_end(arm: WatchedArm, controller: Controller) -> None:
+    """The key that ends a jog and the stop arrive together: the stop counts."""
+
+    def ended() -> bool:
+        if len(arm.seen) < 10:
+            return False
+        arm.control.stop("stopped from another terminal")
+        return True
+
+    with pytest.raises(StoppedError, match="from another terminal; the board confirmed: set points are frozen"):
+        jog(arm, MA2000, MA2000.limits, lambda _row: None, ended, print)
+    with pytest.raises(StoppedError):
+        arm.set_points({1: 600})
+    controller.release()
