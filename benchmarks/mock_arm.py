@@ -37,7 +37,7 @@ PLANT_NAMES: dict[str, tuple[str, ...]] = {
     **{f"joint{j}.motor.rotor_inertia": (f"joint_{j}.rotor_inertia",) for j in (1, 2, 3)},
     **{f"joint{j}.viscous_friction.coefficient": (f"joint_{j}.viscous_friction",) for j in (1, 2, 3)},
 }
-"""Names of the model's parameters and where the mock's plant file has them. The plant has one arm of friction for all."""
+"""Names of the model's parameters and where the mock's plant file has them; it has one arm of friction for all."""
 
 FRICTION_ARMS = tuple(f"joint{j}.load_dependent_friction.arm" for j in (1, 2, 3))
 
