@@ -1,4 +1,8 @@
-"""What an experiment tells about a model's parameters, before it is made: Fisher information of simulated records."""
+"""What an experiment tells about a model's parameters, before it is made: Fisher information of simulated records.
+
+Samples are weighed by the sensor's noise alone. The real residual is quieter than that at low frequencies (the loop
+suppresses it) and louder near the loop's bandwidth, so a width is predicted within a factor of two or so.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +21,13 @@ from daq.contracts.trace import Trace, TraceRecord
 from model.fitting.fit import INTERVAL, fit_problem
 from model.fitting.options import FitOptions
 from model.fitting.problem import whitened
+from model.fitting.records import resolution
 from model.fitting.result import FitResult
 from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown, prior_precision, scales
 from model.fitting.whitening import white
 from model.machine_model.model import Model
+from model.simulation.simulate import Options, simulate
 
 Floats = NDArray[np.float64]
 
@@ -29,8 +35,8 @@ Planner = Callable[[ExperimentSpec], Floats]
 """Set points (k, joints of the machine) in rad, one row a control period, of an experiment. It raises a DaqError (one
 line) for an experiment that the limits of the machine do not allow. Given from above: planning belongs to `daq`."""
 
-CORRELATION = 3.0
-"""Samples that count as one, since the residual of a closed loop is correlated: a cautious round number."""
+FOLLOWING_SHARE = 0.6
+"""Of the following error at which set points pause: the real arm may be slower than the model."""
 
 
 class _Part(BaseModel):
@@ -102,8 +108,9 @@ def experiment_information(
     """
     trace = imagined_trace(model, spec, plan)
     problem = fit_problem(model, [trace], options)
+    _check_followed(model, trace)
     values = np.array([u.start for u in problem.unknowns])
-    floor = [white(d * CORRELATION**0.5) for d in problem.floor]
+    floor = [white(d) for d in problem.floor]
     data = whitened(problem, problem.evaluate(values, derivatives=True), floor)
     natural = scales(problem.unknowns)
     information = replace(data, jacobian=data.jacobian * natural).information
@@ -127,6 +134,21 @@ def imagined_trace(model: Model, spec: ExperimentSpec, plan: Planner) -> Trace:
         record, joints, period * np.arange(len(wanted)), wanted, set_point=wanted, drive=np.zeros_like(wanted),
         tick=np.arange(len(wanted)),
     )  # fmt: skip
+
+
+def _check_followed(model: Model, trace: Trace) -> None:
+    """Raises SpecError when the arm would fall so far behind that set points pause."""
+    most = model.machine.limits.following_error_counts
+    if most is None:
+        return
+    error = np.abs(simulate(model, trace, Options(quantise=False)).error)
+    for column, joint in enumerate(model.machine.modelled_joints):
+        sensor = model.machine.joint(joint).sensor
+        if sensor is not None and error[:, column].max() > FOLLOWING_SHARE * most * resolution(sensor):
+            counts = error[:, column].max() / resolution(sensor)
+            raise SpecError(
+                f"joint {joint} would fall {counts:.0f} counts behind; set points pause at {most}, and a margin is kept"
+            )
 
 
 def _marginal(problem: SimulatedProblem, information: Floats) -> tuple[tuple[Unknown, ...], Floats]:

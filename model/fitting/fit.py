@@ -85,7 +85,7 @@ def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> S
     signal = _signal(model, options)
     unknowns = chosen_unknowns(model, options)
     records = records_of(traces, model.machine, signal)
-    samples = sum(r.measured.size for r in records)
+    samples = sum(r.samples for r in records)
     if samples <= len(unknowns):
         raise TraceError(
             f"{samples} samples for {len(unknowns)} parameters: there must be more samples than parameters"

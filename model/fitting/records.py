@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import TraceError
-from daq.contracts.machine import Machine, Sensor
+from daq.contracts.machine import Machine, NoController, Sensor
 from daq.contracts.trace import Trace
 from model.simulation.inputs import RunInputs, inputs_of
 
@@ -44,8 +44,8 @@ class Record:
 
     @property
     def samples(self) -> int:
-        """Samples in the record."""
-        return len(self.measured)
+        """Samples that are compared."""
+        return sum(run.stop - run.start for run in self.runs)
 
 
 def records_of(traces: Sequence[Trace], machine: Machine, signal: Signal) -> tuple[Record, ...]:
@@ -145,10 +145,12 @@ def _check_same_unit(trace: Trace, machine: Machine) -> None:
 
 
 def _moves(record: Record, machine: Machine, signal: Signal) -> bool:
+    """Whether some joint was asked to move, and did; an arm that sags to its first set point does not count."""
     for column, joint in enumerate(machine.modelled_joints):
         sensor = machine.joint(joint).sensor
-        spread = float(np.ptp(record.measured[:, column]))
         least = LEAST_MOTION_COUNTS * resolution(sensor) if sensor is not None and signal == "position" else 0.0
-        if spread > least:
+        asked = record.inputs.drive if isinstance(machine.controller, NoController) else record.inputs.set_points
+        moved = float(np.ptp(record.measured[record.runs[0].start :, column]))
+        if moved > least and np.ptp(asked[:, column]) > 0.0:
             return True
     return False

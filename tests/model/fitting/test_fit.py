@@ -1,0 +1,161 @@
+"""Fitting records of an arm that is known: values, intervals, verdicts, lineage, progress and cancelling."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq.contracts.progress import CancelledError
+from model.fitting.fit import fit
+from model.fitting.options import FitOptions, Prior
+from model.fitting.result import FitResult, load_result
+from tests.model.fitting.imagined import arm, changed, traces
+
+TRUTH = {
+    "joint1.motor.back_emf_constant": 0.0300,
+    "joint2.motor.back_emf_constant": 0.0460,
+    "joint3.motor.back_emf_constant": 0.0360,
+    "load.mass": 1.36,
+    "joint2.load_dependent_friction.arm": 0.16,
+}
+QUICK = FitOptions(parameters=tuple(TRUTH), sensor_bend=False, replicas=4, rounds=3)
+
+
+@pytest.fixture(scope="module")
+def result() -> FitResult:
+    return fit(arm(), traces(arm().with_values(TRUTH)), QUICK)
+
+
+def test_finds_the_values_that_the_records_were_made_with(result: FitResult) -> None:
+    assert result.converged
+    for name, value in TRUTH.items():
+        found = result.parameter(name)
+        assert found.verdict == "known"
+        assert found.value is not None
+        assert found.deviation is not None
+        assert abs(found.value - value) < 4 * found.deviation, name
+        assert found.deviation < 0.3 * abs(found.before - value), name
+        assert found.low is not None
+        assert found.high is not None
+        assert found.high - found.value == pytest.approx(1.96 * found.deviation, rel=1e-3)
+
+
+def test_what_is_left_is_the_noise_of_the_sensor(result: FitResult) -> None:
+    assert result.whitened_mean_square == pytest.approx(1.0, abs=0.1)
+    for error in result.errors:
+        assert error.after < 1.35 * error.floor
+    assert result.errors[1].before > 4 * result.errors[1].floor
+
+
+def test_the_fitted_model_says_where_it_comes_from(result: FitResult) -> None:
+    assert result.model.lineage.parent == arm().identity
+    assert result.model.lineage.traces == ("imagined-0-0", "imagined-1-0")
+    assert result.model.parameter("load.mass").value == result.parameter("load.mass").value
+    assert {use.name for use in result.model.effects} == {use.name for use in arm().effects}  # no nuisance stays in it
+
+
+def test_a_result_survives_its_file(result: FitResult, tmp_path: Path) -> None:
+    result.save(tmp_path / "fit.json")
+    assert load_result(tmp_path / "fit.json") == result
+
+
+def test_the_same_records_give_the_same_result_to_the_bit(result: FitResult) -> None:
+    again = fit(arm(), traces(arm().with_values(TRUTH)), QUICK)
+    assert again.values == result.values
+    assert again.covariance == result.covariance
+
+
+def assert_close(found: FitResult, deviations: float) -> None:
+    """Every value within so many deviations of the truth, whatever the verdict."""
+    sizes = dict(zip(found.names, np.sqrt(np.diag(found.covariance_matrix)), strict=True))
+    for name, value in TRUTH.items():
+        assert abs(found.parameter(name).model_value - value) < deviations * sizes[name], name
+
+
+def test_missing_samples_are_left_out_not_bridged() -> None:
+    whole = traces(arm().with_values(TRUTH))
+    keep = np.setdiff1d(np.arange(len(whole[0])), np.r_[120:130, 200])
+    signals = {
+        name: getattr(whole[0], name)[keep] for name in ("time", "position", "set_point", "error", "drive", "tick")
+    }
+    found = fit(arm(), [changed(whole[0], **signals), whole[1]], QUICK)
+    assert found.samples == 2 * (len(whole[0]) - 20) - 11
+    assert_close(found, 5)
+
+
+def test_a_crackling_sensor_decides_nothing_when_the_loss_is_robust() -> None:
+    given = traces(arm().with_values(TRUTH))
+    crackled = given[0].position.copy()
+    crackled[60::97, 1] += 0.03
+    found = fit(arm(), [changed(given[0], position=crackled), given[1]], QUICK)
+    assert_close(found, 5)
+
+
+def test_progress_never_goes_back_and_ends_at_one() -> None:
+    told: list[float] = []
+    fit(arm(), traces(arm(), 1, 4.0), QUICK.model_copy(update={"rounds": 1}), lambda f, _text: told.append(f))
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+
+
+class After:
+    """A cancel that comes after some questions."""
+
+    def __init__(self, questions: int) -> None:
+        self.left = questions
+
+    def is_set(self) -> bool:
+        self.left -= 1
+        return self.left < 0
+
+
+def test_can_be_cancelled_in_the_middle() -> None:
+    with pytest.raises(CancelledError):
+        fit(arm(), traces(arm(), 1, 4.0), QUICK, cancel=After(3))
+
+
+def test_another_start_finds_the_same() -> None:
+    given = traces(arm().with_values(TRUTH))
+    plain = QUICK.model_copy(update={"rounds": 1, "replicas": 0, "tolerance": 1e-7})
+    one = fit(arm(), given, plain)
+    two = fit(arm(), given, plain.model_copy(update={"starts": 2, "seed": 5}))
+    deviations = np.sqrt(np.diag(one.covariance_matrix))[: len(TRUTH)]
+    assert (np.abs(np.subtract(one.values, two.values))[: len(TRUTH)] < 0.3 * deviations).all()
+
+
+def test_nelder_and_mead_find_two_parameters_too() -> None:
+    names = ("joint2.motor.back_emf_constant", "load.mass")
+    start = arm().with_values({k: v for k, v in TRUTH.items() if k not in names})
+    options = FitOptions(parameters=names, method="nelder_mead", most_evaluations=120)
+    found = fit(start, traces(arm().with_values(TRUTH)), options)
+    assert found.parameter(names[0]).model_value == pytest.approx(TRUTH[names[0]], rel=0.02)
+    assert found.evaluations <= 120
+
+
+def test_a_strong_prior_holds_and_the_parameter_is_not_called_known() -> None:
+    options = FitOptions(
+        parameters=("link1.mass", "load.mass"), priors={"link1.mass": Prior(expected=2.6, deviation=0.1)}, replicas=0,
+        rounds=1, sensor_bend=False,
+    )  # fmt: skip
+    found = fit(arm(), traces(arm(), 1, 4.0), options).parameter("link1.mass")
+    assert found.verdict == "unknown"
+    assert found.value is found.low is found.high is found.deviation is None
+    assert found.model_value == pytest.approx(2.6, abs=0.05)
+
+
+def test_the_scale_of_torque_is_found_in_records_of_the_whole_arm() -> None:
+    options = FitOptions(
+        parameters=("*.mass", "*.torque_constant", "*.rotor_inertia", "*.viscous_friction.coefficient", "load.mass"),
+        sensor_bend=False, friction_form=False, replicas=0, rounds=1,
+    )  # fmt: skip
+    found = fit(arm(), traces(arm(), 2, 4.0), options)
+    report = found.identifiability
+    assert report.torque_scale_free
+    scale = next(c for c in report.undetermined if c.torque_scale)
+    assert {m.name for m in scale.members} == {p.name for p in found.parameters}
+    assert {m.change for m in scale.members} == {1.0}
+    for name in ("load.mass", "joint3.motor.torque_constant", "joint3.motor.rotor_inertia"):
+        assert found.parameter(name).verdict != "known"
+        assert found.parameter(name).value is None

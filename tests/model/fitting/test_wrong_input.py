@@ -1,0 +1,122 @@
+"""Wrong input to a fit: one clear error, never a number that looks like a result."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq.contracts.errors import DaqError, SpecError, TraceError
+from daq.contracts.trace import Trace
+from model.fitting.fit import fit
+from model.fitting.options import FitOptions, Prior
+from model.fitting.result import load_result
+from tests.model.fitting.imagined import arm, changed, set_points, trace
+
+SOME = FitOptions(parameters=("load.mass",), sensor_bend=False, replicas=0, rounds=1)
+
+
+@pytest.fixture(scope="module")
+def good() -> Trace:
+    return trace(arm(), 0, 3.0)
+
+
+def refused(given: list[Trace], options: FitOptions = SOME) -> str:
+    with pytest.raises(DaqError) as error:
+        fit(arm(), given, options)
+    text = str(error.value)
+    assert "\n" not in text
+    return text
+
+
+def test_no_trace() -> None:
+    assert "at least one" in refused([])
+
+
+def test_the_same_trace_twice(good: Trace) -> None:
+    assert "more than once" in refused([good, good])
+
+
+def test_no_motion() -> None:
+    still = trace(arm(), points=np.tile(set_points(0, 0.02), (150, 1)))
+    assert "no motion" in refused([still])
+
+
+def test_not_a_number(good: Trace) -> None:
+    position = good.position.copy()
+    position[17, 1] = np.nan
+    with pytest.raises(TraceError, match="not finite at sample 17"):
+        fit(arm(), [changed(good, position=position)], SOME)
+
+
+def test_two_samples(good: Trace) -> None:
+    names = ("time", "position", "set_point", "error", "drive", "tick")
+    assert "2 samples" in refused([changed(good, **{n: getattr(good, n)[:2] for n in names})])
+
+
+def test_a_joint_missing(good: Trace) -> None:
+    columns = {n: getattr(good, n)[:, :2] for n in ("position", "set_point", "error", "drive")}
+    assert "joint 3 is not in it" in refused([changed(good, joints=(1, 2), **columns)])
+
+
+@pytest.mark.parametrize("signals", [("position", "set_point"), ("position",), ("set_point",)])
+def test_degrees_for_radians(good: Trace, signals: tuple[str, ...]) -> None:
+    text = refused([changed(good, **{n: np.degrees(getattr(good, n)) for n in signals})])
+    assert "rad" in text
+    assert "degrees" in text or "apart throughout" in text
+
+
+def test_no_set_points(good: Trace) -> None:
+    assert "set points" in refused([changed(good, set_point=None)])
+
+
+def test_more_parameters_than_samples(good: Trace) -> None:
+    names = ("time", "position", "set_point", "error", "drive", "tick")
+    short = changed(good, **{n: getattr(good, n)[60:76] for n in names})
+    assert "16 samples for 26 parameters" in refused([short], FitOptions(parameters=("*",)))
+
+
+def test_a_bound_the_wrong_way_round(good: Trace) -> None:
+    text = refused([good], SOME.model_copy(update={"bounds": {"load.mass": (2.0, 1.0)}}))
+    assert "lower bound 2 kg is not below the upper bound 1 kg" in text
+
+
+def test_a_bound_beyond_what_is_possible(good: Trace) -> None:
+    assert "leave what is possible" in refused([good], SOME.model_copy(update={"bounds": {"load.mass": (-3.0, 1.5)}}))
+
+
+def test_a_start_outside_the_bounds(good: Trace) -> None:
+    assert "outside 2 to 3" in refused([good], SOME.model_copy(update={"bounds": {"load.mass": (2.0, 3.0)}}))
+
+
+@pytest.mark.parametrize("options", [
+    FitOptions(parameters=("load.weight",)), FitOptions(held=("nothing.*",)), FitOptions(bounds={"load.weight": (0, 1)}),
+    FitOptions(priors={"load.weight": Prior(expected=1, deviation=1)}),
+])  # fmt: skip
+def test_a_name_that_is_none(good: Trace, options: FitOptions) -> None:
+    assert "not in this model" in refused([good], options)
+
+
+def test_nothing_left_to_fit(good: Trace) -> None:
+    assert "nothing to fit" in refused([good], FitOptions(held=("*",)))
+
+
+def test_a_trace_of_another_machine(good: Trace) -> None:
+    other = arm().machine.model_copy(update={"name": "other"})
+    text = refused([changed(good, record=good.record.model_copy(update={"machine": other}))])
+    assert "made on other" in text
+
+
+def test_a_result_of_a_newer_version(tmp_path: Path) -> None:
+    (tmp_path / "new.json").write_text(json.dumps({"format": 99}), "utf-8")
+    with pytest.raises(SpecError, match="format 99 is newer"):
+        load_result(tmp_path / "new.json")
+
+
+@pytest.mark.parametrize("text", ["", "[1, 2]", "{}", '{"format": 1, "model": 3}'])
+def test_a_file_that_is_no_result(tmp_path: Path, text: str) -> None:
+    (tmp_path / "other.json").write_text(text, "utf-8")
+    with pytest.raises(SpecError):
+        load_result(tmp_path / "other.json")
