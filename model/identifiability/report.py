@@ -97,9 +97,7 @@ def judged(jacobian: Floats, values: Floats, unknowns: Sequence[Unknown]) -> Ide
     alone = np.linalg.norm(scaled, axis=0)
     reduced, kept = _without_nuisances(scaled, nuisance, claimed), np.flatnonzero(~nuisance)
     own = [unknowns[k] for k in kept]
-    directions = undetermined(
-        reduced / natural[kept], values[kept], natural[kept], [u.torque for u in own]
-    )
+    directions = undetermined(reduced / natural[kept], values[kept], natural[kept], [u.torque for u in own])
     combinations = tuple(_combination(d, own, values[kept]) for d in directions)
     verdicts = tuple(_verdict(unknowns[k], marginal[k], alone[k], combinations) for k in kept)
     prior = np.array([1.0 if u.deviation is not None else WEAKEST_PRIOR**-2 for u in unknowns])
