@@ -4,9 +4,9 @@
     python -m benchmarks recovery --seeds 100 --folder FOLDER --bent  with potentiometers that bend by up to ±0.25 %
     python -m benchmarks recovery --quick                             three seeds
 
-Every seed is an arm of its own: its parameters are drawn from what the machine file expects (value ± deviation), written
-into a plant file for the mock, and hidden until the fit has answered. The experiments are designed once, on the model
-of the machine file. Counted are the parameters that the identifiability report calls known.
+Every seed is an arm of its own: its parameters are drawn from what the machine file expects (value ± deviation),
+written into a plant file for the mock, and hidden until the fit has answered. The experiments are designed once, on
+the model of the machine file. Counted are the parameters that the identifiability report calls known.
 
 Two boards are studied. With straight potentiometers the fit is told so. With bent ones (what the mock has by default)
 the bend is a nuisance within the stated linearity.
@@ -102,7 +102,10 @@ def figures(entries: list[dict[str, Any]]) -> list[Figure]:
         for name, p in entry["parameters"].items():
             if p["verdict"] == "known":
                 hits.setdefault(name, []).append(p["low"] <= p["truth"] <= p["high"])
-    table = [_figure(name, held, f"≥ {EACH:.0%}", len(held) < 10 or np.mean(held) >= EACH) for name, held in sorted(hits.items())]
+    table = [
+        _figure(name, held, f"≥ {EACH:.0%}", len(held) < 10 or np.mean(held) >= EACH)
+        for name, held in sorted(hits.items())
+    ]
     pooled = [held for each in hits.values() for held in each]
     inside = bool(pooled) and POOLED[0] <= float(np.mean(pooled)) <= POOLED[1]
     return [_figure("pooled", pooled, f"{POOLED[0]:.0%} to {POOLED[1]:.0%}", inside), *table]

@@ -69,13 +69,15 @@ def _gains(rng: np.random.Generator, machine: Machine) -> dict[int, Gain]:
 
 def _amplitudes(rng: np.random.Generator, joints: tuple[int, ...], share: float = 1.0) -> dict[int, float]:
     low, high = AMPLITUDES
-    return {j: share * float(rng.choice((-1, 1)) * math.exp(rng.uniform(math.log(low), math.log(high)))) for j in joints}
+    return {
+        j: share * float(rng.choice((-1, 1)) * math.exp(rng.uniform(math.log(low), math.log(high)))) for j in joints
+    }
 
 
 def _multisine(rng: np.random.Generator, joints: tuple[int, ...], duration: float) -> Multisine:
     return Multisine(
-        amplitude=_amplitudes(rng, joints), duration=duration, lowest=0.1, highest=float(rng.uniform(*HIGHEST_FREQUENCIES)),
-        tones=12, seed=int(rng.integers(1, 10_000)),
+        amplitude=_amplitudes(rng, joints), duration=duration, lowest=0.1,
+        highest=float(rng.uniform(*HIGHEST_FREQUENCIES)), tones=12, seed=int(rng.integers(1, 10_000)),
     )  # fmt: skip
 
 

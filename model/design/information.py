@@ -121,7 +121,9 @@ def imagined_trace(model: Model, spec: ExperimentSpec, plan: Planner) -> Trace:
     """The record that the experiment would give on this model without noise. Raises as the planner does."""
     machine = model.machine
     if isinstance(machine.controller, NoController):
-        raise SpecError(f"machine {machine.name} has no controller: no experiment with set points can be imagined on it")
+        raise SpecError(
+            f"machine {machine.name} has no controller: no experiment with set points can be imagined on it"
+        )
     angles = np.asarray(plan(spec), dtype=np.float64)
     period = machine.controller.period.value
     record = TraceRecord(
@@ -131,8 +133,8 @@ def imagined_trace(model: Model, spec: ExperimentSpec, plan: Planner) -> Trace:
     joints = machine.modelled_joints
     wanted = np.ascontiguousarray(angles[:, [j - 1 for j in joints]])
     return Trace(
-        record, joints, period * np.arange(len(wanted)), wanted, set_point=wanted, drive=np.zeros_like(wanted),
-        tick=np.arange(len(wanted)),
+        record, joints, np.asarray(period * np.arange(len(wanted)), dtype=np.float64), wanted, set_point=wanted,
+        drive=np.zeros_like(wanted), tick=np.arange(len(wanted)),
     )  # fmt: skip
 
 
@@ -168,7 +170,9 @@ def _fitted_information(unknowns: Sequence[Unknown], fitted: FitResult) -> Float
     rows = []
     for u in unknowns:
         if u.name not in fitted.names:
-            raise SpecError(f"{u.name}: the fit did not find it; fitted were {', '.join(p.name for p in fitted.parameters)}")
+            raise SpecError(
+                f"{u.name}: the fit did not find it; fitted were {', '.join(p.name for p in fitted.parameters)}"
+            )
         rows.append(fitted.names.index(u.name))
     natural = scales(tuple(unknowns))
     covariance = fitted.covariance_matrix[np.ix_(rows, rows)] / np.outer(natural, natural)

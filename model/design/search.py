@@ -22,7 +22,7 @@ from model.design.information import (
 )
 from model.fitting.fit import INTERVAL
 from model.fitting.options import FitOptions
-from model.fitting.unknowns import scales
+from model.fitting.unknowns import Unknown, scales
 from model.machine_model.model import Model
 
 Floats = NDArray[np.float64]
@@ -70,12 +70,14 @@ def design(
     """
     options, fit_options, cancel = options or DesignOptions(), fit_options or FitOptions(), cancel or Never()
     specs, informations, refused = [], [], 0
-    unknowns = ()
+    unknowns: tuple[Unknown, ...] = ()
     last_refusal = ""
     for number in range(options.candidates):
         if cancel.is_set():
             raise CancelledError("the design was cancelled")
-        progress(0.95 * number / options.candidates, f"candidate {number + 1} of {options.candidates}, {refused} refused")
+        progress(
+            0.95 * number / options.candidates, f"candidate {number + 1} of {options.candidates}, {refused} refused"
+        )
         spec = drawn_experiment(model.machine, number, options.duration, options.seed)
         try:
             unknowns, information = experiment_information(model, spec, plan, fit_options)

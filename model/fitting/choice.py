@@ -20,8 +20,8 @@ from model.machine_model.parameter import Parameter
 
 BEND = "potentiometer_nonlinearity"
 BEND_SHARE = 0.5
-"""Standard deviation of a bend's first term as a share of the stated linearity; later terms fall as one over their number,
-which makes the whole curve stay within the linearity in about nine of ten cases."""
+"""Standard deviation of a bend's first term as a share of the stated linearity; later terms fall as one over their
+number, which makes the whole curve stay within the linearity in about nine of ten cases."""
 SLIDING_FRICTION = (
     "coulomb_friction", "load_dependent_friction", "stribeck_friction", "direction_dependent_friction", "gear_loss",
     "stiction",
@@ -120,14 +120,13 @@ def friction_forms(model: Model) -> tuple[Model, tuple[Unknown, ...]]:
     for joint in creeping:
         name, level = f"joint{joint}.stribeck_friction.torque", friction_level(model, joint)
         if level > 0:
-            found.append(
-                Unknown(name, "N·m", 0.0, -level, level, 0.0, CREEPING_SHARE * level, nuisance=True, torque=1)
-            )
+            found.append(Unknown(name, "N·m", 0.0, -level, level, 0.0, CREEPING_SHARE * level, nuisance=True, torque=1))
     return wider, tuple(found)
 
 
 def friction_level(model: Model, joint: int) -> float:
-    """Largest Coulomb friction of a joint, N·m: the constant part, and the arm under all the weight beyond the joint."""
+    """Largest Coulomb friction of a joint, N·m: the constant part, and the arm under all the weight beyond the
+    joint."""
     column = {c: float(model.vector[at.slot(joint, c)]) for c in (at.COULOMB, at.COULOMB_ARM)}
     beyond = sum(float(model.vector[at.slot(j, at.MASS)]) for j in model.machine.modelled_joints if j >= max(joint, 2))
     weight = 9.81 * (beyond + float(model.vector[at.LOAD]))

@@ -2,8 +2,9 @@
 
 Whitening takes out the correlation that is the same everywhere. What is left is of another kind: an arm that comes to
 rest a little off stays off for the whole hold, and the noise differs between motion and rest. The sandwich
-A⁻¹ B A⁻¹ with A = JᵀJ + prior, and B from the sums of neighbouring scores (Newey and West 1987), answers for that. Since
-B is itself estimated from few independent stretches, no parameter gets a smaller deviation from it than from A alone.
+A⁻¹ B A⁻¹ with A = JᵀJ + prior, and B from the sums of neighbouring scores (Newey and West 1987), answers for that.
+Since B is itself estimated from few independent stretches, no parameter gets a smaller deviation from it than from A
+alone.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 BANDWIDTH = 50
-"""Samples over which scores are taken to be correlated: one second at 50 Hz, longer than a reversal, shorter than a hold."""
+"""Samples over which scores are taken to be correlated: one second at 50 Hz, longer than a reversal, shorter
+than a hold."""
 
 
 def score_covariance(scores: Sequence[Floats], bandwidth: int = BANDWIDTH) -> Floats:

@@ -91,15 +91,15 @@ def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> S
             f"{samples} samples for {len(unknowns)} parameters: there must be more samples than parameters"
         )
     simple = options.method == "nelder_mead"
-    wider, bends = (model, ()) if simple else with_bends(model, options, signal)
-    postures = ()
+    wider, bends = with_bends(model, options, signal) if not simple else (model, ())
+    postures: tuple[Unknown, ...] = ()
     if options.start_posture and signal == "position" and not simple:
         postures = start_postures(model.machine, records, bool(bends))
     wider, forms = friction_forms(wider) if options.friction_form and not simple else (wider, ())
     loop = options.loop or ("open" if isinstance(model.machine.controller, NoController) else "closed")
     return SimulatedProblem(
-        wider, records, (*unknowns, *bends, *forms, *postures), noise_floor(records, model.machine, signal), signal, loop,
-        options.step,
+        wider, records, (*unknowns, *bends, *forms, *postures), noise_floor(records, model.machine, signal), signal,
+        loop, options.step,
     )  # fmt: skip
 
 
@@ -174,7 +174,8 @@ def _with_noise(
 
 @dataclass(frozen=True)
 class _Estimate:
-    """At the solution; `after` is without what the noise does on average: simulated − measured as anybody would see it."""
+    """At the solution; `after` is without what the noise does on average: simulated − measured as anybody
+    would see it."""
 
     covariance: Floats
     report: IdentifiabilityReport

@@ -113,7 +113,7 @@ def solve(
     samples = objective.samples
     found = least_squares(
         objective.residual, x, jac=objective.jacobian, bounds=(low, high), method="trf", x_scale=1.0,
-        loss=(lambda z: huber(z, samples)) if search.robust else "linear",
+        loss=(lambda z: huber(z, samples)) if search.robust else "linear",  # type: ignore[arg-type] # stubs: rows of 3
         ftol=search.tolerance, xtol=search.tolerance, gtol=search.tolerance, max_nfev=search.most_evaluations,
     )  # fmt: skip
     return Solution(

@@ -49,21 +49,23 @@ def climb(
         if tell is not None:
             tell(count, mean**0.5)
         if goal is not None and mean <= goal:
-            raise _Reached
+            raise _GoalReachedError
         return mean
 
     simplex = _first_simplex(np.array([b[0] for b in bounds]), np.array([b[1] for b in bounds]))
     options = {"maxfev": most_evaluations, "fatol": tolerance * problem.floor.max() ** 2, "xatol": tolerance,
                "initial_simplex": simplex, "adaptive": True}  # fmt: skip
     try:
-        found = minimize(error, np.zeros(len(begin)), method="Nelder-Mead", bounds=bounds, options=options)
+        start = np.zeros(len(begin))
+        # The stubs know no tuple of floats as bounds.
+        found = minimize(error, start, method="Nelder-Mead", bounds=bounds, options=options)  # type: ignore[call-overload]
         message, converged = str(found.message), bool(found.success)
-    except _Reached:
+    except _GoalReachedError:
         message, converged = "the error asked for is reached", True
     return Solution(best[1], best[0], count, converged, message)
 
 
-class _Reached(Exception):
+class _GoalReachedError(Exception):
     """The goal is met."""
 
 

@@ -64,7 +64,8 @@ class Whitened:
         return np.asarray(flat.T @ flat)
 
     def scores(self, influence: Floats | None = None) -> list[Floats]:
-        """Per stretch (k, p): Σ over signals of J ψ(r) at each sample; ψ is the identity unless `influence` is given."""
+        """Per stretch (k, p): Σ over signals of J ψ(r) at each sample; ψ is the identity unless `influence` is
+        given."""
         r = self.residual if influence is None else influence
         every = np.einsum("mnp,mn->mp", self.jacobian, r)
         return [every[a:b] for a, b in zip(self.starts, self.starts[1:], strict=False)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -112,7 +113,7 @@ def _record(trace: Trace, machine: Machine, signal: Signal) -> Record:
     begin = begin if begin <= len(trace) // 4 else 0
     breaks = np.flatnonzero(np.diff(inputs.rows) > 1.5) + 1
     edges = [begin, *(int(b) for b in breaks if b > begin), len(trace)]
-    runs = tuple(slice(a, b) for a, b in zip(edges, edges[1:], strict=False))
+    runs = tuple(slice(a, b) for a, b in pairwise(edges))
     return Record(inputs, np.ascontiguousarray(source[:, columns]), runs, name)
 
 

@@ -46,7 +46,8 @@ class FittedParameter(_Part):
 
 
 class JointError(_Part):
-    """Root mean square of simulated − measured on one joint over all traces, and the noise of the measurement itself."""
+    """Root mean square of simulated − measured on one joint over all traces, and the noise of the measurement
+    itself."""
 
     joint: int
     unit: str

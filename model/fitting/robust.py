@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 THRESHOLD = 4.0
-"""Standard deviations beyond which a residual counts as an outlier; Gaussian noise reaches it once in 16 000 samples."""
+"""Standard deviations beyond which a residual counts as an outlier; Gaussian noise reaches it once in 16 000
+samples."""
 
 
 def huber(squares: Floats, samples: int, threshold: float = THRESHOLD) -> Floats:

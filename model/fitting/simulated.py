@@ -70,13 +70,17 @@ class SimulatedProblem:
         count = len(prepared)
         out = np.zeros((count, OUTPUTS, max(len(r.inputs) for r in self.records), self.model.joint_count))
         engine_for(self.model).run(
-            prepared, np.arange(count), np.tile(vector, (count, 1)), np.array(initials), self.model.flags, self.step, out
+            prepared,
+            np.arange(count),
+            np.tile(vector, (count, 1)),
+            np.array(initials),
+            self.model.flags,
+            self.step,
+            out,
         )
         if not np.isfinite(out).all():
             raise SpecError("a simulation with noise does not stay finite: the loop is unstable")
-        return [
-            at_rows(out[t, OUT_READING, : len(r.inputs)], r.inputs.rows) for t, r in enumerate(self.records)
-        ]
+        return [at_rows(out[t, OUT_READING, : len(r.inputs)], r.inputs.rows) for t, r in enumerate(self.records)]
 
     @cached_property
     def _prepared(self) -> list[Prepared]:
@@ -155,7 +159,8 @@ class SimulatedProblem:
 
 
 def initial_name(trace: int, joint: int) -> str:
-    """Name of the unknown by which joint `joint` starts trace number `trace` (from 1) off the posture it was read at."""
+    """Name of the unknown by which joint `joint` starts trace number `trace` (from 1) off the posture it was
+    read at."""
     return f"{INITIAL}.trace{trace}.joint{joint}.position"
 
 

@@ -1,8 +1,8 @@
 """Whitening of residuals by autoregression, so that correlated samples do not count as independent ones.
 
 The residual of a closed loop is not white: the controller answers the sensor's noise, so slow errors are suppressed and
-fast ones are not. An autoregressive model of the residual, estimated from the residual itself, undoes that; residual and
-Jacobian are filtered alike (generalised least squares).
+fast ones are not. An autoregressive model of the residual, estimated from the residual itself, undoes that; residual
+and Jacobian are filtered alike (generalised least squares).
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ class Whitener:
         return len(self.predictors) - 1
 
     def whitened(self, signal: Floats) -> Floats:
-        """Filters (n, …) along its first axis. The first samples are predicted from as many as there are before them."""
+        """Filters (n, …) along its first axis. The first samples are predicted from as many as there are
+        before them."""
         result = np.empty_like(signal)
         for k in range(min(self.order, len(signal))):
             past = signal[:k][::-1]

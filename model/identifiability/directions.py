@@ -23,7 +23,8 @@ UNKNOWN_DEVIATION = 1.0
 NEGLIGIBLE = 0.12
 """Share of a direction's largest member below which a member is left out of its name."""
 FREE_SCALE = 0.03
-"""Change of the whitened residual (all samples together) for the natural size of a direction that still counts as none."""
+"""Change of the whitened residual (all samples together) for the natural size of a direction that still counts
+as none."""
 
 
 @dataclass(frozen=True)

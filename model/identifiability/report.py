@@ -95,7 +95,7 @@ def judged(jacobian: Floats, values: Floats, unknowns: Sequence[Unknown]) -> Ide
     information = scaled.T @ scaled + np.diag(np.where(claimed, 1.0, WEAKEST_PRIOR**-2))
     marginal = np.sqrt(np.diag(np.linalg.inv(information)))
     alone = np.linalg.norm(scaled, axis=0)
-    reduced, kept = _without_nuisances(scaled, nuisance, claimed), np.flatnonzero(~nuisance)
+    reduced, kept = _without_nuisances(scaled, nuisance, claimed), np.flatnonzero(~nuisance).tolist()
     own = [unknowns[k] for k in kept]
     directions = undetermined(reduced / natural[kept], values[kept], natural[kept], [u.torque for u in own])
     combinations = tuple(_combination(d, own, values[kept]) for d in directions)

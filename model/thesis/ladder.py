@@ -47,8 +47,14 @@ BACK_EMF_DEVIATION = DATA_SHEET_BACK_EMF_2 * gaussian_share("source")
 CURVE_POINTS = 25
 
 PLAIN = FitOptions(
-    use_priors=False, robust=False, start_posture=False, sensor_bend=False, friction_form=False, replicas=0,
-    whiten=False, rounds=1,
+    use_priors=False,
+    robust=False,
+    start_posture=False,
+    sensor_bend=False,
+    friction_form=False,
+    replicas=0,
+    whiten=False,
+    rounds=1,
 )
 """The source's squared error: no priors, weights, nuisances or noise."""
 

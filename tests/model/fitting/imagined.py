@@ -1,4 +1,5 @@
-"""Records of an arm that is the model itself, with noise drawn and readings rounded: what a fit must get right first."""
+"""Records of an arm that is the model itself, with noise drawn and readings rounded: what a fit must get right
+first."""
 
 from __future__ import annotations
 
@@ -35,7 +36,9 @@ def set_points(number: int, seconds: float) -> NDArray[np.float64]:
     motion = np.zeros((len(time), 3))
     for joint, size in enumerate((0.30, 0.20, 0.30)):
         for frequency in (0.15, 0.35, 0.6, 1.1):
-            motion[:, joint] += size / (1 + 2 * frequency) * np.sin(2 * np.pi * frequency * moving + rng.uniform(0, 6.28))
+            motion[:, joint] += (
+                size / (1 + 2 * frequency) * np.sin(2 * np.pi * frequency * moving + rng.uniform(0, 6.28))
+            )
         motion[:, joint] -= motion[0, joint]
     return np.asarray(STARTS[number % 4] + motion * np.clip(moving / 0.5, 0.0, 1.0)[:, None])
 
@@ -48,8 +51,8 @@ def trace(
     wanted = set_points(number, seconds) if points is None else points
     joints = model.machine.modelled_joints
     record = TraceRecord(
-        trace_id=f"imagined-{number}-{seed}", created=datetime(2026, 1, 1, tzinfo=UTC), software="test", source="imported",
-        period=PERIOD, gains=dict.fromkeys(joints, gains),
+        trace_id=f"imagined-{number}-{seed}", created=datetime(2026, 1, 1, tzinfo=UTC), software="test",
+        source="imported", period=PERIOD, gains=dict.fromkeys(joints, gains),
     )  # fmt: skip
     time = PERIOD * np.arange(len(wanted))
     asked = Trace(

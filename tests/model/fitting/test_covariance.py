@@ -11,7 +11,8 @@ Floats = NDArray[np.float64]
 
 
 def estimates(bandwidth: int, repeats: int = 300) -> tuple[float, float]:
-    """Share of 95 % intervals that contain the truth, plain and sandwich, for a mean with noise that is held in stretches."""
+    """Share of 95 % intervals that contain the truth, plain and sandwich, for a mean with noise that is held
+    in stretches."""
     plain = robust = 0
     for seed in range(repeats):
         rng = np.random.default_rng(seed)

@@ -92,7 +92,8 @@ def test_a_start_outside_the_bounds(good: Trace) -> None:
 
 
 @pytest.mark.parametrize("options", [
-    FitOptions(parameters=("load.weight",)), FitOptions(held=("nothing.*",)), FitOptions(bounds={"load.weight": (0, 1)}),
+    FitOptions(parameters=("load.weight",)), FitOptions(held=("nothing.*",)),
+    FitOptions(bounds={"load.weight": (0, 1)}),
     FitOptions(priors={"load.weight": Prior(expected=1, deviation=1)}),
 ])  # fmt: skip
 def test_a_name_that_is_none(good: Trace, options: FitOptions) -> None:

@@ -22,12 +22,11 @@ def pendulum_jacobian(values: Floats, noise: float) -> Floats:
 
     Unknowns: mass m (kg), length l (m), torque constant K (N·m/A), viscous v (N·m·s/rad).
     """
-    m, l, K, v = values
+    m, length, K, v = values
     u, speed, s = rng.normal(size=(3, 400))
-    torque = K * u - v * speed
-    return np.stack(
-        [-torque / (m**2 * l**2), -2 * torque / (m * l**3) + 9.81 * s / l**2, u / (m * l**2), -speed / (m * l**2)], axis=1
-    ) / noise  # fmt: skip
+    torque, inertia = K * u - v * speed, m * length**2
+    by_mass, by_length = -torque / (m * inertia), -2 * torque / (length * inertia) + 9.81 * s / length**2
+    return np.stack([by_mass, by_length, u / inertia, -speed / inertia], axis=1) / noise
 
 
 VALUES = np.array([1.2, 0.3, 0.02, 0.005])
