@@ -60,7 +60,7 @@ def ask_at_the_socket(_process: Running) -> None:
     ("end_it", "reason"),
     [
         (send_signal(signal.SIGTERM), "stopped by a signal"),
-        (speak, "stopped by whoever started the run"),
+        (speak, "stopped by Ctrl-C, or by the program that started the run"),
         (ask_at_the_socket, "stopped from another terminal"),
     ],
     ids=["SIGTERM", "its parent", "the stop socket"],
