@@ -51,7 +51,7 @@ def options(
 def main() -> None:
     """Entry point: errors that are the user's end in one line on standard error and a documented exit code."""
     try:
-        exit_code = app(standalone_mode=False)
+        exit_code = app(prog_name="daq", standalone_mode=False)
     except DaqError as error:
         fail(str(error), error.exit_code)
     except ProtocolError as error:
