@@ -33,9 +33,11 @@ Floats = NDArray[np.float64]
 
 INTERVAL = 1.959964
 """Standard deviations on either side that hold 95 % of a Gaussian."""
-SETTLED = 0.1
-"""Rounds end when no value moves by more than this share of its deviation."""
+SETTLED = 0.33
+"""Deviations by which a round may still move the values."""
 LEAST_SQUARES_EVALUATIONS = 60
+ROUND_EVALUATIONS = 2
+"""In a round that is not the last: the next one changes the weights anyway."""
 FIRST_TOLERANCE = 100.0
 """Times the tolerance of the rounds: the first search only has to come near."""
 SIMPLEX_EVALUATIONS = 400
@@ -59,19 +61,22 @@ def fit(
     options, cancel, begun = options or FitOptions(), cancel or Never(), time.perf_counter()
     problem = fit_problem(model, traces, options)
     before = problem.evaluate(_starts(problem), derivatives=False)
-    solution = _first_search(problem, options, progress, cancel)
+    solution = _widened(problem, _first_search(_without_creeping(problem), options, progress, cancel))
     evaluations = solution.evaluations
     whiteners: list[Whitener] = [white(d) for d in problem.floor]
-    search = Search(options.robust, options.tolerance, options.most_evaluations or LEAST_SQUARES_EVALUATIONS)
     for number in range(options.rounds):
-        last = solution
+        last, most = solution, options.most_evaluations or LEAST_SQUARES_EVALUATIONS
+        if number + 1 < options.rounds:
+            most = min(most, ROUND_EVALUATIONS)
         progress(0.5 + 0.4 * number / options.rounds, f"round {number + 1}: noise and whitening")
         problem, whiteners = _with_noise(problem, solution.values, options)
         if options.method == "nelder_mead":
             break
+        search = Search(options.robust, options.tolerance, most)
         solution = solve(problem, whiteners, solution.values, cancel, search)
         evaluations += solution.evaluations
-        if _settled(problem, whiteners, last.values, solution.values):
+        if _settled(last.values, solution):
+            solution = replace(solution, converged=True, message="no value moves any more")
             break
     progress(0.95, "intervals and identifiability")
     estimate = _estimate(problem, whiteners, solution.values, options)
@@ -143,6 +148,21 @@ def _first_search(problem: SimulatedProblem, options: FitOptions, progress: Prog
     return min(found, key=lambda s: s.cost)
 
 
+def _without_creeping(problem: SimulatedProblem) -> SimulatedProblem:
+    """Without the friction that belongs to creeping: it costs a simulation most of its speed and moves little."""
+    kept = tuple(u for u in problem.unknowns if not (u.nuisance and u.name.endswith(".stribeck_friction.torque")))
+    return replace(problem, unknowns=kept, memory={})
+
+
+def _widened(problem: SimulatedProblem, solution: Solution) -> Solution:
+    """A solution of some of the unknowns as one of all of them, the others where they start."""
+    if len(solution.values) == len(problem.unknowns):
+        return solution
+    kept = [u.name for u in _without_creeping(problem).unknowns]
+    found = dict(zip(kept, solution.values, strict=True))
+    return replace(solution, values=np.array([found.get(u.name, u.start) for u in problem.unknowns]), information=None)
+
+
 def _beginnings(problem: SimulatedProblem, options: FitOptions) -> list[Floats]:
     rng = np.random.default_rng(options.seed)
     own = _starts(problem)
@@ -194,15 +214,20 @@ def _estimate(
     cut = influence(data.residual) if options.robust else data.residual
     prior = np.maximum(prior_precision(problem.unknowns) * scale**2, 1e-12)
     covariance = sandwich(scaled.information, scaled.scores(cut), prior) * np.outer(scale, scale)
+    if options.replicas and problem.offset is not None:
+        covariance = covariance * (1.0 + 1.0 / options.replicas)  # the replicas' mean has noise of its own
     report = judged(data.jacobian.reshape(data.residual.size, -1), values, problem.unknowns)
     after = problem.with_offset(None).evaluate(values, derivatives=False)
     return _Estimate(covariance, report, after, float(np.mean(data.residual**2)))
 
 
-def _settled(problem: SimulatedProblem, whiteners: Sequence[Whitener], last: Floats, now: Floats) -> bool:
-    data = whitened(problem, problem.evaluate(now, derivatives=True), whiteners)
-    precision = np.diag(data.information) + prior_precision(problem.unknowns)
-    return bool((np.abs(now - last) * np.sqrt(precision) < SETTLED).all())
+def _settled(last: Floats, solution: Solution) -> bool:
+    """Whether the last round moved less than it matters, in the mean over all directions. Replicas differ from round to
+    round like other draws of the noise, which alone moves every direction by a third of its deviation."""
+    if solution.information is None:
+        return True
+    moved = solution.values - last
+    return bool(moved @ solution.information @ moved < SETTLED**2 * len(last))
 
 
 def _result(

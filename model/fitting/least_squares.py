@@ -24,13 +24,17 @@ DIVERGED = 1e3
 
 @dataclass(frozen=True)
 class Solution:
-    """Where a search ended: values (p,), half the sum of squares with priors, evaluations, and why it ended."""
+    """Where a search ended: values (p,), half the sum of squares with priors, evaluations, and why it ended.
+
+    `information` (p, p) is JᵀJ there, priors included; None where no derivatives were taken.
+    """
 
     values: Floats
     cost: float
     evaluations: int
     converged: bool
     message: str
+    information: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -116,8 +120,9 @@ def solve(
         loss=(lambda z: huber(z, samples)) if search.robust else "linear",  # type: ignore[arg-type] # stubs: rows of 3
         ftol=search.tolerance, xtol=search.tolerance, gtol=search.tolerance, max_nfev=search.most_evaluations,
     )  # fmt: skip
+    J = np.asarray(found.jac) / objective.scale
     return Solution(
-        objective.values(found.x), float(found.cost), objective.evaluations, found.status > 0, found.message
+        objective.values(found.x), float(found.cost), objective.evaluations, found.status > 0, found.message, J.T @ J
     )
 
 

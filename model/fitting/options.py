@@ -56,7 +56,7 @@ class FitOptions(BaseModel):
     """Simulations with drawn noise that tell what the noise does on average; 0 for none."""
     longest_memory: Annotated[int, Field(ge=0, le=100)] = 12
     """Samples that the whitening looks back, at most."""
-    rounds: Annotated[int, Field(ge=1, le=20)] = 4
+    rounds: Annotated[int, Field(ge=1, le=20)] = 6
     """Of noise, whitening and search, at most."""
     tolerance: Annotated[FiniteFloat, Field(gt=0)] = 1e-5
     most_evaluations: Annotated[int, Field(ge=1, le=1_000_000)] | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -27,11 +27,21 @@ PRESLIDING = "presliding"
 
 
 @dataclass(frozen=True)
+class _Simulated:
+    """What one record should show, (m, n), and its derivatives (p, m, n)."""
+
+    signal: Floats
+    jacobian: Floats | None
+
+
+@dataclass(frozen=True)
 class SimulatedProblem:
     """Simulated − measured for records of one machine.
 
     Args:
         offset: per record (m, n) residual, rad, that the model itself would leave on average; None for none.
+        memory: the last simulation without and the last with derivatives. Problems that differ in offset or readings
+            alone share it: a round begins where the last one ended, and need not simulate that again.
     """
 
     model: Model
@@ -42,6 +52,7 @@ class SimulatedProblem:
     loop: Literal["closed", "open"] = "closed"
     step: float = LONGEST_STEP
     offset: tuple[Floats, ...] | None = None
+    memory: dict[bool, tuple[bytes, list[_Simulated]]] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def runs(self) -> Sequence[Sequence[slice]]:
@@ -94,6 +105,24 @@ class SimulatedProblem:
 
     def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
         """Residuals of every record. Raises SpecError when a simulation does not stay finite."""
+        found = []
+        for t, (record, simulated) in enumerate(zip(self.records, self._simulated(values, derivatives), strict=True)):
+            residual = simulated.signal - record.measured
+            if self.offset is not None:
+                residual = residual - self.offset[t]
+            found.append(Evaluation(residual, simulated.jacobian))
+        return found
+
+    def _simulated(self, values: Floats, derivatives: bool) -> list[_Simulated]:
+        key = values.tobytes()
+        for kind in {derivatives, True}:
+            if kind in self.memory and self.memory[kind][0] == key:
+                return self.memory[kind][1]
+        found = self._simulate(values, derivatives)
+        self.memory[derivatives] = (key, found)
+        return found
+
+    def _simulate(self, values: Floats, derivatives: bool) -> list[_Simulated]:
         vector, initials = self._state(values)
         which, seeds = self._rows(derivatives)
         dtype = np.complex128 if derivatives else np.float64
@@ -110,28 +139,25 @@ class SimulatedProblem:
         engine = engine_for(self.model)
         engine.run(self._prepared, np.array(which, dtype=np.int64), vectors, starts, self.model.flags, self.step, out)
         column = OUT_SPEED if self.signal == "velocity" else OUT_READING
-        return self._evaluations(out[:, column], which, seeds, derivatives)
+        return self._at_samples(out[:, column], which, seeds, derivatives)
 
-    def _evaluations(
+    def _at_samples(
         self, signal: NDArray[Any], which: list[int], seeds: list[int], derivatives: bool
-    ) -> list[Evaluation]:
+    ) -> list[_Simulated]:
         found = []
         for t, record in enumerate(self.records):
             own = [row for row, trace in enumerate(which) if trace == t]
             simulated = signal[own[0], : len(record.inputs)].real
             if not np.isfinite(simulated).all():
                 raise SpecError(f"the simulation of {record.name} does not stay finite: the loop is unstable")
-            residual = at_rows(simulated, record.inputs.rows) - record.measured
-            if self.offset is not None:
-                residual = residual - self.offset[t]
             jacobian = None
             if derivatives:
-                jacobian = np.zeros((len(self.unknowns), *residual.shape))
+                jacobian = np.zeros((len(self.unknowns), *record.measured.shape))
                 for row in own:
                     if seeds[row] >= 0:
                         tangent = signal[row, : len(record.inputs)].imag / DUAL_STEP
                         jacobian[seeds[row]] = at_rows(tangent, record.inputs.rows)
-            found.append(Evaluation(residual, jacobian))
+            found.append(_Simulated(at_rows(simulated, record.inputs.rows), jacobian))
         return found
 
     def _rows(self, derivatives: bool) -> tuple[list[int], list[int]]:
