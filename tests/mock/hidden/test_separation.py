@@ -79,11 +79,11 @@ def test_tangents_are_those_of_every_tolerance_and_curve(known: Tangents) -> Non
     assert len(known.names) == len(tolerances()) + 3 * 3 * 2
     assert known.matrix.shape == (60 * 3, len(known.names))
     sizes = dict(zip(known.names, np.linalg.norm(known.matrix, axis=0), strict=True))
-    assert sizes["back_emf_constant_2"] > 20
+    assert sizes["back_emf_constant_2"] > 3
     assert sizes["m1"] < 1, "the source found it insensitive, too"
 
 
-@pytest.mark.parametrize(("name", "fraction"), [("resistance_1", 0.1), ("viscous_friction_2", 0.15), ("m_load", -0.2)])
+@pytest.mark.parametrize(("name", "fraction"), [("resistance_1", 0.1), ("viscous_friction_2", 0.08), ("m_load", -0.2)])
 def test_what_a_tolerance_can_explain_costs_no_more_than_its_prior(name: str, fraction: float, known: Tangents) -> None:
     stated = {tolerance.name: tolerance.stated for tolerance in tolerances()}[name]
     moved = replace(SOUND, plant=deviating_plant(SOUND.plant, {name: fraction}))
@@ -96,7 +96,7 @@ def test_what_a_tolerance_can_explain_costs_no_more_than_its_prior(name: str, fr
 @pytest.mark.parametrize(
     ("name", "values", "deviations"),
     [
-        ("back_emf_error", {"joint": 3, "factor": 1.6}, 0.6 * 3),
+        ("back_emf_error", {"joint": 3, "factor": 1.2}, 0.2 / 0.05),
         ("load_dependent_friction", {"joint": 3, "arm": 0.3}, 0.3 / 0.128486 * 3),
         ("payload", {"mass": 0.5}, 0.5 / 0.1250307),
     ],
