@@ -1,0 +1,174 @@
+"""The answer of a diagnosis: stable, typed, and JSON as it stands. docs/diagnosis.md describes every field."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from daq.contracts.experiment import ExperimentSpec
+from model.machine_model.model import Model
+
+ANSWER_FORMAT = 1
+"""Version of the answer; a reader refuses newer ones."""
+
+Verdict = Literal["nothing-significant", "named", "ambiguous", "unknown-effect"]
+Phase = Literal["ramp_start", "steady_ramp", "reversal", "creep", "hold"]
+AgainstWhat = Literal["time", "position", "speed", "direction", "drive"]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class NamedParameter(_Part):
+    """One parameter of an added effect: estimate and 95 % interval; no interval where the data do not bound it."""
+
+    name: str
+    value: float
+    low: float | None
+    high: float | None
+    unit: str
+
+
+class Candidate(_Part):
+    """An effect that was tried.
+
+    `evidence` is what it takes off −2 log posterior, its own parameters and the places it was looked for paid for (BIC
+    and ln of the number of trials); above 0 it explains more than it costs. `misfit` is the weighted residual
+    that it leaves, per sample: near 1 for the right effect. `refitted` says whether all tolerance parameters were
+    fitted again with it, or it was only probed.
+    """
+
+    effect: str
+    joints: tuple[int, ...]
+    evidence: float
+    misfit: float | None = None
+    refitted: bool = False
+    parameters: tuple[NamedParameter, ...] = ()
+
+
+class SignalError(_Part):
+    """Root mean square of measurement − simulation of one joint. `floor`: of the measurement's own noise."""
+
+    joint: int
+    unit: str
+    before: float
+    after: float
+    floor: float
+
+
+class PhaseCell(_Part):
+    """One cell of the map of disagreement: mean square of the weighted residual (1: no more than noise) of a joint in
+    a stretch of time and phase of motion; `significance` in standard deviations."""
+
+    joint: int
+    start: float
+    end: float
+    phase: Phase
+    mean_square: float
+    significance: float
+    trace: int = 0
+
+
+class Dependence(_Part):
+    """Mean residual of a joint against a quantity, in bins: what a person would plot."""
+
+    joint: int
+    against: AgainstWhat
+    unit: str
+    centres: tuple[float, ...]
+    residual: tuple[float | None, ...]
+    deviation: tuple[float | None, ...]
+    significance: float
+
+
+class MovingParameter(_Part):
+    """The distortion method's α(t): a parameter that would have to move, how much, and with what it moves."""
+
+    parameter: str
+    relative_range: float
+    moves_with: AgainstWhat | None
+    correlation: float
+
+
+class Where(_Part):
+    """Where simulation and measurement disagree, before the step: a one-line summary, and the numbers behind it."""
+
+    joint: int | None
+    phase: Phase | None
+    summary: str
+    cells: tuple[PhaseCell, ...]
+    dependences: tuple[Dependence, ...]
+    moving: tuple[MovingParameter, ...] = ()
+
+
+class RemainingShape(_Part):
+    """What none of the known effects explains, as a torque at a joint against something, so that a person can invent
+    the effect: torque (N·m, N) in bins of `against`, with its standard deviation."""
+
+    joint: int
+    against: AgainstWhat
+    unit: str
+    torque_unit: str
+    centres: tuple[float, ...]
+    torque: tuple[float | None, ...]
+    deviation: tuple[float | None, ...]
+    explained: float
+    """Share of the remaining torque's variance that this dependence explains."""
+
+
+class Step(_Part):
+    """One turn of the workflow: what was found, what adding it did."""
+
+    effect: str | None
+    joints: tuple[int, ...]
+    parameters: tuple[NamedParameter, ...]
+    evidence: float
+    margin: float
+    """Evidence of the answer over the next best that would be another answer."""
+    candidates: tuple[Candidate, ...]
+    group: tuple[Candidate, ...] = ()
+    """Candidates that the data cannot tell apart, when the verdict is `ambiguous`."""
+    rmse_fit: tuple[SignalError, ...]
+    rmse_holdout: tuple[SignalError, ...] = ()
+    excess_removed_holdout: float | None = None
+    """Share of the held-out variance above the noise floor that the step removed."""
+    sum_lambda2_before: float | None = None
+    sum_lambda2_after: float | None = None
+    where: Where
+    reason: str
+    adopted: bool
+    rejected_because: str | None = None
+
+
+class NextExperiment(_Part):
+    """The experiment that best separates what is left, within the arm's limits."""
+
+    name: str
+    spec: ExperimentSpec
+    duration: float
+    """s"""
+    separates: tuple[str, ...]
+    predicted_separation: float
+    """Standard deviations between the two candidates that are hardest to tell apart, tolerance parameters refitted."""
+    reason: str
+
+
+class Diagnosis(_Part):
+    """The whole answer."""
+
+    format: Annotated[int, Field(ge=1)] = ANSWER_FORMAT
+    verdict: Verdict
+    summary: str
+    steps: tuple[Step, ...]
+    remaining: tuple[RemainingShape, ...] = ()
+    next_experiment: NextExperiment | None = None
+    model_before: Model
+    model_after: Model
+    traces: tuple[str, ...]
+    holdout: tuple[str, ...] = ()
+    seconds: float
+    robot_seconds: float
+    notes: tuple[str, ...] = ()
+    """Assumptions and limits that a reader of this answer should know."""
