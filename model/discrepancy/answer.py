@@ -21,10 +21,9 @@ class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class NamedParameter(_Part):
+class FoundValue(_Part):
     """One parameter of an added effect: estimate and 95 % interval; no interval where the data do not bound it."""
 
-    name: str
     value: float
     low: float | None
     high: float | None
@@ -45,7 +44,7 @@ class Candidate(_Part):
     evidence: float
     misfit: float | None = None
     refitted: bool = False
-    parameters: tuple[NamedParameter, ...] = ()
+    parameters: dict[str, FoundValue] = {}
 
 
 class SignalError(_Part):
@@ -123,7 +122,8 @@ class Step(_Part):
 
     effect: str | None
     joints: tuple[int, ...]
-    parameters: tuple[NamedParameter, ...]
+    parameters: dict[str, FoundValue]
+    """By the parameter's full name, as in the model."""
     evidence: float
     margin: float
     """Evidence of the answer over the next best that would be another answer."""
