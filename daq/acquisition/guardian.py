@@ -64,6 +64,10 @@ class Guardian:
             return EndCause.DEAF
         return self._cause
 
+    def forget(self) -> None:
+        """After an explicit reset: what ended the work before ends nothing any more."""
+        self._cause = None
+
     def __enter__(self) -> Self:
         self._wake_read, self._wake_write = os.pipe()
         os.set_blocking(self._wake_write, False)

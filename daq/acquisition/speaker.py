@@ -8,11 +8,12 @@ import threading
 from types import TracebackType
 from typing import Self
 
-from daq.acquisition.messages import EventHappened, Failed, Finished, Progress, Sampled
+from pydantic import BaseModel
+
+from daq.acquisition.messages import EventHappened, Progress, Sampled
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import TraceEvent
 
-Report = Progress | EventHappened | Sampled | Finished | Failed
 WAITING_REPORTS = 4096
 """Reports that may wait for a parent that does not read (80 s of samples); those beyond are not told."""
 
@@ -28,7 +29,7 @@ class Speaker:
         self.untold = 0
         """Reports that found no room."""
         self._output = output
-        self._queue: queue.Queue[Report | None] = queue.Queue(WAITING_REPORTS)
+        self._queue: queue.Queue[BaseModel | None] = queue.Queue(WAITING_REPORTS)
         self._thread = threading.Thread(target=self._write_all, name="reports", daemon=True)
 
     def __enter__(self) -> Self:
@@ -41,22 +42,22 @@ class Speaker:
         self._queue.put(None)
         self._thread.join()
 
-    def ended(self, report: Finished | Failed) -> None:
+    def ended(self, report: BaseModel) -> None:
         """The last report; waits for room."""
         self._queue.put(report)
 
     def progress(self, fraction: float, text: str) -> None:
         """How far the run is."""
-        self._say(Progress(fraction=fraction, text=text))
+        self.say(Progress(fraction=fraction, text=text))
 
     def happened(self, event: TraceEvent) -> None:
         """An event."""
-        self._say(EventHappened(event=event))
+        self.say(EventHappened(event=event))
 
     def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
         """A control period, where somebody wants them."""
         if self.report_samples:
-            self._say(
+            self.say(
                 Sampled(
                     tick=row.tick,
                     time=row.time,
@@ -68,7 +69,8 @@ class Speaker:
                 )
             )
 
-    def _say(self, report: Report) -> None:
+    def say(self, report: BaseModel) -> None:
+        """Any report; one that finds no room is counted."""
         try:
             self._queue.put_nowait(report)
         except queue.Full:

@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from daq.cli.context import console, invocation
-from daq.cli.limp import limp_line
 from daq.cli.robot import connected
 from daq.contracts.errors import DaqError
+from daq.contracts.limp import limp_line
 
 app = typer.Typer(add_completion=False)
 

@@ -8,8 +8,8 @@ from dataclasses import asdict
 import typer
 
 from daq.cli.context import JsonOption, invocation, print_json
-from daq.cli.limp import limp_joints, limp_line
 from daq.cli.robot import connected
+from daq.contracts.limp import limp_joints, limp_line
 
 app = typer.Typer(add_completion=False)
 

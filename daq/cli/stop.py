@@ -11,7 +11,6 @@ from daq.contracts.errors import DaqError
 
 if TYPE_CHECKING:
     from daq.acquisition.stop_socket import StopAnswer, StopAttempt
-    from daq.link import Link
 
 app = typer.Typer(add_completion=False)
 
@@ -52,41 +51,9 @@ def _stop_configured(call: Invocation, reached: set[str]) -> list[StopAnswer]:
         return [_undelivered("configured robot", "", str(error))]
     if url is None or url.startswith("mock://") or url in reached:
         return []
-    return [_stop_at(name, url)]
+    from daq.acquisition.port_stop import stop_at_port
 
-
-def _stop_at(name: str, url: str) -> StopAnswer:
-    """Nobody of ours holds the port: open it and stop what is behind it."""
-    from daq.acquisition.stop_socket import StopAnswer
-    from daq.link import Link, LinkError, RequestRefusedError
-
-    try:
-        with Link.open(url) as link:
-            stopped = link.stop()
-            limp = _limp(link)
-    except LinkError as error:
-        return StopAnswer(robot=name, port=url, delivered=error.sent, confirmed=False, text=str(error))
-    except RequestRefusedError as error:
-        return StopAnswer(robot=name, port=url, delivered=True, confirmed=False, text=str(error))
-    except DaqError as error:
-        return _undelivered(name, url, str(error))
-    return StopAnswer(
-        robot=name, port=url, delivered=True, confirmed=True, tick=stopped.tick, postures=tuple(stopped.postures),
-        text=limp,
-    )  # fmt: skip
-
-
-def _limp(link: Link) -> str:
-    """Which joints nothing holds; a board that does not say so has been stopped all the same."""
-    from daq.cli.limp import limp_line
-    from daq.link import LinkError, RequestRefusedError
-    from firmware_protocol.commands import Gains, ReportGains
-
-    try:
-        gains = link.request(ReportGains(), Gains).gains
-    except (LinkError, RequestRefusedError):
-        return ""
-    return limp_line(dict(enumerate(gains, start=1)))
+    return [stop_at_port(name, url)]
 
 
 def _answered(attempt: StopAttempt) -> StopAnswer:

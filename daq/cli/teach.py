@@ -11,9 +11,9 @@ import typer
 
 from daq.cli.consent import agreed
 from daq.cli.context import Invocation, JsonOption, YesOption, console, invocation
-from daq.cli.limp import require_drive
 from daq.cli.quantities import parse_angle, parse_per_joint_angles
 from daq.contracts.errors import SafetyError, SpecError
+from daq.contracts.limp import require_drive
 
 if TYPE_CHECKING:
     from daq.acquisition.owned import OwnedRobot

@@ -80,6 +80,8 @@ class Arrangement:
     ears: Ears
     outside: Outside
     robot: str = "ma2000"
+    trace_id: str = field(default_factory=new_trace_id)
+    """Of the trace to be made; whoever keeps a list of runs chooses it, and finds the trace after a crash."""
 
 
 def run_experiment(run: Arrangement, consent: Consent) -> RunResult:
@@ -167,7 +169,7 @@ def _finish(run: Arrangement, changes: tuple[GainChange, ...]) -> Ending:
 def _trace_record(run: Arrangement) -> TraceRecord:
     controller, now = run.controller, datetime.now(UTC)
     return TraceRecord(
-        trace_id=new_trace_id(),
+        trace_id=run.trace_id,
         created=now,
         software=f"ma2000-daq {version('ma2000-daq')}",
         source="mock" if controller.identity.simulated else "real",

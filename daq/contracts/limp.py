@@ -6,6 +6,10 @@ from collections.abc import Mapping
 
 from daq.contracts.errors import SafetyError
 
+JUMP_WITHIN = 16
+"""ADC counts of error up to which gains are written: an assumption. A limp joint that becomes stiff jumps by its whole
+error, so 1° at most on joints 1 to 3; what a held joint hangs below its set point is less."""
+
 
 def limp_joints(gains: Mapping[int, tuple[int, int, int]]) -> list[int]:
     """Those whose proportional gain is 0."""
@@ -23,3 +27,17 @@ def require_drive(gains: Mapping[int, tuple[int, int, int]]) -> None:
     line = limp_line(gains)
     if line:
         raise SafetyError(f"{line}; hold the arm, `daq reset --here`, then `daq gains set` them; nothing moved")
+
+
+def require_no_jump(errors: Mapping[int, int], wanted: Mapping[int, tuple[int, int, int]]) -> None:
+    """Raises SafetyError when a joint that gets a drive is too far from its set point; `errors` in ADC counts."""
+    far = [
+        f"joint {joint} is {errors[joint]} ADC counts"
+        for joint, gain in sorted(wanted.items())
+        if any(gain) and joint in errors and abs(errors[joint]) > JUMP_WITHIN
+    ]
+    if far:
+        raise SafetyError(
+            f"gains refused: {', '.join(far)} from its set point, allowed are ±{JUMP_WITHIN}: it would jump there; "
+            "hold the arm, make its posture the set points with `daq reset --here`, then set the gains; nothing changed"
+        )

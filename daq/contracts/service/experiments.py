@@ -1,0 +1,118 @@
+"""Experiments of the queue, and schedules that put them there."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import AwareDatetime, Field
+
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.service.base import Wire
+from daq.contracts.trace import Outcome
+
+ExperimentState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
+"""`done`: the plan was carried out to its end. `failed`: refused, or ended by a guard. `cancelled`: taken back, or
+stopped by somebody. `interrupted`: the link, a process or the power was lost; it never runs again by itself."""
+
+Priority = Annotated[int, Field(ge=-100, le=100)]
+"""Higher goes first; among equals the one submitted first."""
+Interval = Annotated[float, Field(ge=10, le=366 * 86400)]
+"""s between two runs of a schedule."""
+
+
+class ExperimentRequest(Wire):
+    """What is to be run. `at`: not before this moment (with its time zone); None for as soon as possible."""
+
+    spec: ExperimentSpec = ExperimentSpec()
+    at: AwareDatetime | None = None
+    priority: Priority = 0
+
+
+class ExperimentChange(Wire):
+    """A new priority of an experiment that still waits."""
+
+    priority: Priority
+
+
+class Experiment(Wire):
+    """One experiment and what became of it. `progress` is a fraction from 0 to 1, only while it runs."""
+
+    id: str
+    robot: str
+    spec: ExperimentSpec
+    state: ExperimentState
+    priority: int
+    at: AwareDatetime | None = None
+    schedule: str | None = None
+    """The schedule that submitted it."""
+    submitted: AwareDatetime
+    submitted_by: str
+    started: AwareDatetime | None = None
+    ended: AwareDatetime | None = None
+    progress: float | None = None
+    progress_text: str = ""
+    outcome: Outcome | None = None
+    reason: str = ""
+    """Why it is not done, in one line."""
+    trace: str | None = None
+    """The number of its trace, once there is one."""
+
+
+class ScheduleRequest(Wire):
+    """An experiment to be run every so often: studies of wear and drift."""
+
+    spec: ExperimentSpec = ExperimentSpec()
+    every: Interval
+    """s from one run to the next."""
+    starts: AwareDatetime | None = None
+    """The first run; None for at once."""
+    count: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
+    """How many runs; None for no end."""
+    priority: Priority = 0
+
+
+class ScheduleChange(Wire):
+    """Switches a schedule on or off."""
+
+    active: bool
+
+
+class Schedule(Wire):
+    """A schedule and how far it is. Runs that were due while the service was off, or while the run before still waited,
+    are left out, not made up for."""
+
+    id: str
+    robot: str
+    spec: ExperimentSpec
+    every: float
+    starts: AwareDatetime
+    count: int | None
+    priority: int
+    active: bool
+    submitted_runs: int
+    next: AwareDatetime | None
+    """When the next run is due; None when there is none."""
+    created: AwareDatetime
+    created_by: str
+
+
+class MotionPreview(Wire):
+    """The motion of an experiment, worked out and checked without a robot. Columns of `set_points` are the machine's
+    joints, in rad; `violations` is what speaks against it, empty when it may run."""
+
+    time: tuple[float, ...]
+    set_points: tuple[tuple[float, ...], ...]
+    moving: tuple[int, ...]
+    duration: float
+    violations: tuple[MotionViolation, ...]
+
+
+class MotionViolation(Wire):
+    """One limit that a motion breaks. `time` is in s from the start of the record; None for the motion as a whole."""
+
+    message: str
+    joint: int | None = None
+    time: float | None = None
+
+
+MotionPreview.model_rebuild()

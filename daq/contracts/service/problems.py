@@ -1,0 +1,32 @@
+"""An error of the service, as application/problem+json (RFC 9457)."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict
+
+
+class FieldProblem(BaseModel):
+    """One field of a request that cannot be accepted."""
+
+    field: str
+    """Where it is, such as `spec.trajectory.amplitude`."""
+    message: str
+    """What is wrong with it, and what is allowed."""
+
+
+class ProblemDetails(BaseModel):
+    """What went wrong, and what to do about it."""
+
+    model_config = ConfigDict(extra="allow")
+
+    type: str
+    """Which kind of problem: the end of an address in docs/service.md."""
+    title: str
+    status: int
+    detail: str
+    """One line about this very case."""
+    advice: str = ""
+    """What to do."""
+    fields: tuple[FieldProblem, ...] = ()
+    request_id: str | None = None
+    """The same as in the service's log."""

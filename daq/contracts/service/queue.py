@@ -1,0 +1,64 @@
+"""The queue of one robot, and who may move it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import AwareDatetime
+
+from daq.contracts.service.base import Wire
+
+Role = Literal["viewer", "operator"]
+
+
+class QueueStatus(Wire):
+    """Whether experiments are taken from the queue, and if not, why.
+
+    `waiting_for` says in one line why nothing runs although the queue is not paused; empty when something runs or
+    nothing waits.
+    """
+
+    paused: bool
+    reason: str
+    """Why it is paused; who resumed it, when it is not."""
+    since: AwareDatetime
+    queued: int
+    running: str | None = None
+    """The experiment that runs."""
+    waiting_for: str = ""
+    attended_until: AwareDatetime | None = None
+    """On a real arm that may not run unattended: until when an operator has said to be there."""
+
+
+class QueueResume(Wire):
+    """The operator's word that the queue may move the arm. A real arm needs `moves_real_arm`."""
+
+    moves_real_arm: bool = False
+
+
+class Control(Wire):
+    """Who may move the robot now: nobody, one client, or the queue while an experiment runs."""
+
+    holder: Literal["nobody", "client", "queue"]
+    name: str | None = None
+    """Of the client."""
+    expires: AwareDatetime | None = None
+    remaining: float | None = None
+    """s until it lapses without a heartbeat."""
+
+
+class ControlRequest(Wire):
+    """Asks for the control of the robot. A real arm needs the operator's word: `moves_real_arm`."""
+
+    moves_real_arm: bool = False
+
+
+class ControlLease(Wire):
+    """The control of the robot, for one client. `lease` is its secret: it goes with every motion and heartbeat in the
+    header `Control-Lease`."""
+
+    lease: str
+    expires: AwareDatetime
+    remaining: float
+    heartbeat_every: float
+    """s after which the client should renew it, at the latest."""

@@ -1,0 +1,163 @@
+"""The robot as the service sees it. Angles in rad, joints from 1; every value says how old it is."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import AwareDatetime, Field
+
+from daq.contracts.experiment import Gain, JointNumber
+from daq.contracts.service.base import Wire
+from daq.contracts.service.queue import Control, QueueStatus
+
+ArmState = Literal["disconnected", "idle", "armed", "running", "stopped", "fault"]
+Activity = Literal["none", "experiment", "jog", "step", "program", "lead"]
+ConnectionState = Literal["disconnected", "connecting", "connected", "lost"]
+
+
+class Sample(Wire):
+    """One control period. `host_time` is the monotonic clock (s) of the service's computer, `utc` the wall clock (s
+    since 1970) when it arrived, `age` the s that have passed since."""
+
+    tick: int
+    host_time: float
+    utc: float
+    age: float
+    joints: tuple[int, ...]
+    set_point: tuple[float, ...]
+    position: tuple[float, ...]
+    error: tuple[float, ...]
+    drive: tuple[float, ...]
+    frozen: bool
+
+
+class LinkStatus(Wire):
+    """The link to the controller. Counters since the link was opened (docs/traces.md names them)."""
+
+    state: Literal["connected", "degraded", "lost", "none"]
+    counters: dict[str, float] = Field(default_factory=dict)
+    age: float | None = None
+    """s since they were read."""
+
+
+class RobotIdentity(Wire):
+    """What the controller says about itself."""
+
+    simulated: bool
+    protocol: int
+    period: float
+    """s of control."""
+    boots: int
+
+
+class RobotStatus(Wire):
+    """Everything about one robot, at one moment."""
+
+    robot: str
+    machine: str
+    port: str
+    connection: ConnectionState
+    connection_problem: str = ""
+    """Why it is not connected."""
+    identity: RobotIdentity | None = None
+    arm: ArmState
+    cause: str = ""
+    """Why the arm is stopped, or at fault."""
+    activity: Activity
+    experiment: str | None = None
+    limp: tuple[int, ...] = ()
+    """Joints without drive: their proportional gain is 0, nothing holds them."""
+    sample: Sample | None = None
+    link: LinkStatus
+    control: Control
+    queue: QueueStatus
+    utc: AwareDatetime
+
+
+class RobotSummary(Wire):
+    """One robot of this service."""
+
+    robot: str
+    machine: str
+    connection: ConnectionState
+    arm: ArmState
+
+
+class StopResult(Wire):
+    """What became of a stop. Anything but `confirmed`: use the emergency stop."""
+
+    delivered: bool
+    """It is on the line to the controller."""
+    confirmed: bool
+    """The board has said that its set points are frozen."""
+    tick: int | None = None
+    seconds: float
+    """From the request to this answer."""
+    text: str
+
+
+class ResetRequest(Wire):
+    """`here`: first make the posture measured now the set points."""
+
+    here: bool = False
+
+
+class JointGains(Wire):
+    """P, I, D of joints, each 0 to 20: the controller's numbers, not physical gains."""
+
+    gains: dict[JointNumber, Gain]
+
+
+class ProcessState(Wire):
+    """Process inputs and outputs 0 to 7, and the gripper."""
+
+    inputs: tuple[bool, ...]
+    outputs: tuple[bool, ...]
+    gripper: Literal["open", "closed"]
+
+
+class OutputRequest(Wire):
+    """One process output."""
+
+    on: bool
+
+
+class GripperRequest(Wire):
+    """The gripper."""
+
+    closed: bool
+
+
+class JogRequest(Wire):
+    """Velocities (rad/s) of joints, kept up for 0.3 s at most: whoever holds the key repeats it. Empty: hold."""
+
+    velocities: dict[JointNumber, Annotated[float, Field(ge=-3, le=3)]]
+
+
+class JogStatus(Wire):
+    """What became of a jog command."""
+
+    taken: bool
+    refused: str = ""
+    """Why joints that should move do not."""
+
+
+class StepRequest(Wire):
+    """One off-line step to absolute angles (`to`), or by relative ones (`by`), in rad; `speed` of the fastest joint in
+    rad/s."""
+
+    to: dict[JointNumber, Annotated[float, Field(ge=-7, le=7)]] | None = None
+    by: dict[JointNumber, Annotated[float, Field(ge=-7, le=7)]] | None = None
+    speed: Annotated[float, Field(gt=0, le=0.35)] = 0.25
+
+
+class LeadRequest(Wire):
+    """Joints to be led by hand. They lose their drive and sink: hold the arm."""
+
+    joints: Annotated[tuple[JointNumber, ...], Field(min_length=1)] = (1, 2, 3)
+
+
+class Done(Wire):
+    """Something was carried out."""
+
+    text: str

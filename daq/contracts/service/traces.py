@@ -1,0 +1,92 @@
+"""Traces of the catalogue."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import AwareDatetime, Field
+
+from daq.contracts.service.base import Wire
+from daq.contracts.trace import Outcome, TraceEvent, TraceRecord
+
+Tag = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.:-]{0,39}$")]
+Source = Literal["mock", "real", "imported"]
+
+
+class CatalogueEntry(Wire):
+    """One trace as the catalogue lists it."""
+
+    id: str
+    robot: str
+    file: str
+    created: AwareDatetime
+    source: Source
+    kind: str | None
+    """Kind of trajectory, where the trace is of an experiment."""
+    name: str | None
+    joints: tuple[int, ...]
+    outcome: Outcome | None
+    samples: int | None
+    duration: float | None
+    """s between the first and the last sample."""
+    size: int
+    """Bytes."""
+    operator: str | None
+    experiment: str | None
+    """The experiment of the queue that made it."""
+    tags: tuple[str, ...] = ()
+    notes: str = ""
+    missing: bool = False
+    """The catalogue knows it, but its file is gone."""
+
+
+class JointFigureSet(Wire):
+    """Figures of one joint: angles in degrees (`unit`), lengths in mm on a prismatic joint, times in s."""
+
+    joint: int
+    unit: str
+    moved: bool
+    start: float
+    end: float
+    overshoot: float | None
+    rise_time: float | None
+    largest_error: float | None
+    final_error: float | None
+    largest_drive: float | None
+
+
+class TraceDetails(Wire):
+    """One trace: what it says about itself, its figures and events."""
+
+    entry: CatalogueEntry
+    record: TraceRecord
+    figures: tuple[JointFigureSet, ...]
+    events: tuple[TraceEvent, ...]
+    missing_samples: int
+
+
+class TraceChange(Wire):
+    """New tags or notes; what is None stays."""
+
+    tags: Annotated[tuple[Tag, ...], Field(max_length=50)] | None = None
+    notes: Annotated[str, Field(max_length=10000)] | None = None
+
+
+class TraceSignals(Wire):
+    """Signals of a trace for a plot, thinned so that no peak is lost: of every stretch the extremes are kept.
+
+    `time` is in s; a signal has one row a joint, in the order of `joints`; rad, or m on a prismatic joint; drive in
+    `drive_unit`. A signal that the trace has not is None.
+    """
+
+    id: str
+    joints: tuple[int, ...]
+    samples: int
+    """Before thinning."""
+    time: tuple[float, ...]
+    position: tuple[tuple[float, ...], ...]
+    set_point: tuple[tuple[float, ...], ...] | None = None
+    error: tuple[tuple[float, ...], ...] | None = None
+    drive: tuple[tuple[float, ...], ...] | None = None
+    drive_unit: str | None = None
+    events: tuple[TraceEvent, ...] = ()
