@@ -117,8 +117,9 @@ def stop_listener(robot: str) -> Iterator[socket.socket]:
         listener.close()
 
 
-def request_stop(robot: str | None = None) -> list[StopAttempt]:
-    """Stops every robot that this user's processes are moving (or the one named). Never waits over a second for each.
+def request_stop(robot: str | None = None, process: int | None = None) -> list[StopAttempt]:
+    """Stops every robot that this user's processes are moving; or the one named; or that of one process, by its id.
+    Never waits over a second for each.
 
     Sockets whose process is gone are removed and not counted.
     """
@@ -127,7 +128,8 @@ def request_stop(robot: str | None = None) -> list[StopAttempt]:
         if not _is_own(folder):
             continue
         for path in sorted(folder.glob("*.sock")):
-            if robot is None or path.stem.rpartition("-")[0] == robot:
+            name, _, owner = path.stem.rpartition("-")
+            if robot in (None, name) and (process is None or owner == str(process)):
                 asked += _ask(path)
     attempts = []
     for path, connection, begun in asked:

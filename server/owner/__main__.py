@@ -1,0 +1,5 @@
+"""`python -m server.owner`."""
+
+from server.owner.process import main
+
+raise SystemExit(main())

@@ -1,0 +1,131 @@
+"""Orders on their way from the service to the owner, read on a thread of their own.
+
+An order that ends what runs takes effect at once, through the guardian, whatever the main thread is doing.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from pydantic import ValidationError
+
+from daq.contracts.errors import SpecError
+from server.owner.messages import (
+    ORDER,
+    Close,
+    Finish,
+    HaltRun,
+    JogBegin,
+    JogDrive,
+    LeadBegin,
+    Long,
+    Open,
+    Order,
+    Quick,
+    RunExperiment,
+    RunProgram,
+)
+
+LONGEST_ORDER = 256 << 20
+"""Bytes: a recorded path of hours."""
+
+
+class Inbox:
+    """Reads orders until the service closes its end, or says `close`.
+
+    busy:    a long order waits or runs: the loss of the service is then a reason to freeze
+    closing: the service wants the port back, or is gone
+    finish:  the teaching under way is to end in good order
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self.busy = threading.Event()
+        self.closing = threading.Event()
+        self.finish = threading.Event()
+        self.guardian_end, self._to_guardian = os.pipe()
+        self._input = os.fdopen(descriptor, "rb", closefd=False)
+        self._waiting: queue.Queue[Long | Quick | None] = queue.Queue()
+        self._drive: JogDrive | None = None
+        self._lock = threading.Lock()
+        self._thread = threading.Thread(target=self._read_all, name="inbox", daemon=True)
+
+    def first(self) -> Open:
+        """The first order. Raises SpecError when it is not the one that says which robot."""
+        line = self._input.readline(LONGEST_ORDER)
+        try:
+            return Open.model_validate_json(line)
+        except ValidationError as error:
+            raise SpecError(f"owner: the first order: {error.errors()[0]['msg']}") from error
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Orders are read within. The thread ends with the input, or with the process."""
+        self._thread.start()
+        yield
+
+    def take(self, patience: float = 0.0) -> Long | Quick | None:
+        """The next order that waits; None when none comes within `patience` s, or the service is leaving."""
+        try:
+            return self._waiting.get(timeout=patience) if patience else self._waiting.get_nowait()
+        except queue.Empty:
+            return None
+
+    def drive(self) -> JogDrive | None:
+        """The newest jog command, once."""
+        command, self._drive = self._drive, None
+        return command
+
+    def done(self) -> None:
+        """The long order has been carried out."""
+        with self._lock:
+            self.busy.clear()
+
+    def _read_all(self) -> None:
+        told = False
+        try:
+            while line := self._input.readline(LONGEST_ORDER):
+                order = ORDER.validate_json(line)
+                if isinstance(order, Close):
+                    told = True
+                    break
+                self._put(order)
+        finally:
+            self.closing.set()
+            self.finish.set()
+            self._waiting.put(None)
+            self._leave(told)
+
+    def _put(self, order: Order) -> None:
+        match order:
+            case HaltRun():
+                self._end_what_runs()
+            case Finish():
+                self.finish.set()
+            case JogDrive():
+                self._drive = order
+            case Open() | Close():
+                raise SpecError("owner: this robot is open already")
+            case RunExperiment() | JogBegin() | RunProgram() | LeadBegin():
+                with self._lock:
+                    self._drive = None
+                    self.finish.clear()
+                    self.busy.set()
+                self._waiting.put(order)
+            case _:
+                self._waiting.put(order)
+
+    def _end_what_runs(self) -> None:
+        with self._lock:
+            if self.busy.is_set():
+                os.write(self._to_guardian, b"stop\n")
+
+    def _leave(self, told: bool) -> None:
+        """The guardian takes the end of its pipe as the loss of whoever started the work."""
+        if told:
+            self._end_what_runs()
+        elif self.busy.is_set():
+            os.close(self._to_guardian)

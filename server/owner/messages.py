@@ -1,0 +1,224 @@
+"""What the owner of a robot is told, and what it tells: one JSON object a line, on its standard input and output."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+
+from daq.acquisition.messages import EventHappened, Finished, Progress
+from daq.contracts.experiment import ExperimentSpec, Gain
+from daq.contracts.limits import Limits
+from daq.contracts.machine import Machine
+from daq.contracts.service.robot import Activity, ArmState
+from daq.teaching import Program
+
+
+class _Message(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+# ---- what it is told
+
+
+class Open(_Message):
+    """The first line: which robot, where."""
+
+    kind: Literal["open"] = "open"
+    url: str
+    machine: Machine
+    limits: Limits
+    folder: Path
+    robot: str
+    memory_map: str | None = None
+    """Text of a memory map file; None for the one that ships."""
+
+
+class _Request(_Message):
+    """`number` comes back with the answer."""
+
+    number: int
+
+
+class RunExperiment(_Request):
+    """Runs an experiment; answered when its trace is closed."""
+
+    kind: Literal["run"] = "run"
+    spec: ExperimentSpec
+    trace_id: str
+    moves_real_arm: bool
+
+
+class JogBegin(_Request):
+    """Jogging until `JogEnd`; answered at its end."""
+
+    kind: Literal["jog_begin"] = "jog_begin"
+
+
+class JogDrive(_Message):
+    """Velocities (rad/s) for the next moment; replaces the command before. No answer. `said` is the monotonic clock
+    (s) of this computer when the client's command arrived: one that was held up on its way moves nothing."""
+
+    kind: Literal["jog_drive"] = "jog_drive"
+    velocities: dict[int, float]
+    said: float
+
+
+class RunProgram(_Request):
+    """Carries out a taught program; answered at its end."""
+
+    kind: Literal["program"] = "program"
+    program: Program
+
+
+class LeadBegin(_Request):
+    """Joints are led by hand until `Finish`; answered with the recorded path."""
+
+    kind: Literal["lead_begin"] = "lead_begin"
+    joints: tuple[int, ...]
+
+
+class Finish(_Message):
+    """Ends jogging or leading in good order. No answer of its own."""
+
+    kind: Literal["finish"] = "finish"
+
+
+class HaltRun(_Message):
+    """Ends whatever runs with a stop, as the operator's cancel does. No answer of its own."""
+
+    kind: Literal["halt"] = "halt"
+
+
+class ReadGains(_Request):
+    """P, I, D of all joints."""
+
+    kind: Literal["read_gains"] = "read_gains"
+
+
+class WriteGains(_Request):
+    """Refused for a joint that would jump to its set point."""
+
+    kind: Literal["write_gains"] = "write_gains"
+    gains: dict[int, Gain]
+
+
+class ReadProcess(_Request):
+    """Process inputs, outputs, gripper."""
+
+    kind: Literal["read_process"] = "read_process"
+
+
+class WriteOutput(_Request):
+    """One process output, 0 to 7."""
+
+    kind: Literal["write_output"] = "write_output"
+    output: int
+    on: bool
+
+
+class MoveGripper(_Request):
+    """Closes or opens the gripper."""
+
+    kind: Literal["gripper"] = "gripper"
+    closed: bool
+
+
+class Reset(_Request):
+    """The explicit end of a stop."""
+
+    kind: Literal["reset"] = "reset"
+    here: bool
+
+
+class Close(_Message):
+    """Gives the port back. Ends what runs with a stop first."""
+
+    kind: Literal["close"] = "close"
+
+
+Order = Annotated[
+    Open | RunExperiment | JogBegin | JogDrive | RunProgram | LeadBegin | Finish | HaltRun | ReadGains | WriteGains
+    | ReadProcess | WriteOutput | MoveGripper | Reset | Close,
+    Field(discriminator="kind"),
+]  # fmt: skip
+ORDER: TypeAdapter[Order] = TypeAdapter(Order)
+
+Long = RunExperiment | JogBegin | RunProgram | LeadBegin
+Quick = ReadGains | WriteGains | ReadProcess | WriteOutput | MoveGripper | Reset
+
+
+# ---- what it tells
+
+
+class Opened(_Message):
+    """The controller has been greeted."""
+
+    kind: Literal["opened"] = "opened"
+    simulated: bool
+    protocol: int
+    period: float
+    boots: int
+
+
+class LiveSample(_Message):
+    """One control period, whatever is going on. Columns in the order of `joints`; `host_time` in s, monotonic."""
+
+    kind: Literal["live"] = "live"
+    tick: int
+    host_time: float
+    joints: tuple[int, ...]
+    set_point: tuple[float, ...]
+    position: tuple[float, ...]
+    error: tuple[float, ...]
+    drive: tuple[float, ...]
+    status: int
+    lateness: float
+    """s by which it came later than the quickest samples after their ticks."""
+
+
+class ArmReport(_Message):
+    """State of the arm and of the link; told when it changes, and once a second."""
+
+    kind: Literal["arm"] = "arm"
+    arm: ArmState
+    cause: str
+    activity: Activity
+    limp: tuple[int, ...]
+    link: Literal["connected", "degraded", "lost"]
+    counters: dict[str, float]
+
+
+class Told(_Message):
+    """A line for whoever is teaching."""
+
+    kind: Literal["told"] = "told"
+    text: str
+
+
+class Answer(_Message):
+    """What became of a request. `problem` is empty when it was carried out; `exit_code` as the command line's."""
+
+    kind: Literal["answer"] = "answer"
+    number: int
+    data: dict[str, object] = {}
+    problem: str = ""
+    exit_code: int = 0
+    finished: Finished | None = None
+    """Of an experiment that left a trace."""
+
+
+class CannotOpen(_Message):
+    """The robot could not be reached; the process ends."""
+
+    kind: Literal["cannot_open"] = "cannot_open"
+    problem: str
+    exit_code: int
+
+
+Report = Annotated[
+    Opened | LiveSample | ArmReport | Told | Answer | CannotOpen | Progress | EventHappened,
+    Field(discriminator="kind"),
+]
+REPORT: TypeAdapter[Report] = TypeAdapter(Report)

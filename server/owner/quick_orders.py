@@ -1,0 +1,85 @@
+"""Orders carried out between two samples: gains, process signals, gripper, reset. Nothing here moves joints."""
+
+from __future__ import annotations
+
+from daq.contracts.errors import DaqError, SafetyError
+from daq.contracts.limp import limp_line, require_no_jump
+from daq.safety import Event, State
+from server.owner.desk import Desk
+from server.owner.messages import MoveGripper, Quick, ReadGains, ReadProcess, Reset, WriteGains, WriteOutput
+
+BITS = 8
+_WHILE_TEACHING = (ReadProcess, WriteOutput, MoveGripper, ReadGains)
+
+
+class NotFrozenError(DaqError):
+    """The board has not confirmed that it took the measured posture as its set points."""
+
+    exit_code = 3
+
+
+def carry_out(desk: Desk, order: Quick) -> dict[str, object]:
+    """The answer's data. Raises DaqError; nothing has changed then, except where its line says so."""
+    if desk.activity != "none" and not isinstance(order, _WHILE_TEACHING):
+        raise SafetyError(f"not while the arm is busy ({desk.activity}): wait for its end, or stop it")
+    match order:
+        case ReadGains():
+            return {"gains": desk.read_gains()}
+        case WriteGains():
+            return _write_gains(desk, order)
+        case ReadProcess():
+            return _process(desk)
+        case WriteOutput():
+            desk.controller.write_outputs(1 << order.output, order.on << order.output)
+            return _process(desk)
+        case MoveGripper():
+            desk.controller.set_gripper(closed=order.closed)
+            return _process(desk)
+        case Reset():
+            return {"text": _reset(desk, order.here)}
+
+
+def _write_gains(desk: Desk, order: WriteGains) -> dict[str, object]:
+    readings = desk.controller.next_snapshot().joints
+    require_no_jump({joint: reading.error for joint, reading in readings}, order.gains)
+    for joint, gain in sorted(order.gains.items()):
+        desk.machine.joint(joint)
+        desk.controller.set_gains(joint, *gain)
+    return {"gains": desk.read_gains()}
+
+
+def _process(desk: Desk) -> dict[str, object]:
+    found = desk.controller.process()
+    return {
+        "inputs": [bool(found.inputs >> bit & 1) for bit in range(BITS)],
+        "outputs": [bool(found.outputs >> bit & 1) for bit in range(BITS)],
+        "gripper": "closed" if found.gripper else "open",
+    }
+
+
+def _reset(desk: Desk, here: bool) -> str:
+    """Ends a stop or a fault. A stop that comes meanwhile wins."""
+    controller, control = desk.controller, desk.control
+    if control.arm.state not in (State.STOPPED, State.FAULT) and not here:
+        return "was not stopped"
+    if here:
+        # A second stop would change nothing: the board measures the posture when a stop begins.
+        controller.release()
+        stopped = controller.stop()
+        if not stopped.acknowledged:
+            raise NotFrozenError(f"reset here: {stopped.problem}; the set points are not known to be here")
+    desk.guardian.forget()
+    if control.arm.state in (State.STOPPED, State.FAULT):
+        control.handle(Event.RESET)
+    else:
+        controller.release()
+    if (cause := desk.ended()) is not None:
+        control.stop(cause)
+        raise SafetyError(f"the arm has been stopped again: {cause}")
+    limp = limp_line(desk.read_gains())
+    holds = "the arm takes set points again" if limp else "the arm holds its posture and takes set points again"
+    return (
+        f"released: {holds}"
+        + ("; the set points are the posture measured now" if here else "")
+        + f". {limp}" * bool(limp)
+    )

@@ -1,0 +1,61 @@
+"""The controller with a listener: whoever takes a snapshot, for whatever reason, the live view has it too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from daq.contracts.machine import Machine
+from daq.driver import EVERY_JOINT, BoardSnapshot, Controller
+from daq.runner.rows import RowMaker
+from firmware_protocol.commands import StatusFlag
+from server.owner.messages import LiveSample
+
+
+class WatchedController(Controller):
+    """A controller that tells `listener` every snapshot it delivers. The listener must not wait for anybody."""
+
+    listener: Callable[[BoardSnapshot], None] | None = None
+
+    def next_snapshot(
+        self,
+        after: int | None = None,
+        joints: Sequence[int] = EVERY_JOINT,
+        set_points: Mapping[int, int] | None = None,
+    ) -> BoardSnapshot:
+        """As `Controller.next_snapshot`."""
+        snapshot = super().next_snapshot(after, joints, set_points)
+        if self.listener is not None:
+            self.listener(snapshot)
+        return snapshot
+
+
+class SampleMaker:
+    """Turns snapshots, of whatever joints, into samples in SI units."""
+
+    def __init__(self, machine: Machine, period: float) -> None:
+        self._machine = machine
+        self._period = period
+        self._rows: dict[tuple[int, ...], RowMaker] = {}
+
+    def sample(self, snapshot: BoardSnapshot, now: float) -> LiveSample:
+        """`now` is the host's monotonic clock in s."""
+        count = len(self._machine.joints)
+        joints = tuple(joint for joint, _ in snapshot.joints if joint <= count)
+        rows = self._rows.setdefault(joints, RowMaker(self._machine, joints, self._period))
+        row = rows.row(snapshot)
+        return LiveSample(
+            tick=row.tick,
+            host_time=now,
+            joints=joints,
+            set_point=row.set_point,
+            position=row.position,
+            error=row.error,
+            drive=row.drive,
+            status=row.status,
+            lateness=snapshot.jitter,
+        )
+
+
+def is_frozen(snapshot: BoardSnapshot) -> bool:
+    """Whether the board has been stopped, by whomever."""
+    return StatusFlag.FROZEN in snapshot.flags
