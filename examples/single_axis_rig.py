@@ -1,7 +1,8 @@
 """A pretended single-axis rig: writes CSV traces as a test bench would, for the example in docs/own-machine.md.
 
-    python examples/single_axis_rig.py FOLDER
+    python examples/single_axis_rig.py FOLDER [paddle]
 
+With a paddle at its end the arm is dragged by the air (docs/own-effect.md).
 The arm hangs in the plane of gravity (0 straight down) and is moved by a PID at 200 Hz. Nothing here is shared with the
 project's models: the equation of motion is written out and integrated on its own.
 """
@@ -19,6 +20,8 @@ TRUE = {"mass": 0.87, "length": 0.3, "inertia": 0.0044, "gain": 0.5, "viscous": 
 PERIOD, DELAY, P, D = 0.005, 0.001, 40.0, 0.8
 COUNT = 2 * math.pi / 2**14
 STEP = 0.00025
+PADDLE = 0.015
+"""Drag of the paddle, N·m a (rad/s)²."""
 
 
 def wanted(time: float, seed: int) -> float:
@@ -30,7 +33,7 @@ def wanted(time: float, seed: int) -> float:
     return gentle * sum(0.35 * math.sin(2 * math.pi * f * t + seed * f) for f in (0.3, 0.7, 1.3)) + 0.4 * gentle
 
 
-def record(seed: int, duration: float = 9.0) -> Iterator[tuple[float, float, float, float]]:
+def record(seed: int, drag: float = 0.0, duration: float = 9.0) -> Iterator[tuple[float, float, float, float]]:
     """Rows of time, set point, position, drive (V), one a control period."""
     noise = random.Random(seed)
     angle = speed = volts = last = 0.0
@@ -46,7 +49,7 @@ def record(seed: int, duration: float = 9.0) -> Iterator[tuple[float, float, flo
             if i * STEP >= DELAY - 1e-12:
                 volts = command
             weight = TRUE["mass"] * 9.81 * TRUE["length"] / 2 * math.sin(angle)
-            driving = TRUE["gain"] * volts - weight - TRUE["viscous"] * speed
+            driving = TRUE["gain"] * volts - weight - (TRUE["viscous"] + drag * abs(speed)) * speed
             if abs(speed) < 1e-4 and abs(driving) <= TRUE["coulomb"]:
                 speed = 0.0
                 continue
@@ -56,7 +59,7 @@ def record(seed: int, duration: float = 9.0) -> Iterator[tuple[float, float, flo
             angle += STEP * speed
 
 
-def write(folder: Path, seeds: tuple[int, ...] = (1, 2)) -> list[Path]:
+def write(folder: Path, drag: float = 0.0, seeds: tuple[int, ...] = (1, 2)) -> list[Path]:
     """One CSV file a seed, each with the TOML that says what its columns cannot."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
@@ -65,12 +68,13 @@ def write(folder: Path, seeds: tuple[int, ...] = (1, 2)) -> list[Path]:
         with path.open("w", newline="") as stream:
             rows = csv.writer(stream)
             rows.writerow(["time", "set_point_1", "position_1", "drive_1"])
-            rows.writerows([f"{value:.9g}" for value in row] for row in record(seed))
+            rows.writerows([f"{value:.9g}" for value in row] for row in record(seed, drag))
         path.with_suffix(".toml").write_text('robot = "single axis"\nperiod = 0.005\ndrive_unit = "V"\n')
         written.append(path)
     return written
 
 
 if __name__ == "__main__":
-    for made in write(Path(sys.argv[1] if len(sys.argv) > 1 else ".")):
+    where, *fitted_with = sys.argv[1:] or ["."]
+    for made in write(Path(where), PADDLE if fitted_with == ["paddle"] else 0.0):
         print(made)

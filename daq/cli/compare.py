@@ -9,8 +9,10 @@ import typer
 from daq.cli.context import JsonOption, console, invocation, print_json
 from daq.cli.model_input import (
     MODEL_HELP,
+    EffectFileOption,
     ReportOption,
     TraceFolderOption,
+    load_effects,
     model_labels,
     read_model,
     read_traces,
@@ -36,6 +38,7 @@ def compare(
     ],
     report: ReportOption = None,
     folder: TraceFolderOption = None,
+    effect_file: EffectFileOption = None,
     json: JsonOption = False,
 ) -> None:
     """Simulate the same traces with two or more models: whose error is smaller, where, and where the models differ.
@@ -47,6 +50,7 @@ def compare(
     from model.comparison.compare import compare
     from model.comparison.difference import differences
 
+    load_effects(effect_file)
     models, traces = _told_apart(names)
     if len(models) < 2:
         raise SpecError(f"{len(models)} model named: name at least two models (.json, .toml, ma2000), then traces")

@@ -9,7 +9,7 @@ import typer
 
 from daq.cli.context import JsonOption, console, print_json
 from daq.cli.effect_choice import patterns
-from daq.cli.model_input import MODEL_HELP, read_model
+from daq.cli.model_input import MODEL_HELP, EffectFileOption, load_effects, read_model
 from daq.contracts.errors import SafetyError, SpecError
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def design(
     duration: Annotated[float, typer.Option(min=1.0, max=600.0, help="Of each, in s.")] = 12.0,
     candidates: Annotated[int, typer.Option(min=1, max=10_000, help="Experiments to choose from.")] = 60,
     seed: Annotated[int, typer.Option(min=0, help="Of the candidates.")] = 0,
+    effect_file: EffectFileOption = None,
     json: JsonOption = False,
 ) -> None:
     """Propose experiments within the machine's limits that make chosen parameters best known (D-optimal).
@@ -50,6 +51,7 @@ def design(
     from model.design.search import design as search
     from model.fitting.options import FitOptions
 
+    load_effects(effect_file)
     chosen = read_model(model)
     options = FitOptions(parameters=patterns(parameters))
 

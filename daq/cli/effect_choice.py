@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from daq.contracts.effects import effect_names
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import parse_joints
 
@@ -34,8 +33,16 @@ def with_effects(model: Model, text: str) -> Model:
                 raise SpecError(f"effect {found}: belongs to the whole machine; write it without {':' + joints!r}")
             model = model.with_effect(found)
         else:
-            model = model.with_effect(found, parse_joints(joints) if joints else model.machine.modelled_joints)
+            model = model.with_effect(found, parse_joints(joints) if joints else _joints_of(found, model))
     return model
+
+
+def _joints_of(name: str, model: Model) -> tuple[int, ...]:
+    """Every joint that the effect may act on."""
+    from model.effects.library import effect
+
+    own = effect(name).joints
+    return tuple(j for j in model.machine.modelled_joints if not own or j in own)
 
 
 def effect_name(text: str) -> str:
@@ -50,8 +57,7 @@ def effect_name(text: str) -> str:
         return begun[0]
     if begun:
         raise SpecError(f"effect {text!r}: could be {', '.join(begun)}")
-    known = ", ".join(n for n in library() if n in effect_names())
-    raise SpecError(f"effect {text!r}: not in the library; it has {known}")
+    raise SpecError(f"effect {text!r}: not in the library; it has {', '.join(library())}")
 
 
 def patterns(text: str | None) -> tuple[str, ...] | None:

@@ -12,9 +12,11 @@ from daq.cli.context import Invocation, JsonOption, console, invocation, print_j
 from daq.cli.effect_choice import bounds, patterns, with_effects
 from daq.cli.model_input import (
     MODEL_HELP,
+    EffectFileOption,
     ReportOption,
     TraceFolderOption,
     TracesArgument,
+    load_effects,
     machine_of,
     read_model,
     read_traces,
@@ -49,6 +51,7 @@ def fit(
     model: Annotated[str | None, typer.Option(help=f"Begin from this one. {MODEL_HELP}")] = None,
     machine: Annotated[str | None, typer.Option(help="Machine file or name (default: the traces').")] = None,
     effects: EffectsOption = None,
+    effect_file: EffectFileOption = None,
     parameters: ParametersOption = None,
     hold: Annotated[str | None, typer.Option(help="Names or patterns to leave as they are.")] = None,
     bound: Annotated[list[str] | None, typer.Option(help="name=low:high, instead of the model's own bounds.")] = None,
@@ -77,6 +80,7 @@ def fit(
     from model.simulation.simulate import Options
 
     call = invocation(context)
+    load_effects(effect_file)
     if out.suffix != ".json":
         raise SpecError(f"--out {out}: a model is written as .json")
     fitted_to = read_traces(call, folder, traces)

@@ -33,6 +33,11 @@ ReportOption = Annotated[
     Path | None, typer.Option("--report", callback=_page, help="Write a self-contained page, an .html file.")
 ]
 
+EffectFileOption = Annotated[
+    list[Path] | None,
+    typer.Option("--effect-file", help="An effect of your own (.py, docs/own-effect.md). May be repeated."),
+]
+
 MODEL_HELP = "A model (.json, as `daq fit` writes it), a machine file (.toml), or a machine that ships (ma2000)."
 
 
@@ -47,6 +52,15 @@ def read_model(name: str) -> Model:
     if name not in shipped_machines() and Path(name).suffix != ".toml":
         return load_model(Path(name))
     return base_model(load_machine(name))
+
+
+def load_effects(files: Sequence[Path] | None) -> None:
+    """Effects of the user's own, from files that the command line names. Raises SpecError with one line."""
+    if files:
+        from model.effects.effect_files import load_effect_file
+
+        for file in files:
+            load_effect_file(file)
 
 
 def model_label(name: str) -> str:

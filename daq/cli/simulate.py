@@ -11,9 +11,11 @@ import typer
 from daq.cli.context import JsonOption, console, invocation, print_json
 from daq.cli.model_input import (
     MODEL_HELP,
+    EffectFileOption,
     ReportOption,
     TraceFolderOption,
     TracesArgument,
+    load_effects,
     model_label,
     read_model,
     read_traces,
@@ -47,6 +49,7 @@ def simulate(
     ] = False,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
+    effect_file: EffectFileOption = None,
     json: JsonOption = False,
 ) -> None:
     """Simulate traces from their recorded set points, and show what is left between measured and simulated.
@@ -59,6 +62,7 @@ def simulate(
     from model.simulation.simulate import Options
 
     call = invocation(context)
+    load_effects(effect_file)
     found = read_traces(call, folder, traces)
     if output is not None and len(found) != 1:
         raise SpecError(f"--output {output}: is for one trace, {len(found)} are named")

@@ -10,9 +10,11 @@ from daq.cli.context import JsonOption, console, invocation, print_json
 from daq.cli.effect_choice import patterns
 from daq.cli.model_input import (
     MODEL_HELP,
+    EffectFileOption,
     ReportOption,
     TraceFolderOption,
     TracesArgument,
+    load_effects,
     model_label,
     read_model,
     read_traces,
@@ -43,6 +45,7 @@ def validate(
     damping_ratio: Annotated[float, typer.Option(help="ζ of the associate system (section 7.2.2).")] = 0.5,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
+    effect_file: EffectFileOption = None,
     json: JsonOption = False,
 ) -> None:
     """Validate a model by distortion: Σλ² says whether expected deviations explain what the model misses.
@@ -56,6 +59,7 @@ def validate(
     from model.validation.names import names_to_validate
     from model.validation.time_domain import vary_in_time
 
+    load_effects(effect_file)
     found = read_traces(invocation(context), folder, traces)
     chosen = read_model(model)
     names = names_to_validate(chosen, patterns(parameters))

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.effects import EffectName, effect_names
 
@@ -57,6 +60,7 @@ class EffectParameter:
         null: value at which the effect is not there; None for a parameter that only shapes it.
         start: value when the effect is added without one: the null value, or a typical shape.
         low, high: bounds. deviation: expected size on a machine that has the effect.
+        source: where its numbers come from; the effect's own source where it is empty.
     """
 
     name: str
@@ -67,6 +71,7 @@ class EffectParameter:
     low: Size = -math.inf
     high: Size = math.inf
     deviation: Size = 1.0
+    source: str = ""
 
     def starting_value(self, scale: JointScale) -> float:
         """Value of the parameter in a model to which the effect has just been added."""
@@ -74,6 +79,15 @@ class EffectParameter:
         if chosen is None:
             raise ValueError(f"effect parameter {self.name} has neither a null nor a starting value")
         return sized(chosen, scale)
+
+
+class EffectFile(BaseModel):
+    """The file that an effect of the user's own comes from: its name, and the first digits of its SHA-256."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str
+    sha256: str
 
 
 @dataclass(frozen=True)
@@ -88,6 +102,8 @@ class Effect:
         flag: bit that switches on the state it needs (0: it only adds a term).
         whole_machine: it belongs to the machine, not to a joint.
         group: first part of its parameters' names when it belongs to the whole machine.
+        joints: on which it may act; empty for any.
+        family, torque, file: of an effect of the user's own (`model.effects.own`).
     """
 
     name: str
@@ -97,8 +113,14 @@ class Effect:
     flag: int = 0
     whole_machine: bool = False
     group: str = "base"
+    joints: tuple[int, ...] = ()
+    family: str = ""
+    torque: Callable[..., Any] | None = None
+    file: EffectFile | None = None
 
     @property
     def shared_name(self) -> EffectName:
-        """Its entry in the shared list: what it acts on, its family, one line for people."""
+        """Its entry in the shared list, or one like it: what it acts on, its family, one line for people."""
+        if self.file is not None:
+            return EffectName(self.name, "joint torque", self.family, self.physics)
         return effect_names()[self.name]

@@ -11,8 +11,13 @@ from model.machine_model.nominal import joint_scale
 from model.machine_model.parameter import Parameter
 
 
-def effect_parameters(machine: Machine, name: str, joints: tuple[int, ...], shared: bool) -> tuple[Parameter, ...]:
-    """Parameters of effect `name` on `joints`: one set a joint, or one set for all when `shared`."""
+def effect_parameters(
+    machine: Machine, name: str, joints: tuple[int, ...], shared: bool, beyond: int = 0
+) -> tuple[Parameter, ...]:
+    """Parameters of effect `name` on `joints`: one set a joint, or one set for all when `shared`.
+
+    `beyond` columns of a joint are taken by effects of the user's own that come before this one.
+    """
     kind = effect(name)
     if kind.whole_machine:
         scale = joint_scale(machine, machine.modelled_joints[-1])
@@ -25,7 +30,7 @@ def effect_parameters(machine: Machine, name: str, joints: tuple[int, ...], shar
         label = f"joint{group[0]}" if len(group) == 1 else "joints" + "+".join(str(j) for j in group)
         scale = joint_scale(machine, group[0])
         for p in kind.parameters:
-            slots = tuple(at.slot(j, p.column) for j in group)
+            slots = tuple(at.slot(j, p.column + beyond) for j in group)
             known = _known(machine.joint(group[0]).friction, name, scale)
             found.append(
                 _parameter(kind, p, f"{label}.{name}", scale, group, slots, known, machine.joint(group[0]).kind)
@@ -48,7 +53,7 @@ def _parameter(
             kind.name, joints,
         )  # fmt: skip
     return Parameter(
-        f"{prefix}.{p.name}", unit, p.starting_value(scale), kind.source, slots, sized(p.low, scale),
+        f"{prefix}.{p.name}", unit, p.starting_value(scale), p.source or kind.source, slots, sized(p.low, scale),
         sized(p.high, scale), null, sized(p.deviation, scale), kind.name, joints,
     )  # fmt: skip
 

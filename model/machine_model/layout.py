@@ -94,7 +94,7 @@ CYLINDER, ROD, BODY = 0, 1, 2
 
 # Bits of the whole number that says which state-changing effects a joint has.
 HAS_INDUCTANCE, HAS_FLEXIBILITY, HAS_STICTION, HAS_EXTRA_TORQUE, HAS_USER_EFFECT = 1, 2, 4, 8, 16
-"""From HAS_USER_EFFECT on, a bit for each effect of the user's own."""
+"""HAS_USER_EFFECT: at least one effect of the user's own."""
 
 # Settings of a run, in this order.
 (CONTROLLER, QUANTISE, PUBLISHED_LOADS) = range(3)

@@ -10,11 +10,20 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
-from model.effects.library import effect
+from model.effects.effect import EffectFile
+from model.effects.library import effect, effect_from
 from model.machine_model import layout as at
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.nominal import base_parameters, joint_scale, nominal_vector
@@ -36,11 +45,23 @@ class _Part(BaseModel):
 
 
 class EffectUse(_Part):
-    """An effect in a model: on which joints (none for the whole machine), with values of their own or shared ones."""
+    """An effect in a model: on which joints (none for the whole machine), with values of their own or shared ones.
+
+    `file` is the one that an effect of the user's own needs, as it was when the model was made.
+    """
 
     name: str
     joints: tuple[int, ...] = ()
     shared: bool = False
+    file: EffectFile | None = None
+
+    @model_serializer(mode="wrap")
+    def _without_no_file(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Files are written where there are any; so the identity of other models does not speak of them."""
+        data: dict[str, Any] = handler(self)
+        if self.file is None:
+            del data["file"]
+        return data
 
 
 class Lineage(_Part):
@@ -76,6 +97,7 @@ class Model(_Part):
             _check_use(self.machine, use)
         if repeated := [u.name for i, u in enumerate(self.effects) for v in self.effects[:i] if _overlap(u, v)]:
             raise SpecError(f"effect {repeated[0]}: in the model twice for the same joint")
+        _check_own(self.effects)
         if unknown := sorted(set(self.values) - set(self.by_name)):
             raise SpecError(f"parameter {unknown[0]!r}: this model has {', '.join(self.by_name)}")
         return self
@@ -85,12 +107,23 @@ class Model(_Part):
         """Every parameter of the model: the machine's own, then those of its effects, with the model's values."""
         found = [*base_parameters(self.machine)]
         for use in self.effects:
-            found.extend(effect_parameters(self.machine, use.name, use.joints, use.shared))
+            beyond = self.own_columns.get(use.name, 0)
+            found.extend(effect_parameters(self.machine, use.name, use.joints, use.shared, beyond))
         for name, members in self.ties.items():
             found = _tied(found, name, members)
         return tuple(
             p if p.name not in self.values else Parameter(**{**vars(p), "value": self.values[p.name]}) for p in found
         )
+
+    @cached_property
+    def own_columns(self) -> dict[str, int]:
+        """Effects of the user's own in the model, by name, and how many of a joint's columns for them lie before."""
+        columns, taken = {}, 0
+        for use in self.effects:
+            if use.file is not None and use.name not in columns:
+                columns[use.name] = taken
+                taken += len(effect(use.name).parameters)
+        return columns
 
     @cached_property
     def by_name(self) -> dict[str, Parameter]:
@@ -151,7 +184,7 @@ class Model(_Part):
 
         `values` are by full name, or by the parameter's last part, then for every joint of the effect.
         """
-        use = EffectUse(name=name, joints=joints, shared=shared)
+        use = EffectUse(name=name, joints=joints, shared=shared, file=effect(name).file)
         _check_use(self.machine, use)
         wider = self._changed(effects=(*self.effects, use))
         chosen: dict[str, float] = {}
@@ -217,8 +250,18 @@ def base_model(machine: Machine, *, friction: bool = True) -> Model:
     return Model(machine=machine, effects=tuple(uses))
 
 
+def _check_own(uses: tuple[EffectUse, ...]) -> None:
+    own = {use.name: use for use in uses if effect(use.name).file is not None}
+    if unnamed := [name for name, use in own.items() if use.file is None]:
+        raise SpecError(f"effect {unnamed[0]}: the model does not say which file it comes from")
+    if (taken := sum(len(effect(name).parameters) for name in own)) > at.USER_COLUMNS:
+        raise SpecError(
+            f"effects {', '.join(own)}: {taken} parameters; a model has room for {at.USER_COLUMNS} of the user's own"
+        )
+
+
 def _check_use(machine: Machine, use: EffectUse) -> None:
-    kind = effect(use.name)
+    kind = effect_from(use.name, use.file)
     if kind.whole_machine and use.joints:
         raise SpecError(f"effect {use.name} belongs to the whole machine, not to joints {list(use.joints)}")
     if not kind.whole_machine and not use.joints:
@@ -226,6 +269,8 @@ def _check_use(machine: Machine, use: EffectUse) -> None:
     for joint in use.joints:
         if joint not in machine.modelled_joints:
             raise SpecError(f"effect {use.name} on joint {joint}: modelled are joints {list(machine.modelled_joints)}")
+        if kind.joints and joint not in kind.joints:
+            raise SpecError(f"effect {use.name} on joint {joint}: its file has it on joints {list(kind.joints)} alone")
 
 
 def _overlap(one: EffectUse, other: EffectUse) -> bool:

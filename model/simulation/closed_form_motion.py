@@ -46,7 +46,6 @@ def friction_levels(theta_2: Any, theta_3: Any, arms: Any, plain: Any, weight_2:
 
 @internal
 def advance(  # noqa: PLR0915 (a step in registers: three joints written out, nothing allocated)
-    user: Any,
     state: NDArray[Any], volts: NDArray[Any], start: complex, duration: complex, steps: int,
     joints: NDArray[Any], body: NDArray[Any], flags: NDArray[Any],
 ) -> None:  # fmt: skip
@@ -100,9 +99,9 @@ def advance(  # noqa: PLR0915 (a step in registers: three joints written out, no
             t3 = drive_3 - damping_3 * u3 - y3 * l3
             if special:
                 now = start + step * h + reach
-                t1 += special_torque(user, joints[0], flags[0], now, h, q1 + dq1, u1, u1, y1, state[0], volts[0])
-                t2 += special_torque(user, joints[1], flags[1], now, h, p2, u2, u2, y2, state[1], volts[1])
-                t3 += special_torque(user, joints[2], flags[2], now, h, p3, u3, u3, y3, state[2], volts[2])
+                t1 += special_torque(joints[0], flags[0], now, h, q1 + dq1, u1, u1, y1, state[0], volts[0])
+                t2 += special_torque(joints[1], flags[1], now, h, p2, u2, u2, y2, state[1], volts[1])
+                t3 += special_torque(joints[2], flags[2], now, h, p3, u3, u3, y3, state[2], volts[2])
             if tilted:
                 b1, b2, b3 = horizontal_gravity_torques(q1 + dq1 + offset_1, p2 + offset_2, p3 + offset_3, body)
                 t1, t2, t3 = t1 - b1, t2 - b2, t3 - b3

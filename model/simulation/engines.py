@@ -9,11 +9,10 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numba
 import numpy as np
+from numba.core.event import Listener, install_listener
 from numpy.typing import NDArray
 
 from daq.contracts.machine import Cylinder, Machine, Rod
@@ -29,8 +28,9 @@ CHUNKS_A_CORE = 4
 
 @dataclass(frozen=True)
 class Engine:
-    """A compiled run. `published_loads`: load-dependent friction by (7.32) to (7.34)."""
+    """A compiled run of a model. `published_loads`: load-dependent friction by (7.32) to (7.34)."""
 
+    model: Model
     batch: Callable[..., None]
     published_loads: bool
 
@@ -42,6 +42,8 @@ class Engine:
 
         Threads share the work; the compiled code holds no lock of Python's. Results do not depend on their number.
         """
+        from model.simulation.own_torque import own_table
+
         shares = vectors[:, : at.SHARED].copy()
         shares[:, at.PERIOD] = np.array([p.period for p in prepared])[which]
         parts = np.ascontiguousarray(vectors[:, at.SHARED :]).reshape(len(vectors), -1, at.PER_JOINT)
@@ -49,28 +51,35 @@ class Engine:
             which, np.array([len(p.set_points) for p in prepared]), _padded([p.set_points for p in prepared]),
             _padded([p.recorded for p in prepared]), _padded([p.noise for p in prepared]), initials,
             np.array([p.first_drive for p in prepared]), shares, parts, np.array([p.gains for p in prepared]), flags,
-            np.array([p.settings for p in prepared]), step, out,
+            np.array([p.settings for p in prepared]), own_table(self.model, vectors.dtype), step, out,
         )  # fmt: skip
         cores = available_cores() if cores is None else cores
-        self._say_if_it_takes_long()
-        if len(which) == 1 or cores == 1:
-            self.batch(0, len(which), *arguments)
+        alone = len(which) == 1 or cores == 1
+        with install_listener("numba:compile", _Announcement(self.batch)):
+            self.batch(0, len(which) if alone else 0, *arguments)  # compiled or loaded once, not in every thread
+        if alone:
             return
         edges = np.unique(np.linspace(0, len(which), min(len(which), cores * CHUNKS_A_CORE) + 1).astype(np.int64))
-        self.batch(int(edges[0]), int(edges[1]), *arguments)  # here, so that what has to be compiled is compiled once
         with ThreadPoolExecutor(cores) as pool:
-            pieces = [pool.submit(self.batch, int(a), int(b), *arguments) for a, b in pairwise(edges[1:])]
+            pieces = [pool.submit(self.batch, int(a), int(b), *arguments) for a, b in pairwise(edges)]
         for piece in pieces:
             piece.result()
 
-    def _say_if_it_takes_long(self) -> None:
-        name = self.batch.__name__
-        compiler: Any = numba.config
-        if not getattr(self.batch, "signatures", True) and not any(
-            Path(compiler.CACHE_DIR).rglob(f"kernel.{name}-*.nbc")
-        ):
+
+class _Announcement(Listener):
+    """Says that a run is being compiled, and nothing where its machine code is found on disk."""
+
+    def __init__(self, run: Callable[..., None]) -> None:
+        self._run = run
+
+    def on_start(self, event: Any) -> None:
+        """A line when the run itself is compiled, none for what it calls."""
+        if event.data["dispatcher"] is self._run:
             sys.stderr.write("Compiling the simulation for this machine, once: some 20 s\n")
             sys.stderr.flush()
+
+    def on_end(self, event: Any) -> None:
+        """Nothing to say."""
 
 
 def available_cores() -> int:
@@ -87,9 +96,9 @@ def engine_for(model: Model, *, general: bool = False) -> Engine:
 
     rods = is_rod_arm(model.machine)
     if general or not rods:
-        return Engine(kernel.run_chain, published_loads=rods)
-    flexible = bool((model.flags & at.HAS_FLEXIBILITY).any())
-    return Engine(kernel.run_flexible if flexible else kernel.run_closed_form, published_loads=True)
+        return Engine(model, kernel.run_chain, published_loads=rods)
+    flexible = bool((model.flags & (at.HAS_FLEXIBILITY | at.HAS_USER_EFFECT)).any())
+    return Engine(model, kernel.run_flexible if flexible else kernel.run_closed_form, published_loads=True)
 
 
 def is_rod_arm(machine: Machine) -> bool:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from model.dynamics.compilation import internal
 from model.machine_model import layout as at
-from model.simulation.dynamics_of_run import accelerate, friction_levels_of
+from model.simulation.dynamics_of_run import accelerate, friction_levels_of, gravity_of
 from model.simulation.joint_torques import (
     DEFLECTION,
     POSITION,
@@ -27,21 +28,22 @@ from model.simulation.joint_torques import (
     special_torque,
     transmitted,
 )
+from model.simulation.own_torque import own_torque
 
 # Rows of the work array (WORK, n): stage values, accelerations, weighted sums.
-Q, V, M, W, TORQUE, A, B, LEVEL, SUM_V, SUM_A, SUM_W, SUM_B = range(12)
-WORK = 12
+Q, V, M, W, TORQUE, A, B, LEVEL, SUM_V, SUM_A, SUM_W, SUM_B, LOAD = range(13)
+WORK = 13
 
 
 @internal
 def advance(
-    user: Any, kind: Any, state: NDArray[Any], volts: NDArray[Any], start: complex,
+    own: NDArray[np.int64], kind: Any, state: NDArray[Any], volts: NDArray[Any], start: complex,
     duration: complex, steps: int, joints: NDArray[Any], body: Any, flags: NDArray[Any], settings: NDArray[Any],
     work: NDArray[Any],
 ) -> None:  # fmt: skip
     """Advance the state (n, STATE) by `duration` s in equal steps at constant motor volts.
 
-    `user` and `kind` are tags that choose the torque of the user's effects and the dynamics.
+    `own` (n, e, 2) are the user's own effects (`own_torque`); `kind` is a tag that chooses the dynamics.
     """
     n = joints.shape[0]
     h = duration / steps
@@ -52,6 +54,8 @@ def advance(
             _to_stage(state, work, reach)
             friction_levels_of(kind, work[Q], joints, body, settings, work[LEVEL])
             now = start + step * h + reach
+            if own.shape[1] > 0:
+                work[LOAD] = gravity_of(kind, work[Q], joints, body)
             for j in range(n):
                 joint, moved = joints[j], work[Q, j] - state[j, POSITION]
                 z = deflection(state[j, DEFLECTION], moved, 1.0 / joint[at.PRESLIDING])
@@ -61,8 +65,10 @@ def advance(
                 link = -z * work[LEVEL, j]
                 if flags[j] != 0:
                     link += special_torque(
-                        user, joint, flags[j], now, h, work[Q, j], work[V, j], turning, z, state[j], volts[j]
+                        joint, flags[j], now, h, work[Q, j], work[V, j], turning, z, state[j], volts[j]
                     )
+                if flags[j] & at.HAS_USER_EFFECT:
+                    link += own_torque(own[j], joint, work[Q, j], work[V, j], volts[j], work[LOAD, j], now)
                 if gives:
                     through = transmitted(joint, work[M, j] - work[Q, j], work[W, j] - work[V, j])
                     rotor = joint[at.ROTOR_INERTIA] * joint[at.GEAR] * joint[at.GEAR]

@@ -17,7 +17,6 @@ from model.drives.piecewise import clamped, magnitude, outside
 from model.dynamics.compilation import inlined, internal
 from model.dynamics.dual import sin_cos
 from model.machine_model import layout as at
-from model.simulation.specialised import user_torque
 
 RESTICK_SPEED = 1e-3
 """rad/s (m/s): a sliding joint slower than this sticks again."""
@@ -101,23 +100,17 @@ def extra_torque(
 
 @inlined
 def special_torque(
-    user: Any, joint: NDArray[Any], flags: int, time: Any, h: Any, q: Any, speed: Any, rotor_speed: Any, z: Any,
+    joint: NDArray[Any], flags: int, time: Any, h: Any, q: Any, speed: Any, rotor_speed: Any, z: Any,
     state: NDArray[Any], volts: Any,
 ) -> Any:  # fmt: skip
-    """What inductance, added torques and effects of the user's own add to a joint's torque at a stage of a step.
-
-    `h` is the step, s; `user` is the tag of the user's effects.
-    """
+    """What inductance and added torques add to a joint's torque at a stage of a step of `h` s."""
     steady = steady_current(joint, state[RISE], volts, rotor_speed)
     current = steady
     if flags & at.HAS_INDUCTANCE:
         current = mean_current(joint, state[RISE], state[CURRENT], steady, h)
     to_torque = joint[at.GEAR] * joint[at.TORQUE_CONSTANT]
     torque = to_torque * (current - steady)
-    torque += extra_torque(joint, flags, time, q, speed, z, state[STUCK], to_torque * current)
-    if flags >= at.HAS_USER_EFFECT:
-        torque += user_torque(user, joint, flags, time, q, speed)
-    return torque
+    return torque + extra_torque(joint, flags, time, q, speed, z, state[STUCK], to_torque * current)
 
 
 @internal

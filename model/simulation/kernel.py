@@ -9,7 +9,7 @@ Every entry takes a batch of runs:
     recorded: (t, k, n) motor volts where nothing controls. noise: (t, k, n) added to the readings before rounding.
     initial: (r, n, 2) position and speed. first_drive: (t, n) commanded volts before the record.
     shares: (r, SHARED) and parts: (r, n, PER_JOINT), the flat vectors. gains: (t, n, GAINS). flags: (n,).
-    settings: (t, SETTINGS).
+    settings: (t, SETTINGS). own: (n, e, 2), the user's own effects (`model.simulation.own_torque`).
     step: longest step of integration, s. out: (r, OUTPUTS, k, n), filled.
 """
 
@@ -43,13 +43,13 @@ from model.simulation.joint_torques import (
     steady_current,
 )
 from model.simulation.period import QUEUE, extra_flags, sample, step_count, switching_times, warm_up
-from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, NoUserEffect, entry
+from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, entry
 
 Array = NDArray[Any]
 
 
 def advance_of(
-    kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any,
+    kind: Any, own: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any,
     flags: Any, settings: Any, work: Any,
 ) -> None:  # fmt: skip
     """Advances `state` over a stretch of constant motor volts."""
@@ -58,35 +58,35 @@ def advance_of(
 
 @overload(advance_of, jit_options=OPTIONS)
 def _advance_of(
-    kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any,
+    kind: Any, own: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any,
     flags: Any, settings: Any, work: Any,
 ) -> Any:  # fmt: skip
     if kind.instance_class is ClosedForm:
 
         def closed_form(
-            kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any,
+            kind: Any, own: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any,
             flags: Any, settings: Any, work: Any,
         ) -> None:  # fmt: skip
-            closed_form_motion.advance(user, state, volts, start, duration, steps, joints, body, flags)
+            closed_form_motion.advance(state, volts, start, duration, steps, joints, body, flags)
 
         return closed_form
 
     def general(
-        kind: Any, user: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any,
+        kind: Any, own: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, joints: Any, body: Any,
         flags: Any, settings: Any, work: Any,
     ) -> None:  # fmt: skip
-        general_motion.advance(user, kind, state, volts, start, duration, steps, joints, body, flags, settings, work)
+        general_motion.advance(own, kind, state, volts, start, duration, steps, joints, body, flags, settings, work)
 
     return general
 
 
 @internal
 def batch(
-    user: Any, kind: Any, first: int, last: int, which: Array, lengths: Array,
+    kind: Any, first: int, last: int, which: Array, lengths: Array,
     set_points: Array, recorded: Array, noise: Array, initial: Array, first_drive: Array, shares: Array, parts: Array,
-    gains: Array, flags: Array, settings: Array, step: float, out: Array,
+    gains: Array, flags: Array, settings: Array, own: Array, step: float, out: Array,
 ) -> None:  # fmt: skip
-    """Runs first … last − 1; `user` and `kind` are tags that choose the user's effects and the dynamics."""
+    """Runs first … last − 1; `kind` is a tag that chooses the dynamics."""
     n = initial.shape[1]
     state = np.zeros((n, STATE), dtype=parts.dtype)
     memory = np.zeros((n, MEMORY), dtype=parts.dtype)
@@ -127,7 +127,7 @@ def batch(
                     steps = step_count(until - done, step)
                     advance_of(
                         kind,
-                        user,
+                        own,
                         state,
                         volts,
                         k * period + done,
@@ -170,12 +170,12 @@ def at_rest(
 def run_closed_form(
     first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
     initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array,
-    settings: Array, step: float, out: Array,
+    settings: Array, own: Array, step: float, out: Array,
 ) -> None:  # fmt: skip
     """The waist-shoulder-elbow arm of rods with rigid transmissions."""
     batch(
-        NoUserEffect(0), ClosedForm(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
-        shares, parts, gains, flags, settings, step, out,
+        ClosedForm(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
+        shares, parts, gains, flags, settings, own, step, out,
     )  # fmt: skip
 
 
@@ -183,12 +183,12 @@ def run_closed_form(
 def run_flexible(
     first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
     initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array,
-    settings: Array, step: float, out: Array,
+    settings: Array, own: Array, step: float, out: Array,
 ) -> None:  # fmt: skip
     """The same arm where a transmission gives or has play."""
     batch(
-        NoUserEffect(0), Flexible(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
-        shares, parts, gains, flags, settings, step, out,
+        Flexible(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
+        shares, parts, gains, flags, settings, own, step, out,
     )  # fmt: skip
 
 
@@ -196,10 +196,10 @@ def run_flexible(
 def run_chain(
     first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
     initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array,
-    settings: Array, step: float, out: Array,
+    settings: Array, own: Array, step: float, out: Array,
 ) -> None:  # fmt: skip
     """Any machine."""
     batch(
-        NoUserEffect(0), AnyChain(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
-        shares, parts, gains, flags, settings, step, out,
+        AnyChain(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
+        shares, parts, gains, flags, settings, own, step, out,
     )  # fmt: skip

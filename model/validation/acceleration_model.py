@@ -19,9 +19,10 @@ from model.dynamics.compilation import compiled
 from model.dynamics.dual import DUAL_STEP
 from model.machine_model import layout as at
 from model.machine_model.model import Model
-from model.simulation.dynamics_of_run import accelerate, body_of, friction_levels_of
+from model.simulation.dynamics_of_run import accelerate, body_of, friction_levels_of, gravity_of
 from model.simulation.engines import is_rod_arm
 from model.simulation.joint_torques import extra_torque, motor_damping, motor_gain
+from model.simulation.own_torque import own_table, own_torque
 from model.simulation.period import extra_flags
 from model.simulation.specialised import AnyChain, ClosedForm, entry
 from model.validation.differentiation import smoothed
@@ -84,7 +85,7 @@ def _accelerations(model: Model, motion: MeasuredMotion, vector: NDArray[Any]) -
     signals = (
         np.ascontiguousarray(s, dtype=vector.dtype) for s in (motion.position, motion.speed, motion.friction, volts)
     )
-    run(*signals, motion.time, np.ascontiguousarray(vector), model.flags, settings, out)
+    run(*signals, motion.time, np.ascontiguousarray(vector), model.flags, settings, own_table(model, vector.dtype), out)
     return out
 
 
@@ -128,7 +129,8 @@ def _after_amplifier(drive: NDArray[Any], joints: NDArray[Any], volts: NDArray[A
 @compiled
 def _along(
     kind: Any, position: NDArray[Any], speed: NDArray[Any], friction: NDArray[Any], volts: NDArray[Any],
-    time: NDArray[Any], vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any], out: NDArray[Any],
+    time: NDArray[Any], vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any],
+    own: NDArray[Any], out: NDArray[Any],
 ) -> None:  # fmt: skip
     n = position.shape[1]
     shared = vector[: at.SHARED]
@@ -137,9 +139,12 @@ def _along(
     modes = extra_flags(joints, flags)
     level = np.empty(n, dtype=vector.dtype)
     torque = np.empty(n, dtype=vector.dtype)
+    load = np.zeros(n, dtype=vector.dtype)
     cold = 0.0 * shared[0]
     for k in range(position.shape[0]):
         friction_levels_of(kind, position[k], joints, body, settings, level)
+        if own.shape[1] > 0:
+            load[:] = gravity_of(kind, position[k], joints, body)
         for j in range(n):
             q, v, z, u = position[k, j], speed[k, j], friction[k, j], volts[k, j]
             pull = motor_gain(joints[j], cold) * u
@@ -147,20 +152,24 @@ def _along(
             if modes[j] & at.HAS_EXTRA_TORQUE:
                 motor = pull - (motor_damping(joints[j], cold) - joints[j, at.VISCOUS] * joints[j, at.GEAR] ** 2) * v
                 torque[j] += extra_torque(joints[j], modes[j], time[k] + cold, q, v, z, cold, motor)
+            if modes[j] & at.HAS_USER_EFFECT:
+                torque[j] += own_torque(own[j], joints[j], q, v, u, load[j], time[k] + cold)
         accelerate(kind, position[k], speed[k], torque, joints, body, out[k])
 
 
 @entry
 def _along_rods(
     position: NDArray[Any], speed: NDArray[Any], friction: NDArray[Any], volts: NDArray[Any], time: NDArray[Any],
-    vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any], out: NDArray[Any],
+    vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any],
+    own: NDArray[Any], out: NDArray[Any],
 ) -> None:  # fmt: skip
-    _along(ClosedForm(0), position, speed, friction, volts, time, vector, flags, settings, out)
+    _along(ClosedForm(0), position, speed, friction, volts, time, vector, flags, settings, own, out)
 
 
 @entry
 def _along_chain(
     position: NDArray[Any], speed: NDArray[Any], friction: NDArray[Any], volts: NDArray[Any], time: NDArray[Any],
-    vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any], out: NDArray[Any],
+    vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any],
+    own: NDArray[Any], out: NDArray[Any],
 ) -> None:  # fmt: skip
-    _along(AnyChain(0), position, speed, friction, volts, time, vector, flags, settings, out)
+    _along(AnyChain(0), position, speed, friction, volts, time, vector, flags, settings, own, out)

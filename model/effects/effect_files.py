@@ -1,0 +1,60 @@
+"""Effects from files of the user's own: read once, kept in the library until they are taken out.
+
+Reading such a file runs it, so it is read only where a person names it: a saved model says which file it needs, by
+name and hash, and never makes a program run it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+from daq.contracts.errors import SpecError
+from model.effects.effect import Effect, EffectFile
+from model.effects.library import add_own, own_effects
+from model.effects.own import OwnEffect, as_library_effect
+
+HASH_DIGITS = 16
+EFFECT = "EFFECT"
+
+
+def load_effect_file(path: Path) -> Effect:
+    """The effect that a file states as `EFFECT`, now in the library; the same file again changes nothing.
+
+    Raises SpecError, in one line, for a file that cannot be read or run, that states no effect, or states it wrongly,
+    and for a name that another file has taken.
+    """
+    try:
+        source = path.read_bytes()
+    except OSError as error:
+        raise SpecError(f"effect file {path}: cannot be read: {error.strerror}") from error
+    if path.suffix != ".py":
+        raise SpecError(f"effect file {path}: is Python, so its name ends in .py")
+    file = EffectFile(name=path.name, sha256=hashlib.sha256(source).hexdigest()[:HASH_DIGITS])
+    for known in own_effects().values():
+        if known.file == file:
+            return known
+    found = as_library_effect(_stated(path, file), file)
+    add_own(found)
+    return found
+
+
+def _stated(path: Path, file: EffectFile) -> OwnEffect:
+    """What the file states, run under a module name of its own."""
+    name = f"own_effect_{file.sha256}"
+    spec = spec_from_file_location(name, path.resolve())
+    if spec is None or spec.loader is None:
+        raise SpecError(f"effect file {path}: cannot be loaded as Python")
+    module = module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses and numba look a function's module up by its name
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        raise SpecError(f"effect file {path}: running it gives {type(error).__name__}: {error}") from error
+    stated = getattr(module, EFFECT, None)
+    if not isinstance(stated, OwnEffect):
+        raise SpecError(f"effect file {path}: states no effect; write {EFFECT} = OwnEffect(…), see docs/own-effect.md")
+    return stated
