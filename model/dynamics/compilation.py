@@ -2,16 +2,22 @@
 
 numba decides whether cached code is still good by the source file of the function alone, not by the files of
 the functions it calls: after an edit of the dynamics it would go on running the old dynamics inside an
-unchanged simulation kernel. The cache is therefore kept in a folder named by a hash of all sources of the
-model, so that any edit gives a fresh one.
+unchanged simulation kernel. The machine code of a function is therefore kept in a folder named by a hash of its
+module and of every module of ours that this one reaches by imports: an edit of any of them gives a fresh folder, an
+edit of a report does not. What is compiled must take functions and constants by import, never by name at run time.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
+import importlib
 import shutil
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from importlib.util import resolve_name
 from pathlib import Path
 from typing import Any
 
@@ -19,33 +25,90 @@ import numba
 import platformdirs
 
 CACHE_DAYS = 30
-"""Caches of older sources that have not been touched for this long are removed."""
+"""Caches of older sources that have not been written for this long are removed."""
 
-_SOURCES = Path(__file__).resolve().parents[1]
+PACKAGES = ("model", "daq", "firmware_protocol")
+"""Where compiled code may reach of ours. numba itself watches its own version and the processor."""
+
+_ROOT = Path(__file__).resolve().parents[2]
 _numba_settings: Any = numba.config
 _PARENT = Path(_numba_settings.CACHE_DIR or platformdirs.user_cache_path("ma2000-daq") / "compiled")
 
 
-def source_hash(folder: Path = _SOURCES) -> str:
-    """Hash of every Python source below `folder`, names included, as 16 hexadecimal digits."""
+def dependencies(module: str, root: Path = _ROOT) -> dict[str, Path]:
+    """Sources that a module of ours reaches by imports, itself and the packages around them included, by name.
+
+    Imports inside functions and for type checking count too. Empty for a module that does not lie below `root`.
+    """
+    found: dict[str, Path] = {}
+    to_do = [module]
+    while to_do:
+        name = to_do.pop()
+        path = None if name in found or name.partition(".")[0] not in PACKAGES else _source(name, root)
+        if path is not None:
+            found[name] = path
+            to_do += [name.rpartition(".")[0], *_imports(name, path)]
+    return found
+
+
+def source_hash(module: str, root: Path = _ROOT) -> str:
+    """Hash of the sources that a module reaches, names included, as 16 hexadecimal digits.
+
+    For a module from elsewhere, a user's own: of its file, where it has been imported, and of all of `model`.
+    """
+    sources = dependencies(module, root)
+    if not sources:
+        sources = {path.relative_to(root).as_posix(): path for path in root.joinpath("model").rglob("*.py")}
+        own = getattr(sys.modules.get(module), "__file__", None)
+        if own is not None:
+            sources[module] = Path(own)
     digest = hashlib.sha256()
-    for path in sorted(folder.rglob("*.py")):
-        digest.update(path.relative_to(folder).as_posix().encode())
-        digest.update(path.read_bytes())
+    for name, path in sorted(sources.items()):
+        digest.update(name.encode() + b"\0")
+        digest.update(path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 
 
-def cache_folder() -> Path:
-    """Folder of the compiled code of these very sources; NUMBA_CACHE_DIR, where set, moves its parent."""
-    return _PARENT / source_hash()
-
-
-def _use_cache_folder() -> None:
-    folder = cache_folder()
+@cache
+def cache_folder(module: str) -> Path:
+    """Folder of the compiled code of a module as it is now; NUMBA_CACHE_DIR, where set, moves its parent."""
+    folder = _PARENT / source_hash(module)
     if not folder.exists():
         folder.mkdir(parents=True, exist_ok=True)
         _remove_old(_PARENT, time.time() - CACHE_DAYS * 86_400)
-    _numba_settings.CACHE_DIR = str(folder)
+    return folder
+
+
+def _source(module: str, root: Path) -> Path | None:
+    """File of a module or a package; None where the name is that of something inside a module."""
+    path = root.joinpath(*module.split("."))
+    return next((p for p in (path.with_suffix(".py"), path / "__init__.py") if p.is_file()), None)
+
+
+@cache
+def _imports_of_text(module: str, is_package: bool, text: bytes) -> tuple[str, ...]:
+    package = module if is_package else module.rpartition(".")[0]
+    names = []
+    for statement in _import_statements(ast.parse(text).body):
+        if isinstance(statement, ast.Import):
+            names += [alias.name for alias in statement.names]
+        else:
+            origin = resolve_name("." * statement.level + (statement.module or ""), package)
+            names += [origin, *(f"{origin}.{alias.name}" for alias in statement.names)]
+    return tuple(names)
+
+
+def _imports(module: str, path: Path) -> tuple[str, ...]:
+    """Names that a module may import: of `from a import b` both a and a.b, which is a module or something in one."""
+    return _imports_of_text(module, path.name == "__init__.py", path.read_bytes())
+
+
+def _import_statements(statements: Sequence[ast.AST]) -> Iterator[ast.Import | ast.ImportFrom]:
+    for statement in statements:
+        if isinstance(statement, ast.Import | ast.ImportFrom):
+            yield statement
+        for block in ("body", "orelse", "finalbody", "handlers", "cases"):
+            yield from _import_statements(getattr(statement, block, ()))
 
 
 def _remove_old(parent: Path, before: float) -> None:
@@ -55,24 +118,45 @@ def _remove_old(parent: Path, before: float) -> None:
             shutil.rmtree(sibling, ignore_errors=True)
 
 
-def compiled(function: Callable[..., Any]) -> Any:
-    """Compile a module-level function to machine code, cached on disk.
+def _compile(function: Callable[..., Any], *, cached: bool, **options: Any) -> Any:
+    """Division by zero gives inf or nan instead of raising, and a product may be fused with a sum, as a C compiler
+    does with -march=native: results repeat to the bit on one machine, not across machines."""
+    if cached:
+        _numba_settings.CACHE_DIR = str(cache_folder(function.__module__))  # read when the function is decorated
+    return numba.njit(cache=cached, error_model="numpy", fastmath={"contract"}, **options)(function)
 
-    Division by zero gives inf or nan instead of raising, and a product may be fused with a sum, as a C
-    compiler does with -march=native: results repeat to the bit on one machine, not across machines.
+
+def compiled(function: Callable[..., Any], *, nogil: bool = False) -> Any:
+    """Compile a module-level function that Python calls to machine code, cached on disk.
+
+    Other threads run beside it with `nogil`.
     """
-    return numba.njit(cache=True, error_model="numpy", fastmath={"contract"})(function)
+    return _compile(function, cached=True, nogil=nogil)
 
 
 def internal(function: Callable[..., Any]) -> Any:
-    """As `compiled`, for functions that only compiled code calls: no entry from Python, so less to compile."""
-    without_entry: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # options its stubs do not list
-    return numba.njit(cache=True, error_model="numpy", fastmath={"contract"}, **without_entry)(function)
+    """Compile a function that only compiled code calls: no entry from Python, and kept only within its callers."""
+    return _compile(function, cached=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """As `compiled`, for small scalar functions that must disappear into their caller."""
-    return numba.njit(cache=True, error_model="numpy", fastmath={"contract"}, forceinline=True)(function)
+    """Compile a small scalar function that must disappear into its caller."""
+    return _compile(function, cached=False, forceinline=True)
 
 
-_use_cache_folder()
+def _import_without_looking_for_blas() -> None:
+    """numba imports scipy.linalg at its first compilation, to learn whether there is a BLAS: a fifth of a first use.
+
+    Nothing here uses one, and what multiplies matrices in a user's own effect asks for it again by itself.
+    """
+    name = "scipy.linalg.cython_blas"
+    if name in sys.modules:
+        return
+    sys.modules[name] = None  # type: ignore[assignment]  # the import system's way to say that there is none
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        del sys.modules[name]
+
+
+_import_without_looking_for_blas()

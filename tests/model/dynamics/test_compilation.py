@@ -1,28 +1,112 @@
-"""Compiled code is kept apart for every state of the sources."""
+"""Compiled code is kept apart for every state of the sources it is made of, and of no others."""
 
 from __future__ import annotations
 
+import ast
 import os
 from pathlib import Path
 
-import numba
+import pytest
 
-from model.dynamics.compilation import CACHE_DAYS, _remove_old, cache_folder, source_hash
+import model
+from model.dynamics import compilation, recursive
+from model.dynamics.compilation import CACHE_DAYS, _remove_old, cache_folder, dependencies, source_hash
+from model.simulation import kernel
+
+SOURCES = {
+    "model/__init__.py": "",
+    "model/dynamics/__init__.py": "GRAVITY = 9.8\n",
+    "model/dynamics/arm.py": "from model.dynamics.constants import PI\ndef torque(): ...\n",
+    "model/dynamics/constants.py": "PI = 3.14\n",
+    "model/dynamics/friction.py": "LEVEL = 1.0\n",
+    "model/simulation/__init__.py": "",
+    "model/simulation/kernel.py": (
+        "import numpy as np\n"
+        "from model.dynamics import (\n    arm,\n    GRAVITY,\n)\n"
+        "def run():\n    try:\n        from ..dynamics.friction import LEVEL\n    except ImportError:\n        pass\n"
+    ),
+    "model/reports/__init__.py": "",
+    "model/reports/page.py": "from model.simulation.kernel import run\n",
+    "daq/__init__.py": "",
+    "numpy.py": "no module of ours\n",
+}
+REACHED = {name for name in SOURCES if name not in ("model/reports/__init__.py", "model/reports/page.py", "numpy.py")}
+REACHED -= {"daq/__init__.py"}
 
 
-def test_any_edit_gives_another_hash(tmp_path: Path) -> None:
-    source = tmp_path / "physics.py"
-    source.write_text("gravity = 9.8\n")
-    before = source_hash(tmp_path)
-    source.write_text("gravity = 9.9\n")
-    edited = source_hash(tmp_path)
-    source.rename(tmp_path / "renamed.py")
-    assert len({before, edited, source_hash(tmp_path)}) == 3
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """A house of modules: a kernel, what it reaches, and a report that reaches the kernel."""
+    for name, text in SOURCES.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return tmp_path
+
+
+def test_a_kernel_depends_on_what_it_imports_wherever_it_does_so(root: Path) -> None:
+    found = dependencies("model.simulation.kernel", root)
+    assert {path.relative_to(root).as_posix() for path in found.values()} == REACHED
+
+
+@pytest.mark.parametrize("name", sorted(SOURCES))
+def test_an_edit_of_what_is_compiled_gives_another_key_and_an_edit_elsewhere_does_not(root: Path, name: str) -> None:
+    before = source_hash("model.simulation.kernel", root)
+    path = root / name
+    path.write_text(path.read_text() + "\nMORE = 1\n")
+    assert (source_hash("model.simulation.kernel", root) != before) == (name in REACHED)
+
+
+def test_a_module_that_becomes_a_package_gives_another_key(root: Path) -> None:
+    before = source_hash("model.simulation.kernel", root)
+    module = root / "model/dynamics/arm.py"
+    text = module.read_text()
+    module.unlink()
+    (root / "model/dynamics/arm").mkdir()
+    (root / "model/dynamics/arm/__init__.py").write_text(text + "from model.reports import page\n")
+    assert source_hash("model.simulation.kernel", root) != before
+    assert "model.reports.page" in dependencies("model.simulation.kernel", root)
+
+
+def test_a_module_of_the_users_own_depends_on_the_whole_model(root: Path) -> None:
+    before = source_hash("drag_of_my_arm", root)
+    report = root / "model/reports/page.py"
+    report.write_text(report.read_text() + "\nMORE = 1\n")
+    assert source_hash("drag_of_my_arm", root) != before
+
+
+def test_every_global_that_the_kernels_reach_comes_from_a_module_of_the_key() -> None:
+    """What compiled code refers to is followed at run time and compared with what the imports say."""
+    reached = dependencies("model.simulation.kernel")
+    for name in (m for m in reached if m.startswith("model.")):
+        namespace = vars(__import__(name, fromlist=["_"]))
+        of_ours = {getattr(value, "__module__", None) or "" for value in namespace.values()}
+        assert {m for m in of_ours if m.startswith("model.")} <= set(reached), name
+
+
+def test_compiled_modules_take_nothing_by_name_at_run_time() -> None:
+    folder = Path(model.__file__).parent
+    for path in dependencies("model.simulation.kernel").values():
+        if path.is_relative_to(folder) and path.name != "compilation.py":
+            called = {
+                ast.unparse(node.func) for node in ast.walk(ast.parse(path.read_bytes())) if isinstance(node, ast.Call)
+            }
+            assert not called & {"import_module", "importlib.import_module", "__import__", "setattr", "globals"}, path
+
+
+def test_the_simulation_does_not_depend_on_reports_and_fits() -> None:
+    reached = dependencies("model.simulation.kernel")
+    assert {"model.dynamics.recursive", "model.drives.amplifier", "model.machine_model.layout"} <= set(reached)
+    assert not [m for m in reached if m.startswith(("model.reports", "model.fitting", "model.thesis", "daq."))]
 
 
 def test_numba_caches_into_the_folder_of_these_sources() -> None:
-    assert Path(numba.config.CACHE_DIR).name == source_hash()
-    assert cache_folder().name == source_hash()
+    for function, module in ((kernel.run_closed_form, "kernel"), (recursive.forward_dynamics, "recursive")):
+        assert function.py_func.__module__.endswith(module)
+        assert Path(function.stats.cache_path).parent == cache_folder(function.py_func.__module__)
+    assert cache_folder(kernel.__name__).name == source_hash(kernel.__name__)
+    assert cache_folder(kernel.__name__) != cache_folder(recursive.__name__)
+    assert cache_folder(kernel.__name__).parent == compilation._PARENT
 
 
 def test_only_old_caches_are_removed(tmp_path: Path) -> None:
