@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any, cast
 
 from mock_controller.board import default_board
-from mock_controller.hidden.arm import HiddenArm, Load, draw_arm, loaded
+from mock_controller.hidden.arm import LOAD_KG, HiddenArm, Load, draw_arm, loaded
 from mock_controller.hidden.experiment import BUILT_IN, Experiment, read_experiment
-from mock_controller.hidden.separation import MOST_REFITS, Priors, Tangents, separation, tangents
+from mock_controller.hidden.separation import MOST_REFITS, Priors, Tangents, seen, separation, tangents
 from mock_controller.plant import default_plant
 
 
@@ -49,29 +49,31 @@ def detectability(arm: HiddenArm, experiment: Experiment, known: Tangents, refit
     """d′ of all effects of an arm together (0 for a clean one), and of each while the others act."""
     plant, board = default_plant(), default_board()
     if not arm.effects:
-        return {"seed": arm.seed, "d_prime": 0.0, "effects": []}
+        return {"seed": arm.seed, "load_kg": LOAD_KG[arm.load], "d_prime": 0.0, "effects": []}
     parts = arm.parts(plant, board)
-    together = separation(parts, experiment, known, refits=refits)
+    present = seen(parts, experiment)
+    together = separation(parts, experiment, known, refits=refits, present=present)
     alone = (
         [together]
         if len(arm.effects) == 1
         else [
-            separation(parts, experiment, known, arm.modifications(leave_out=index), refits)
+            separation(parts, experiment, known, arm.modifications(leave_out=index), refits, present)
             for index in range(len(arm.effects))
         ]
     )
     return {
         "seed": arm.seed,
+        "load_kg": LOAD_KG[arm.load],
         "d_prime": together.d_prime,
         "effects": [
             {
                 "effect": effect.name,
                 "joints": list(effect.joints),
-                "d_prime": seen.d_prime,
-                "before_refit": seen.before_refit,
-                "refit_moved": {name: value for name, value in seen.moved.items() if abs(value) > 1.0},
+                "d_prime": found.d_prime,
+                "before_refit": found.before_refit,
+                "refit_moved": {name: value for name, value in found.moved.items() if abs(value) > 1.0},
             }
-            for effect, seen in zip(arm.effects, alone, strict=True)
+            for effect, found in zip(arm.effects, alone, strict=True)
         ],
     }
 

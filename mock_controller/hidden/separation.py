@@ -12,6 +12,7 @@ J is taken at the data file's arm by finite differences of this very plant; pote
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -36,15 +37,15 @@ from mock_controller.hidden.tolerances import (
     harmonic_deviation,
     tolerances,
 )
-from mock_controller.modifications.controller import InputDelay
-from mock_controller.modifications.interface import Modification
-from mock_controller.plant import PlantParameters
+from mock_controller.modifications.interface import ChangesTransmission, Modification, of_kind
+from mock_controller.plant import STEP_US, PlantParameters
 
 Priors = Literal["stated", "drawn"]
 MODELLED = 3
 """Joints 1 to 3 are looked at; the others are held."""
-_TANGENT_STEP_US = 2000
-"""Steps of the plant for the tangents: four digits of a derivative are enough, and it takes half the time."""
+_COARSE_STEP_US = 2000
+"""Steps of the plant where four digits of a difference are enough: it takes half the time."""
+_TANGENT_STEP_US = _COARSE_STEP_US
 _LARGEST_STEP = 0.1
 """Fraction by which a constant is moved at most: wide priors are followed along the tangent."""
 _DELAY_STEP_S = 2e-3
@@ -59,6 +60,8 @@ _SMALL_MOVE = 0.5
 """Standard deviations within which the tangents are trusted without looking."""
 _SETTLED = 0.95
 """A refit that leaves more than this share of the cost is the last."""
+_AS_FORETOLD = 0.03
+"""A run that leaves what the tangents have foretold, d′ to this share, shows that they hold there: it is the last."""
 _LEAST_FRACTION, _MOST_FRACTION = -0.9, 5.0
 """Constants are moved by no more than these fractions of their values."""
 _EARLIEST_S = 5e-3
@@ -139,7 +142,10 @@ def tangents(
     )
     if kept is not None:
         kept.parent.mkdir(parents=True, exist_ok=True)
-        np.savez(kept, names=np.array(found.names), matrix=found.matrix, deviations=found.deviations)
+        # Written aside and renamed: others may look for the file at this moment.
+        aside = kept.with_suffix(f".{os.getpid()}.npz")
+        np.savez(aside, names=np.array(found.names), matrix=found.matrix, deviations=found.deviations)
+        aside.replace(kept)
     return found
 
 
@@ -149,20 +155,25 @@ def separation(
     known: Tangents,
     without: tuple[Modification, ...] = (),
     refits: int = MOST_REFITS,
+    present: NDArray[np.float64] | None = None,
 ) -> Separation:
     """d′ between `parts` and the same arm with the modifications `without` only (by default none).
 
-    The refit goes along the tangents, then looks where that has led and goes on, up to `refits` times: a strong effect
-    that tolerances can imitate is far from where the tangents were taken. Where some can imitate it exactly, the refit
-    also starts from those.
+    `present`: what `seen` has given for these parts, where that is known.
+
+    The refit goes along the tangents, then looks where that has led. Where less is left than the tangents have
+    foretold, or more, it goes on, up to `refits` times: a strong effect that tolerances can imitate is far from where
+    the tangents were taken. Where some can imitate it exactly, the refit also starts from those.
     """
     one = reading_deviation(parts.board)
-    present = readings(parts, experiment)[:, :MODELLED]
+    step_us = _step_length(parts)
+    present = seen(parts, experiment) if present is None else present
     sound = replace(parts, modifications=without)
 
     def left_at(moved: NDArray[np.float64]) -> NDArray[np.float64]:
-        absent = readings(_moved(sound, known, moved), experiment)[:, :MODELLED]
-        left: NDArray[np.float64] = ((present - absent) / one).ravel()
+        there, rest = _moved(sound, known, moved, step_us)
+        absent = readings(there, experiment, step_us=step_us)[:, :MODELLED]
+        left: NDArray[np.float64] = ((present - absent) / one).ravel() - known.matrix @ rest
         return left
 
     nowhere = np.zeros(len(known.names))
@@ -170,9 +181,14 @@ def separation(
     found = project(apart, known)
     if refits == 0 or max(map(abs, found.moved.values()), default=0.0) < _SMALL_MOVE:
         return found
-    refitted = _refitted(apart, nowhere, left_at, known, refits)
     hidden = [effect for effect in parts.modifications if effect not in without]
     imitating = imitation(parts.plant, hidden)
+    looked = _looked(found, left_at, known)
+    if not imitating and abs(looked.d_prime - found.d_prime) <= _AS_FORETOLD * found.d_prime:
+        return replace(looked, before_refit=found.before_refit)
+    refitted = _refitted(apart, nowhere, left_at, known, refits)
+    if looked.d_prime < refitted.d_prime:
+        refitted = looked
     if imitating:
         there = known.within_reach(np.array([imitating.get(name, 0.0) for name in known.names]) / known.deviations)
         again = _refitted(left_at(there), there, left_at, known, refits)
@@ -184,6 +200,25 @@ def project(difference: NDArray[np.float64], known: Tangents) -> Separation:
     """d′ of a difference of readings (in their standard deviations, periods·3) after one refit along the tangents."""
     moved = _step(difference, np.zeros(len(known.names)), known.matrix)
     return _told(float(np.linalg.norm(difference)), difference - known.matrix @ moved, moved, known)
+
+
+def _looked(
+    found: Separation, left_at: Callable[[NDArray[np.float64]], NDArray[np.float64]], known: Tangents
+) -> Separation:
+    """d′ by a run of the arm to which a refit along the tangents has led."""
+    there = known.within_reach(np.array(list(found.moved.values())))
+    return _told(0.0, left_at(there), there, known)
+
+
+def seen(parts: LoopParts, experiment: Experiment) -> NDArray[np.float64]:
+    """Readings (counts, (periods, MODELLED)) of the arm with all that it has."""
+    return readings(parts, experiment, step_us=_step_length(parts))[:, :MODELLED]
+
+
+def _step_length(parts: LoopParts) -> int:
+    """Steps of the plant (µs): coarse ones where the drive changes between them and no gear gives."""
+    fine = parts.board.timing.computing_delay % _COARSE_STEP_US or of_kind(parts.modifications, ChangesTransmission)
+    return STEP_US if fine else _COARSE_STEP_US
 
 
 def _refitted(
@@ -231,21 +266,29 @@ def _told(before: float, left: NDArray[np.float64], moved: NDArray[np.float64], 
     return Separation(float(np.sqrt(squared)), before, by_name)
 
 
-def _moved(parts: LoopParts, known: Tangents, moved: NDArray[np.float64]) -> LoopParts:
-    """The arm with its tolerance parameters moved by so many of their standard deviations."""
+def _moved(
+    parts: LoopParts, known: Tangents, moved: NDArray[np.float64], step_us: int
+) -> tuple[LoopParts, NDArray[np.float64]]:
+    """The arm with its tolerance parameters moved by so many of their standard deviations.
+
+    Also what is left of the moves: the computing delay is moved by whole steps of the plant.
+    """
+    rest = np.zeros(len(known.names))
     deviations = dict(zip(known.names, (moved * known.deviations).tolist(), strict=True))
     if not any(deviations.values()):
-        return parts
-    late = deviations.get("computing_delay", 0.0)
-    whole = math.floor(late * 1e3) * 1e-3
+        return parts, rest
+    late = deviations["computing_delay"]
+    whole = round(late * 1e6 / step_us) * step_us * 1e-6
     deviations["computing_delay"] = whole
+    delay = known.names.index("computing_delay")
+    rest[delay] = (late - whole) / known.deviations[delay]
     plant, board = deviating_plant(parts.plant, deviations), deviating_board(parts.board, deviations)
-    effects: list[Modification] = [InputDelay(joint, late - whole) for joint in range(1, MODELLED + 1)]
+    effects: list[Modification] = []
     for joint in range(1, MODELLED + 1):
         for harmonic in HARMONICS:
             sine, cosine = (deviations[_harmonic_name(joint, share, harmonic)] for share in ("sine", "cosine"))
             effects.append(LinearityHarmonic(joint, harmonic, sine, cosine))
-    return LoopParts(plant, board, (*parts.modifications, *effects), parts.arm_seed)
+    return LoopParts(plant, board, (*parts.modifications, *effects), parts.arm_seed), rest
 
 
 def _harmonic_name(joint: int, share: str, harmonic: int) -> str:

@@ -38,6 +38,8 @@ from mock_controller.plant.transmission import FreeRotor
 STEP_US = 1000
 """Integration step (µs); halving it changes the default ramp by less than a hundredth of an ADC count."""
 
+_PARTS_OF_A_STEP = 4
+"""Into how many parts a step is cut where a gear gives: the light waist of an upright arm swings against its teeth."""
 _STALL_INERTIA = 1e9
 """Inertia (kg·m²) that holds a stalled joint still against anything the arm can do."""
 
@@ -64,7 +66,10 @@ class Plant:
             parameters = change.change_plant(parameters)
         self.parameters = parameters
         self.step_us = step_us
-        self._step_s = step_us * 1e-6
+        self._inner_us = step_us
+        if of_kind(self._modifications, ChangesTransmission):
+            self._inner_us = max(step_us // _PARTS_OF_A_STEP, 1)
+        self._step_s = self._inner_us * 1e-6
         self._drives = [DriveTrain(joint, self._step_s) for joint in parameters.joints]
         self._rotors = self._free_rotors()
         self._model = build_model(parameters, self._step_s, {index + 1 for index in self._rotors})
@@ -130,7 +135,7 @@ class Plant:
     @property
     def time_us(self) -> int:
         """Simulated time since the reset (µs)."""
-        return self._steps * self.step_us
+        return self._steps * self._inner_us
 
     @property
     def joint_angles(self) -> list[float]:
@@ -182,7 +187,7 @@ class Plant:
             raise PlantError(f"voltages {list(volts_in)}: must be {JOINTS} finite numbers")
         volts = self._motor_volts = self._amplify(volts_in)
         if self._is_modified:
-            for _ in range(steps):
+            for _ in range(steps * (self.step_us // self._inner_us)):
                 self._step_modified(volts)
             return
         pushed = self._pushed_by(volts)
@@ -293,7 +298,7 @@ class Plant:
             if coupling.stiffness > allowed or coupling.damping > damping_allowed:
                 raise PlantError(
                     f"joint {index + 1}: coupling of {coupling.stiffness:g} N·m/rad and {coupling.damping:g} N·m·s/rad "
-                    f"is too hard for steps of {self.step_us} µs: allowed are {allowed:.3g} and {damping_allowed:.3g}"
+                    f"is too hard for steps of {self._inner_us} µs: allowed are {allowed:.3g} and {damping_allowed:.3g}"
                 )
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from mock_controller import detectability
 from mock_controller.board import default_board
+from mock_controller.hidden import separation as hidden_separation
 from mock_controller.hidden.arm import Kind, Load, compose_seed, draw_arm
 from mock_controller.hidden.closed_loop import LoopParts, reading_deviation, readings
 from mock_controller.hidden.experiment import BUILT_IN, Experiment, ExperimentError, read_experiment
@@ -146,7 +147,7 @@ def test_the_command_prints_a_line_an_arm(tmp_path: Path, capsys: pytest.Capture
     clean, pair = compose_seed(4, Kind.CLEAN, Load.NOMINAL), compose_seed(4, Kind.PAIR, Load.NOMINAL)
     assert detectability.main([str(clean), str(pair), "--experiment", str(table), "--refits", "0"]) == 0
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert lines[0] == {"seed": clean, "d_prime": 0.0, "effects": []}
+    assert lines[0] == {"seed": clean, "load_kg": None, "d_prime": 0.0, "effects": []}
     assert [effect["effect"] for effect in lines[1]["effects"]] == [effect.name for effect in draw_arm(pair).effects]
     assert lines[1]["d_prime"] >= 0.0
     assert detectability.main(["99", "--experiment", str(table)]) == 2
@@ -174,3 +175,22 @@ def test_built_in_experiments_last_as_long_as_they_say_and_stay_in_range(name: s
     assert len(experiment.set_points) / 50 == pytest.approx(seconds, abs=0.2)
     steps = np.abs(np.diff(np.array(experiment.set_points), axis=0))
     assert steps.max() <= 15
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("torque_ripple", {"joint": 1, "amplitude": 1.0, "periods": 30}),
+        ("stiction", {"joint": 2, "breakaway": 6.0}),
+        ("wrong_gain", {"joint": 3, "factor": 1.2}),
+        ("joint_compliance", {"joint": 3, "compliance": 1.5e-3, "damping": 0.5}),
+    ],
+)
+def test_looking_less_often_and_in_coarser_steps_gives_the_same(
+    name: str, values: dict[str, float], known: Tangents, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parts = with_effect(name, **values)
+    quick = separation(parts, short(), known)
+    monkeypatch.setattr(hidden_separation, "_AS_FORETOLD", -1.0)
+    monkeypatch.setattr(hidden_separation, "_step_length", lambda _parts: 1000)
+    assert quick.d_prime == pytest.approx(separation(parts, short(), known).d_prime, rel=0.05)

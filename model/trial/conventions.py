@@ -1,0 +1,109 @@
+"""The mock's parameters in the conventions of the model, so that stated intervals can be held against the truth.
+
+The two were written independently: they measure the same quantity from different zeros, with other signs or on the
+other side of a gear. `TRANSLATIONS` says how, effect by effect; `LEFT_OUT` lists what has no counterpart, and why.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+from daq.contracts.machine import DcMotor, Machine
+from model.trial.truth import HiddenEffect, Truth
+
+Values = Mapping[str, float]
+Translation = Callable[[Values, int, Truth, Machine], dict[str, float]]
+
+
+def _same(**names: str) -> Translation:
+    """model name = mock's name, where both mean the same."""
+    return lambda values, _joint, _truth, _machine: {ours: values[theirs] for ours, theirs in names.items()}
+
+
+def _viscous(values: Values, joint: int, truth: Truth, machine: Machine) -> dict[str, float]:
+    """All of the joint's viscous friction, on the motor's side: the machine's with its deviation, and c/n²."""
+    stated = machine.joint(joint).friction.viscous_motor_side
+    present = 0.0 if stated is None else stated.value * (1.0 + truth.deviations[f"viscous_friction_{joint}"])
+    return {"coefficient": present + values["coefficient"] / _gear(machine, joint) ** 2}
+
+
+def _load_dependent(values: Values, joint: int, truth: Truth, machine: Machine) -> dict[str, float]:
+    """The whole arm μ̃ of the joint: the machine's with its deviation, and what was added."""
+    stated = machine.joint(joint).friction.coulomb_arm
+    present = 0.0 if stated is None else stated.value * (1.0 + truth.deviations[f"coulomb_arm_{joint}"])
+    return {"arm": present + values["arm"]}
+
+
+def _supply(values: Values, joint: int, _truth: Truth, machine: Machine) -> dict[str, float]:
+    """The limit that is left."""
+    return {"voltage": _motor(machine, joint).supply_limit.value - values["reduction"]}
+
+
+def _factor(values: Values, _joint: int, _truth: Truth, _machine: Machine) -> dict[str, float]:
+    """A factor as a relative error."""
+    return {"relative": values["factor"] - 1.0}
+
+
+def _tilt(values: Values, _joint: int, _truth: Truth, _machine: Machine) -> dict[str, float]:
+    """The mock turns gravity; the model turns the base, and so gravity the other way."""
+    return {"about_x": -values["about_x"], "about_y": -values["about_y"]}
+
+
+TRANSLATIONS: dict[str, Translation] = {
+    "viscous_friction": _viscous,
+    "coulomb_friction": _same(torque="torque"),
+    "load_dependent_friction": _load_dependent,
+    "stribeck_friction": _same(torque="torque", speed="speed"),
+    "direction_dependent_friction": _same(difference="torque"),
+    "back_emf_error": _factor,
+    "motor_inductance": _same(inductance="inductance"),
+    "dead_zone": _same(width="width"),
+    "supply_limit": _supply,
+    "torque_ripple": _same(cycles="periods"),
+    "gear_loss": _same(loss="loss"),
+    "backlash": _same(gap="play"),
+    "joint_compliance": _same(compliance="compliance"),
+    "link_mass": _same(added="mass"),
+    "centre_of_mass": _same(shift="shift"),
+    "base_tilt": _tilt,
+    "spring_torque": _same(stiffness="stiffness", rest="neutral"),
+    "periodic_disturbance": _same(frequency="frequency"),
+    "potentiometer_gain": _same(relative="error"),
+    "potentiometer_offset": _same(offset="angle"),
+    "input_delay": _same(time="delay"),
+    "wrong_gain": _factor,
+    "lost_set_points": _same(share="share"),
+}
+"""By effect: parameters of the model (the last part of their names) from those of the mock."""
+
+LEFT_OUT: dict[str, str] = {
+    "stiction": "the mock's bond fades with speed, the model's breaks: their breakaway torques are not one quantity",
+    "resistance_drift": "the mock's winding heats with its risen resistance, the model's with the cold one",
+    "payload": "the mock's load has its centre up to 8 cm off, the model's has not: the masses that fit best differ",
+    "potentiometer_nonlinearity": "a loaded divider there, a sine series here",
+    "torque_ripple: sine, cosine": "their phase is that of a reading that potentiometers bend by up to ±0.25 %",
+    "periodic_disturbance: sine, cosine": "their phase counts from the mock's start there, from the record's here",
+    "backlash: damping": "contact damping there, a share of critical damping here; it only shapes the contact",
+    "joint_compliance: damping": "as that of backlash",
+}
+"""Effects, or parameters of them, that no interval is counted for."""
+
+
+def true_parameters(effect: HiddenEffect, joint: int | None, truth: Truth, machine: Machine) -> dict[str, float]:
+    """The truth in the model's parameters (last part of the name), at a joint; empty for what is left out."""
+    translation = TRANSLATIONS.get(effect.known_as)
+    if translation is None:
+        return {}
+    found = translation(effect.at(joint), joint or 0, truth, machine)
+    return {name: value for name, value in found.items() if math.isfinite(value)}
+
+
+def _motor(machine: Machine, joint: int) -> DcMotor:
+    drive = machine.joint(joint).drive
+    assert isinstance(drive, DcMotor)
+    return drive
+
+
+def _gear(machine: Machine, joint: int) -> float:
+    return _motor(machine, joint).gear_ratio.value

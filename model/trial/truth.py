@@ -1,0 +1,84 @@
+"""What an arm had hidden, as `python -m mock_controller.reveal` tells it, and how well it could be seen."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from daq.contracts.effects import effect_names
+
+Kind = Literal["clean", "single", "open_set", "pair", "shared_by_joints", "wrong_priors"]
+
+DETECTABLE = 5.0
+"""d′ from which on an effect counts as detectable."""
+MERGED_FRICTION = "friction"
+"""What all kinds of friction are called where they are merged."""
+FRICTION_OF_MOCK = ("tight_spot", "quadratic_drag", "cable_hysteresis", "ageing_friction")
+"""Effects that only the mock knows and that are friction too."""
+
+
+class _Told(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+
+class HiddenEffect(_Told):
+    """One hidden effect: the mock's name, the shared name (or `unknown_effect`), joints, parameters one set a joint
+    (one set without joints for an effect on the whole arm), strength 0 to 1 within its range of sizes."""
+
+    effect: str
+    known_as: str
+    joints: tuple[int, ...]
+    parameters: tuple[dict[str, float], ...]
+    strength: float
+
+    def at(self, joint: int | None) -> dict[str, float]:
+        """Its parameters at a joint."""
+        return self.parameters[0 if joint is None else self.joints.index(joint)]
+
+
+class Truth(_Told):
+    """An arm revealed. `deviations`: fractions of the data file's values, of the computing delay s."""
+
+    seed: int
+    kind: Kind
+    load: str
+    load_kg: float | None
+    effects: tuple[HiddenEffect, ...]
+    deviations: dict[str, float]
+
+
+class SeenEffect(_Told):
+    """d′ of one effect with the arm's others acting."""
+
+    effect: str
+    d_prime: float
+
+
+class Detectability(_Told):
+    """d′ of an arm's effects together and one by one, computed on the mock's side before any diagnosis."""
+
+    seed: int
+    d_prime: float
+    effects: tuple[SeenEffect, ...] = ()
+
+    @property
+    def every_effect_detectable(self) -> bool:
+        """Whether there is an effect, and each is detectable."""
+        return bool(self.effects) and all(seen.d_prime >= DETECTABLE for seen in self.effects)
+
+
+def merged(name: str) -> str:
+    """The name with all kinds of friction as one."""
+    known = effect_names().get(name)
+    return MERGED_FRICTION if known is not None and known.family == "friction" else name
+
+
+def is_friction(effect: HiddenEffect) -> bool:
+    """Whether it is friction, of the shared list or of the mock's own."""
+    return merged(effect.known_as) == MERGED_FRICTION or effect.effect in FRICTION_OF_MOCK
+
+
+def parse_truth(data: dict[str, Any]) -> Truth:
+    """The truth from one line of `reveal`. Raises pydantic's ValidationError for anything else."""
+    return Truth.model_validate(data)
