@@ -42,7 +42,7 @@ class Engine:
 
         Threads share the work; the compiled code holds no lock of Python's. Results do not depend on their number.
         """
-        from model.simulation.own_torque import own_table
+        from model.simulation.own_table import own_table
 
         shares = vectors[:, : at.SHARED].copy()
         shares[:, at.PERIOD] = np.array([p.period for p in prepared])[which]

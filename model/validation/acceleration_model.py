@@ -22,7 +22,8 @@ from model.machine_model.model import Model
 from model.simulation.dynamics_of_run import accelerate, body_of, friction_levels_of, gravity_of
 from model.simulation.engines import is_rod_arm
 from model.simulation.joint_torques import extra_torque, motor_damping, motor_gain
-from model.simulation.own_torque import own_table, own_torque
+from model.simulation.own_table import own_table
+from model.simulation.own_torque import own_torque
 from model.simulation.period import extra_flags
 from model.simulation.specialised import AnyChain, ClosedForm, entry
 from model.validation.differentiation import smoothed
