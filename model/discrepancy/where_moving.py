@@ -1,0 +1,47 @@
+"""α(t): which parameter would have to move for the model to explain a trace, how much, and with what it moves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from daq.contracts.trace import Trace
+from model.discrepancy.answer import AgainstWhat, MovingParameter
+from model.machine_model import layout as at
+from model.machine_model.model import Model
+from model.validation.names import names_to_validate
+from model.validation.time_domain import Variation, vary_in_time
+
+SHOWN = 5
+"""Parameters, those that explain most of what is left."""
+LEAST_EXPLAINED = 0.02
+"""Share of the residual's energy below which a parameter's variation says nothing."""
+TERMS: dict[str, AgainstWhat] = {
+    "position": "position", "speed": "speed", "magnitude of speed": "speed", "direction": "direction",
+    "load": "position", "drive": "drive", "time": "time",
+}  # fmt: skip
+"""What the time-domain form calls a quantity, and what the answer calls it; gravity's load is a matter of position."""
+
+
+def moving_parameters(model: Model, trace: Trace) -> tuple[MovingParameter, ...]:
+    """The parameters whose variation with time explains most, by the distortion method's time-domain form.
+
+    Empty for a trace without recorded drive, and for a model with a flexible transmission, which that form has not.
+    """
+    if trace.drive is None or (model.flags & at.HAS_FLEXIBILITY).any():
+        return ()
+    names = [n for n in names_to_validate(model) if model.parameter(n).deviation]
+    found = vary_in_time(model, trace, names)
+    chosen = sorted((v for v in found.parameters if v.alone_varying > LEAST_EXPLAINED), key=lambda v: -v.alone_varying)
+    return tuple(_moving(v) for v in chosen[:SHOWN])
+
+
+def _moving(v: Variation) -> MovingParameter:
+    values = np.array([a for a in v.values if a is not None])
+    size = abs(v.value) if v.value != 0.0 else v.expected
+    low, high = np.quantile(values, [0.05, 0.95]) if len(values) else (0.0, 0.0)
+    strongest = next((c for c in v.against if c.significant and c.regressor in TERMS), None)
+    return MovingParameter(
+        parameter=v.name, relative_range=float((high - low) / size),
+        moves_with=None if strongest is None else TERMS[strongest.regressor],
+        correlation=0.0 if strongest is None else float(np.clip(strongest.value, -1.0, 1.0)),
+    )  # fmt: skip

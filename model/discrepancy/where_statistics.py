@@ -1,0 +1,178 @@
+"""Statistics of correlated residuals: how many independent samples a stretch is worth, and means in bins.
+
+Neighbouring residuals of a closed loop are alike, so m samples are not m observations. An autoregression fitted to the
+residual itself (the one that whitening uses) gives its autocorrelation ρ. The mean square of m neighbours is a sum of
+squares weighted by the eigenvalues of their correlation; of many samples it has the spread of one over
+m / (1 + 2 Σ (1 − k/m) ρ_k²) independent ones. The covariance of the mean in one bin with that in another is
+σ² Σ_k ρ_k times the number of sample pairs k apart, one in each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from model.fitting.whitening import fitted_whitener
+
+Floats = NDArray[np.float64]
+
+LONGEST_MEMORY = 12
+"""Samples that the autoregression looks back, at most."""
+LAGS = 100
+"""Samples over which correlation is followed; what lies beyond does not count."""
+LARGEST = 1000.0
+"""Standard deviations; larger significances mean nothing."""
+BISECTIONS = 100
+FEWEST = 3.0
+"""Independent samples that a bin needs to be shown."""
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Of a residual: its variance, and its autocorrelation (LAGS + 1,) beginning with 1."""
+
+    variance: float
+    values: Floats
+
+    def samples_of_square(self, count: int) -> float:
+        """Independent samples that the mean square of `count` neighbours is worth."""
+        lags = np.arange(1, min(count, len(self.values)))
+        return float(count / (1 + 2 * np.sum((1 - lags / count) * self.values[lags] ** 2)))
+
+
+def correlation_of(runs: Sequence[Floats], floor: float) -> Correlation:
+    """Correlation of a residual given as stretches (m,) without gaps; `floor` is its least standard deviation."""
+    whitener = fitted_whitener(runs, LONGEST_MEMORY, floor)
+    every = np.concatenate(runs)
+    variance = max(float(every @ every) / max(len(every), 1), floor**2)
+    response = np.zeros(3 * LAGS)
+    response[0] = 1.0
+    predictor = whitener.predictors[-1]
+    for k in range(1, len(response)):
+        reach = min(k, len(predictor))
+        response[k] = predictor[:reach] @ response[k - reach : k][::-1]
+    covariance = np.array([response[lag:] @ response[: len(response) - lag] for lag in range(LAGS + 1)])
+    return Correlation(variance, covariance / covariance[0])
+
+
+def significance_of_squares(mean_squares: Floats, count: int, correlation: Correlation) -> Floats:
+    """Standard deviations by which mean squares of `count` neighbours (expected: 1) are too large, any shape.
+
+    A mean square of correlated samples is a weighted sum of squares, its weights the eigenvalues of their correlation.
+    Its tail follows by the saddle point (Lugannani and Rice 1980; Barndorff-Nielsen's r*), which holds far out, where
+    matching the variance alone would find noise significant too often.
+    """
+    lags = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    known = np.append(correlation.values, 0.0)[np.minimum(lags, len(correlation.values))]
+    weights = np.maximum(np.linalg.eigvalsh(known), 0.0) / count
+    weights = weights / weights.sum()
+    x = np.maximum(np.asarray(mean_squares, dtype=np.float64), 1e-6)
+    low, high = np.full(x.shape, -0.5 / (weights.max() * 1e-9)), np.full(x.shape, 0.5 / weights.max())
+    for _ in range(BISECTIONS):
+        s = 0.5 * (low + high)
+        above = np.sum(weights / (1 - 2 * weights * s[..., None]), axis=-1) > x
+        low, high = np.where(above, low, s), np.where(above, s, high)
+    s = 0.5 * (low + high)
+    factor = 1 - 2 * weights * s[..., None]
+    generating = -0.5 * np.sum(np.log(factor), axis=-1)
+    curvature = 2 * np.sum((weights / factor) ** 2, axis=-1)
+    return _saddle_point(np.sign(s) * np.sqrt(np.maximum(2 * (s * x - generating), 0.0)), s * np.sqrt(curvature))
+
+
+def significance_of_chi_square(mean_square: float, freedom: float) -> float:
+    """The same of the mean of `freedom` independent squares, by the same approximation in closed form."""
+    x = max(mean_square, 1e-6)
+    w = np.sign(x - 1) * np.sqrt(freedom * max(x - 1 - np.log(x), 0.0))
+    return float(_saddle_point(np.array(w), np.sqrt(0.5 * freedom) * (x - 1)))
+
+
+def chance_significance(trials: int, chance: float = 0.01) -> float:
+    """Standard deviations that the most significant of so many independent trials reaches by chance this often."""
+    return float(stats.norm.isf(chance / max(trials, 1)))
+
+
+def _saddle_point(w: Floats, u: Floats) -> Floats:
+    """r* = w + ln(u/w)/w, a standard Gaussian; near the mean, where that is 0/0, w itself."""
+    far = np.abs(w) > 1e-3
+    safe = np.where(far, w, 1.0)
+    return np.minimum(np.where(far, w + np.log(np.where(far, u, 1.0) / safe) / safe, w), LARGEST)
+
+
+@dataclass(frozen=True)
+class Bins:
+    """Mean of a signal in bins of a quantity, (b,) each; NaN where there are too few samples.
+
+    significance: of the whole dependence, in standard deviations. explained: share of the signal's variance that the
+    bins explain, beyond what as many bins of nothing would.
+    """
+
+    centres: Floats
+    mean: Floats
+    deviation: Floats
+    significance: float
+    explained: float
+
+
+def binned(signal: Floats, quantity: Floats, edges: Floats, stretches: Sequence[slice], floor: float) -> Bins:
+    """Means of a signal (m,) in bins of a quantity (m,), NaN where the quantity does not count.
+
+    The correlation is that of what the bins leave; so a strong dependence does not pass for its own noise. What
+    counts is how the bins differ: a signal that is off by the same everywhere depends on nothing.
+
+    Args:
+        edges: (b + 1,) of the bins. stretches: without gaps. floor: least standard deviation of the signal.
+    """
+    place = np.where(np.isnan(quantity), -1, np.digitize(np.nan_to_num(quantity), edges[1:-1]))
+    member = (place[:, None] == np.arange(len(edges) - 1)).astype(np.float64)
+    kept = np.zeros(len(signal), dtype=bool)
+    for stretch in stretches:
+        kept[stretch] = True
+    member[~kept] = 0.0
+    counts = member.sum(axis=0)
+    means = np.where(counts > 0, member.T @ np.where(kept, signal, 0.0) / np.maximum(counts, 1), 0.0)
+    used = member.sum(axis=1) > 0
+    left = np.where(used, signal - member @ means, 0.0)
+    correlation = correlation_of([left[s] for s in stretches], floor)
+    pairs = sum(_pairs(member[s], correlation.values) for s in stretches)
+    spread = correlation.variance * np.asarray(pairs) / np.maximum(np.outer(counts, counts), 1.0)
+    deviation = np.sqrt(np.maximum(np.diag(spread), 0.0))
+    known = (counts > 0) & (np.square(deviation) < correlation.variance / FEWEST)
+    significance = _significance(means[known], spread[np.ix_(known, known)])
+    explained = _explained(signal[used], left[used], spread, counts)
+    shown = np.where(known, means, np.nan)
+    return Bins(0.5 * (edges[1:] + edges[:-1]), shown, np.where(known, deviation, np.nan), significance, explained)
+
+
+def _pairs(member: Floats, correlation: Floats) -> Floats:
+    """Σ over lags of ρ times the number of pairs of samples, (b, b)."""
+    total = member.T @ member
+    for lag in range(1, min(len(correlation), len(member))):
+        one_way = member[lag:].T @ member[:-lag]
+        total += correlation[lag] * (one_way + one_way.T)
+    return np.asarray(total)
+
+
+def _significance(means: Floats, spread: Floats) -> float:
+    """Of the differences between means with this covariance: their chi-square about the best common value."""
+    if len(means) < 2:
+        return 0.0
+    values, vectors = np.linalg.eigh(spread)
+    useful = values > 1e-9 * max(values.max(), 1e-300)
+    basis = vectors[:, useful].T / np.sqrt(values[useful])[:, None]
+    scores, ones = basis @ means, basis @ np.ones(len(means))
+    scores = scores - ones * (ones @ scores) / (ones @ ones)
+    freedom = max(1, int(useful.sum()) - 1)
+    return max(0.0, significance_of_chi_square(float(scores @ scores) / freedom, freedom))
+
+
+def _explained(signal: Floats, left: Floats, spread: Floats, counts: Floats) -> float:
+    """1 − left/whole about the mean, less the share that means of nothing would take."""
+    whole = float(np.sum((signal - signal.mean()) ** 2)) if len(signal) else 0.0
+    if whole <= 0.0:
+        return 0.0
+    by_chance = float(np.sum(np.diag(spread) * counts))
+    return float(np.clip((whole - float(left @ left) - by_chance) / whole, 0.0, 1.0))
