@@ -19,7 +19,7 @@ from daq.contracts.errors import DaqError, TraceError
 from daq.contracts.machine import load_machine, shipped_machines
 from daq.contracts.trace import Floats, Outcome, Trace, TraceRecord
 from daq.traces import disk
-from daq.traces.naming import new_trace_id
+from daq.traces.naming import trace_id_of
 from daq.traces.recording import software
 
 SIGNALS = ("set_point", "position", "drive", "velocity")
@@ -113,7 +113,7 @@ def _record(path: Path, beside: Beside) -> TraceRecord:
             raise TraceError(f"{toml_path(path)}: machine: {error}") from error
     own_name = machine.name if machine else path.stem
     return TraceRecord(
-        trace_id=new_trace_id(),
+        trace_id=_identity(path),
         created=beside.created or datetime.now(UTC),
         software=software(),
         source=beside.source,
@@ -125,6 +125,14 @@ def _record(path: Path, beside: Beside) -> TraceRecord:
         notes=beside.notes,
         outcome=beside.outcome,
     )
+
+
+def _identity(path: Path) -> str:
+    """Of the file and the TOML beside it, so that a model fitted to them goes on naming them. Raises TraceError."""
+    try:
+        return trace_id_of(*(p.read_bytes() for p in (path, toml_path(path)) if p.exists()))
+    except OSError as error:
+        raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
 
 
 def _joints(path: Path, header: list[str], beside: Beside) -> tuple[int, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import secrets
 from datetime import UTC
@@ -18,6 +19,14 @@ KIND_LENGTH = 40
 def new_trace_id() -> str:
     """Twelve random hexadecimal digits."""
     return secrets.token_hex(ID_DIGITS // 2)
+
+
+def trace_id_of(*contents: bytes) -> str:
+    """Twelve hexadecimal digits that stand for what files contain, wherever they lie."""
+    digest = hashlib.sha256()
+    for content in contents:
+        digest.update(len(content).to_bytes(8, "big") + content)
+    return digest.hexdigest()[:ID_DIGITS]
 
 
 def trace_path(folder: Path, record: TraceRecord) -> Path:

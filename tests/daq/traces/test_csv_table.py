@@ -46,6 +46,20 @@ def test_a_trace_comes_back_from_csv_to_the_bit(tmp_path_factory: pytest.TempPat
         assert getattr(back.record, name) == getattr(about, name), name
 
 
+def test_a_file_has_the_same_identity_wherever_it_lies_and_another_when_it_says_something_else(tmp_path: Path) -> None:
+    trace = read_trace(write(tmp_path / "a.mcap", 3))
+    (tmp_path / "far").mkdir()
+    here, there = export_csv(trace, tmp_path / "b.csv"), export_csv(trace, tmp_path / "far" / "c.csv")
+    identity = import_csv(here).record.trace_id
+    assert len(identity) == 12
+    assert import_csv(here).record.trace_id == import_csv(there).record.trace_id == identity
+    there.write_text(there.read_text().replace("2.01", "2.02", 1))
+    assert import_csv(there).record.trace_id != identity
+    beside = here.with_suffix(".toml")
+    beside.write_text(beside.read_text().replace("0.02", "0.04", 1))
+    assert import_csv(here).record.trace_id != identity
+
+
 def test_the_same_trace_gives_the_same_bytes_and_plain_columns(tmp_path: Path) -> None:
     trace = read_trace(write(tmp_path / "a.mcap", 3))
     first, second = export_csv(trace, tmp_path / "b.csv"), export_csv(trace, tmp_path / "c.csv")
