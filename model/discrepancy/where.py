@@ -94,13 +94,14 @@ def located(
 
 
 def _check(records: Sequence[Record], residuals: Sequence[Floats], deviations: Floats) -> None:
-    if len(records) != len(residuals) or any(
-        r.shape != record.measured.shape for r, record in zip(residuals, records, strict=False)
-    ):
-        raise SpecError(
-            f"residuals of shapes {[r.shape for r in residuals]} for records of shapes "
-            f"{[r.measured.shape for r in records]}: one (m, n) array a record is needed"
-        )
+    if len(records) != len(residuals):
+        raise SpecError(f"{len(residuals)} residuals for {len(records)} records: one (m, n) array a record is needed")
+    for record, residual in zip(records, residuals, strict=True):
+        if residual.shape != record.measured.shape:
+            raise SpecError(
+                f"residual of {record.name} has shape {residual.shape}: one (m, n) array a record is needed, here "
+                f"{record.measured.shape}"
+            )
     if not (np.isfinite(deviations).all() and (deviations > 0).all()):
         raise SpecError(f"deviations of the noise {deviations}: must be positive numbers")
 

@@ -15,6 +15,8 @@ SHOWN = 5
 """Parameters, those that explain most of what is left."""
 LEAST_EXPLAINED = 0.02
 """Share of the residual's energy below which a parameter's variation says nothing."""
+BY_CHANCE = 0.1
+"""Share of the time that noise alone takes α(t) beyond two of its deviations, doubled."""
 TERMS: dict[str, AgainstWhat] = {
     "position": "position", "speed": "speed", "magnitude of speed": "speed", "direction": "direction",
     "load": "position", "drive": "drive", "time": "time",
@@ -31,17 +33,16 @@ def moving_parameters(model: Model, trace: Trace) -> tuple[MovingParameter, ...]
         return ()
     names = [n for n in names_to_validate(model) if model.parameter(n).deviation]
     found = vary_in_time(model, trace, names)
-    chosen = sorted((v for v in found.parameters if v.alone_varying > LEAST_EXPLAINED), key=lambda v: -v.alone_varying)
-    return tuple(_moving(v) for v in chosen[:SHOWN])
+    telling = [v for v in found.parameters if v.alone_varying > LEAST_EXPLAINED and v.significant > BY_CHANCE]
+    return tuple(_moving(v) for v in sorted(telling, key=lambda v: -v.alone_varying)[:SHOWN])
 
 
 def _moving(v: Variation) -> MovingParameter:
-    values = np.array([a for a in v.values if a is not None])
+    """Its range between the 5th and the 95th percentile of a Gaussian, noise taken off, in terms of its value."""
     size = abs(v.value) if v.value != 0.0 else v.expected
-    low, high = np.quantile(values, [0.05, 0.95]) if len(values) else (0.0, 0.0)
     strongest = next((c for c in v.against if c.significant and c.regressor in TERMS), None)
     return MovingParameter(
-        parameter=v.name, relative_range=float((high - low) / size),
+        parameter=v.name, relative_range=2 * 1.645 * v.deviation / size,
         moves_with=None if strongest is None else TERMS[strongest.regressor],
         correlation=0.0 if strongest is None else float(np.clip(strongest.value, -1.0, 1.0)),
     )  # fmt: skip

@@ -1,0 +1,50 @@
+"""The remaining torque: what was put in comes out, at its joint, against what it depends on, and never from noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from model.discrepancy.phases import asked_motion
+from model.discrepancy.remaining import shapes, torque_of
+from model.fitting.records import Record, noise_floor, records_of
+from model.machine_model.model import Model
+from model.simulation.simulate import Options, simulate
+from tests.model.discrepancy.motions import trace_of
+from tests.model.fitting import imagined
+
+JOINT = 3
+STIFFNESS = 1.5
+
+
+@pytest.fixture(scope="module")
+def arm() -> Model:
+    return imagined.arm()
+
+
+def left(arm: Model, record: Record) -> np.ndarray:
+    run = simulate(arm, record.inputs, Options(quantise=False))
+    return np.asarray(record.measured - run.at_samples(run.reading))
+
+
+def test_a_spring_that_the_model_lacks_comes_out_as_a_torque_against_position(arm: Model) -> None:
+    sprung = arm.with_effect("spring_torque", (JOINT,), {"stiffness": STIFFNESS, "rest": -0.4})
+    records = records_of([trace_of(sprung)], arm.machine, "position")
+    deviations = noise_floor(records, arm.machine, "position")
+    residual = left(arm, records[0])
+    found = shapes(arm, records, [residual], deviations)
+    first = found[0]
+    assert (first.joint, first.against, first.torque_unit) == (JOINT, "position", "N·m")
+    assert first.explained > 0.5
+    pairs = [(x, t) for x, t in zip(first.centres, first.torque, strict=True) if t is not None]
+    slope = np.polyfit(*np.array(pairs).T, 1)[0]
+    assert slope == pytest.approx(-STIFFNESS, rel=0.25)
+    torque = torque_of(arm, records[0], residual, deviations)[records[0].runs[0], JOINT - 1]
+    true = -STIFFNESS * (asked_motion(arm, records[0])[records[0].runs[0], JOINT - 1] + 0.4)
+    assert np.corrcoef(torque, true)[0, 1] > 0.85
+
+
+def test_nothing_remains_of_an_arm_that_is_the_model(arm: Model) -> None:
+    records = records_of([trace_of(arm)], arm.machine, "position")
+    deviations = 1.3 * noise_floor(records, arm.machine, "position")
+    assert shapes(arm, records, [left(arm, records[0])], deviations) == ()
