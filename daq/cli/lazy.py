@@ -18,6 +18,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "io": ("daq.cli.process_io", "Process inputs and outputs, and the gripper."),
     "teach": ("daq.cli.teach", "Jog, lead by the nose, steps, and playing back."),
     "calibrate": ("daq.cli.calibrate", "Find what the machine really does."),
+    "serve": ("daq.cli.serve", "Serve experiments and traces to people and programs."),
     "traces": ("daq.cli.traces", "List, show, plot, convert and verify traces."),
     "config": ("daq.cli.config", "Show and check the configuration."),
     "mock": ("daq.cli.mock", "Start a mock controller that others can connect to."),
@@ -27,6 +28,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "compare": ("daq.cli.compare", "Several models beside the same traces."),
     "design": ("daq.cli.design", "Experiments that make parameters best known."),
     "thesis": ("daq.cli.thesis", "The 1991 source reproduced, ours beside the published."),
+    "blind": ("daq.cli.blind", "Effects hidden in the mock, diagnosed blindly, scored."),
     "demo": ("daq.cli.demo", "The ramp step on the mock, from command to plot."),
 }
 

@@ -37,7 +37,8 @@ def _load_dependent(values: Values, joint: int, truth: Truth, machine: Machine) 
 
 def _supply(values: Values, joint: int, _truth: Truth, machine: Machine) -> dict[str, float]:
     """The limit that is left."""
-    return {"voltage": _motor(machine, joint).supply_limit.value - values["reduction"]}
+    limit = _motor(machine, joint).supply_limit
+    return {} if limit is None else {"voltage": limit.value - values["reduction"]}
 
 
 def _factor(values: Values, _joint: int, _truth: Truth, _machine: Machine) -> dict[str, float]:

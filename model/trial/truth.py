@@ -74,9 +74,9 @@ def merged(name: str) -> str:
     return MERGED_FRICTION if known is not None and known.family == "friction" else name
 
 
-def is_friction(effect: HiddenEffect) -> bool:
-    """Whether it is friction, of the shared list or of the mock's own."""
-    return merged(effect.known_as) == MERGED_FRICTION or effect.effect in FRICTION_OF_MOCK
+def is_mock_friction(name: str) -> bool:
+    """Whether an effect that only the mock knows is friction."""
+    return name in FRICTION_OF_MOCK
 
 
 def parse_truth(data: dict[str, Any]) -> Truth:

@@ -1,0 +1,168 @@
+"""The trial, case by case: seen, recorded, diagnosed, sealed, revealed, scored. Each stage is done once and kept."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from daq.cli.trial.experiments import machine_with_load, trial_experiment, write_set_points
+from daq.cli.trial.folder import STAGES, Stage, TrialFolder
+from daq.cli.trial.mock_side import TrialStageError, detect, reveal
+from daq.cli.trial.recording import Recorded, record
+from daq.cli.trial.sealed import DIAGNOSER, SealedAnswer, diagnose_sealed
+from daq.contracts.machine import Machine
+from model.discrepancy.answer import Diagnosis
+from model.machine_model.model import base_model
+from model.trial.score import Score, score, score_of_failure
+from model.trial.table import TrialTable, trial_table
+from model.trial.truth import Detectability, parse_truth
+
+ROBOT_TIME = 60.0
+"""s that a trial with further experiments may spend on them."""
+Tell = Callable[[int, str], None]
+
+
+@dataclass
+class Campaign:
+    """A trial of `seeds`. `machine` is the one whose model the diagnosis begins from, before loads are announced."""
+
+    folder: TrialFolder
+    machine: Machine
+    diagnoser: Sequence[str] = DIAGNOSER
+    until: Stage = "score"
+    _tangents: dict[int, Lock] = field(default_factory=dict)
+
+    def run(self, seeds: Sequence[int], processes: int, tell: Tell) -> None:
+        """Does what is left to do of all cases, several at once; `tell` hears of every case that is done."""
+        self._tangents = {seed % 10: Lock() for seed in seeds}
+        seen_by = "diagnostic" if self.folder.asked.acquire else self.folder.asked.experiment
+        set_points = self.folder.path / f"{seen_by}{self.folder.shard}.csv"
+        write_set_points(trial_experiment(seen_by), self.machine, set_points)
+        with ThreadPoolExecutor(processes) as pool:
+            try:
+                for number, said in enumerate(
+                    pool.map(lambda seed: self._case(seed, set_points), self.folder.in_order(seeds)), start=1
+                ):
+                    tell(number, said)
+            except BaseException:
+                pool.shutdown(cancel_futures=True)
+                raise
+
+    def table(self) -> TrialTable:
+        """Of all cases in the folder that are scored, those of other shards too."""
+        self.folder.reload()
+        scores = [Score.model_validate(row) for row in self.folder.rows("score")]
+        return trial_table(scores, sum(row["outcome"] != "complete" for row in self.folder.rows("record")))
+
+    def _case(self, seed: int, set_points: Path) -> str:
+        """One case through the stages that are left; what to tell about it."""
+        try:
+            for stage in STAGES[: STAGES.index(self.until) + 1]:
+                if self.folder.row(stage, seed) is None and not self._stage(stage, seed, set_points):
+                    break
+        except TrialStageError as error:
+            return f"{self.folder.name_of(seed)}: {error}"
+        return f"{self.folder.name_of(seed)}: done"
+
+    def _stage(self, stage: Stage, seed: int, set_points: Path) -> bool:
+        """Does one stage; False where the case ends there."""
+        if stage == "detect":
+            # The first of a load works out its tangents, which takes a minute; the others read them.
+            with self._tangents[seed % 10]:
+                self.folder.add(stage, detect(seed, set_points, self.folder.path / "tangents"))
+            return True
+        if stage == "record":
+            row = self._record(seed)
+        elif stage == "diagnose":
+            if self._row("record", seed)["outcome"] != "complete":
+                return False
+            row = self._diagnose(seed)
+        else:
+            row = self._score(seed)
+        self.folder.add(stage, row)
+        return True
+
+    def _row(self, stage: Stage, seed: int) -> dict[str, Any]:
+        row = self.folder.row(stage, seed)
+        assert row is not None
+        return row
+
+    def _machine(self, seed: int) -> Machine:
+        """The machine with the load that this arm is announced to carry."""
+        return machine_with_load(self.machine, self._row("detect", seed)["load_kg"])
+
+    def _record(self, seed: int) -> dict[str, Any]:
+        begun = time.monotonic()
+        runs = [self._run(seed, name) for name in (self.folder.asked.experiment, "held-out")]
+        failed = next((run for run in runs if run.outcome != "complete"), None)
+        return {
+            "seed": seed,
+            "case": self.folder.name_of(seed),
+            "outcome": "complete" if failed is None else failed.outcome,
+            "reason": "" if failed is None else failed.reason,
+            "trace": runs[0].file.name,
+            "held_out": runs[1].file.name,
+            "robot_seconds": runs[0].duration,
+            "seconds": time.monotonic() - begun,
+        }
+
+    def _run(self, seed: int, name: str) -> Recorded:
+        return record(seed, name, trial_experiment(name), self._machine(seed), self.folder.path / "traces")
+
+    def _diagnose(self, seed: int) -> dict[str, Any]:
+        """The sealed answer: its file and hash are written before anybody looks at the truth."""
+        recorded, case = self._row("record", seed), self.folder.name_of(seed)
+        traces = [self.folder.path / "traces" / recorded["trace"]]
+        row: dict[str, Any] = {"seed": seed, "case": case}
+        spent, seconds = 0.0, 0.0
+        try:
+            while True:
+                given = self._answer(seed, traces, recorded["held_out"])
+                seconds += given.seconds
+                more = self._further(seed, given, len(traces), spent)
+                if more is None:
+                    break
+                traces.append(more.file)
+                spent += more.duration
+        except TrialStageError as error:
+            return {**row, "failure": str(error), "seconds": seconds}
+        file = self.folder.path / "answers" / f"{case}.json"
+        file.write_bytes(given.text)
+        return {
+            **row, "answer": file.name, "sha256": given.digest, "seconds": seconds,
+            "robot_seconds": recorded["robot_seconds"] + spent, "traces": [trace.name for trace in traces],
+        }  # fmt: skip
+
+    def _answer(self, seed: int, traces: list[Path], held_out: str) -> SealedAnswer:
+        model = base_model(self._machine(seed))
+        return diagnose_sealed(traces, self.folder.path / "traces" / held_out, model, self.diagnoser)
+
+    def _further(self, seed: int, given: SealedAnswer, count: int, spent: float) -> Recorded | None:
+        """The experiment that the answer asks for, run, where that is allowed and there is robot time left."""
+        if not self.folder.asked.acquire:
+            return None
+        answer = Diagnosis.model_validate_json(given.text)
+        asked = answer.next_experiment
+        if answer.verdict == "named" or asked is None or spent + asked.duration > ROBOT_TIME:
+            return None
+        return record(seed, f"further {count}", asked.spec, self._machine(seed), self.folder.path / "traces")
+
+    def _score(self, seed: int) -> dict[str, Any]:
+        """Reveals the truth and scores the answer, which must be the one that was sealed."""
+        sealed = self._row("diagnose", seed)
+        seen = Detectability.model_validate(self._row("detect", seed))
+        if "failure" in sealed:
+            found = score_of_failure(parse_truth(reveal(seed)), seen, sealed["seconds"])
+        else:
+            text = (self.folder.path / "answers" / sealed["answer"]).read_bytes()
+            if sha256(text).hexdigest() != sealed["sha256"]:
+                raise TrialStageError(f"answer {sealed['answer']}: is not the one that was sealed")
+            answer = Diagnosis.model_validate_json(text)
+            found = score(parse_truth(reveal(seed)), seen, answer, self._machine(seed))
+        return found.model_dump(mode="json")

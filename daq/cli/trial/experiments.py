@@ -1,0 +1,53 @@
+"""What the arms of a trial are asked to do."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+from daq.contracts.experiment import ExperimentSpec, Pause, Ramp, Segment, Sequence
+from daq.contracts.machine import Machine
+from daq.contracts.quantity import Quantity
+
+RELATIVE_LOAD_DEVIATION = 0.1
+"""Expected deviation of masses (section 7.4 of the source)."""
+
+
+def trial_experiment(name: str) -> ExperimentSpec:
+    """`diagnostic`: the preset of 55 s. `ramp`: the source's ramp there and back, 8 s. `held-out`: the preset."""
+    from daq.trajectories.presets import preset
+
+    return _ramp_step() if name == "ramp" else preset(name).spec
+
+
+def _ramp_step() -> ExperimentSpec:
+    """The ramp of 21.6° in 0.65 s, joints 1 to 3 together, held, and back."""
+    segments = []
+    for degrees, rest in ((21.6, 3.0), (-21.6, 3.2)):
+        segments.append(Segment(move=Ramp(amplitude=math.radians(degrees), duration=0.65)))
+        segments.append(Segment(move=Pause(duration=rest)))
+    return ExperimentSpec(trajectory=Sequence(segments=tuple(segments)), joints=(1, 2, 3), hold=0.02, name="ramp-step")
+
+
+def write_set_points(spec: ExperimentSpec, machine: Machine, path: Path) -> Path:
+    """The experiment's set points as the mock's side reads them: a line a period, posture units."""
+    from daq.trajectories import plan, start_angles
+
+    motion = plan(spec, machine, start_angles(spec, machine))
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow([f"set_point_{joint}" for joint in range(1, motion.postures.shape[1] + 1)])
+        table.writerows(motion.postures.tolist())
+    return path
+
+
+def machine_with_load(machine: Machine, kilograms: float | None) -> Machine:
+    """The machine with the load that was announced; None: its own."""
+    if kilograms is None or machine.load is None:
+        return machine
+    load = Quantity(
+        value=kilograms, unit="kg", source="announced", low=machine.load.low, high=machine.load.high,
+        deviation=RELATIVE_LOAD_DEVIATION * kilograms,
+    )  # fmt: skip
+    return machine.model_copy(update={"load": load})

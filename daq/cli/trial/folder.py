@@ -1,0 +1,115 @@
+"""A trial's folder: what it was asked, one JSON line a case and stage, traces and answers under random names."""
+
+from __future__ import annotations
+
+import hmac
+import json
+import os
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Lock
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from daq.contracts.errors import SpecError
+
+Stage = Literal["detect", "record", "diagnose", "score"]
+STAGES: tuple[Stage, ...] = ("detect", "record", "diagnose", "score")
+_CAMPAIGN = "trial.json"
+
+
+class Asked(BaseModel):
+    """What a folder's trial is; a resumed one must be the same. `key` makes the names of its cases."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    format: Literal[1] = 1
+    experiment: Literal["diagnostic", "ramp"]
+    acquire: bool
+    registration: dict[str, str] | None
+    """Its file's name, SHA-256, the run, and the commit that the seeds are drawn from."""
+    key: str
+
+
+@dataclass
+class TrialFolder:
+    """The folder of one trial, perhaps shared by several shards, each of which writes lines of its own."""
+
+    path: Path
+    asked: Asked
+    shard: str
+    _rows: dict[Stage, dict[int, dict[str, Any]]] = field(default_factory=dict)
+    _lock: Lock = field(default_factory=Lock)
+
+    @classmethod
+    def open(
+        cls, path: Path, experiment: Literal["diagnostic", "ramp"], acquire: bool, registration: dict[str, str] | None,
+        shard: str,
+    ) -> TrialFolder:  # fmt: skip
+        """The folder, made when it is new. Raises SpecError when it holds another trial."""
+        for part in ("traces", "answers"):
+            (path / part).mkdir(parents=True, exist_ok=True)
+        asked = Asked(experiment=experiment, acquire=acquire, registration=registration, key=secrets.token_hex(16))
+        file = path / _CAMPAIGN
+        # Of shards that begin at once, one writes it.
+        aside = path / f".{_CAMPAIGN}.{os.getpid()}"
+        aside.write_text(asked.model_dump_json(indent=1) + "\n", "utf-8")
+        try:
+            os.link(aside, file)
+        except FileExistsError:
+            present = _read_asked(file)
+            if present.model_copy(update={"key": asked.key}) != asked:
+                raise SpecError(f"{path}: holds a trial of other options; take another folder") from None
+            asked = present
+        finally:
+            aside.unlink()
+        folder = cls(path, asked, shard)
+        folder.reload()
+        return folder
+
+    def reload(self) -> None:
+        """Reads the lines of all shards."""
+        for stage in STAGES:
+            self._rows[stage] = {}
+            for file in sorted(self.path.glob(f"{stage}*.jsonl")):
+                for line in file.read_text("utf-8").splitlines():
+                    try:
+                        row = json.loads(line)
+                    except json.JSONDecodeError:
+                        continue  # the line that a crash cut short: its case is done again
+                    self._rows[stage][row["seed"]] = row
+
+    def row(self, stage: Stage, seed: int) -> dict[str, Any] | None:
+        """What a stage has given for a case."""
+        return self._rows[stage].get(seed)
+
+    def rows(self, stage: Stage) -> list[dict[str, Any]]:
+        """What a stage has given for all cases."""
+        return list(self._rows[stage].values())
+
+    def add(self, stage: Stage, row: dict[str, Any]) -> None:
+        """Writes a line, and waits until it is on the disk."""
+        with self._lock:
+            with (self.path / f"{stage}{self.shard}.jsonl").open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row, ensure_ascii=False) + "\n")
+                file.flush()
+                os.fsync(file.fileno())
+            self._rows[stage][row["seed"]] = row
+
+    def name_of(self, seed: int) -> str:
+        """A case's name: twelve digits that tell nobody without the folder's key anything."""
+        return hmac.new(bytes.fromhex(self.asked.key), str(seed).encode(), "sha256").hexdigest()[:12]
+
+    def in_order(self, seeds: Sequence[int]) -> list[int]:
+        """Cases in the order in which they are run: that of their names, which mixes kinds."""
+        return sorted(set(seeds), key=self.name_of)
+
+
+def _read_asked(file: Path) -> Asked:
+    try:
+        return Asked.model_validate_json(file.read_text("utf-8"))
+    except ValidationError as error:
+        raise SpecError(f"{file}: not a trial's: {error.errors()[0]['msg']}") from error

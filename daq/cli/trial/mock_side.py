@@ -1,0 +1,37 @@
+"""The mock's side of a trial, each a process: how well an arm's effects can be seen, and what they were."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from daq.contracts.errors import DaqError
+
+
+class TrialStageError(DaqError):
+    """A stage of a trial that did not do its work; one line."""
+
+
+def detect(seed: int, set_points: Path, cache: Path) -> dict[str, Any]:
+    """d′ of the arm's effects, one by one and together. Raises TrialStageError."""
+    return _line("mock_controller.detectability", str(seed), "--experiment", str(set_points), "--cache", str(cache))
+
+
+def reveal(seed: int) -> dict[str, Any]:
+    """What the arm hid. Raises TrialStageError."""
+    return _line("mock_controller.reveal", str(seed))
+
+
+def _line(module: str, *arguments: str) -> dict[str, Any]:
+    done = subprocess.run(
+        [sys.executable, "-m", module, *arguments], capture_output=True, text=True, check=False, start_new_session=True
+    )
+    try:
+        line: dict[str, Any] = json.loads(done.stdout)
+    except json.JSONDecodeError:
+        words = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
+        raise TrialStageError(f"{module} ended with code {done.returncode}: {words}") from None
+    return line

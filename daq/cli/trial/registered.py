@@ -1,0 +1,78 @@
+"""What a registration file is held against: the source tree as it is, and the commit that registered it."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterable
+from hashlib import sha256
+from pathlib import Path
+
+import daq
+from daq.contracts.errors import SpecError
+from model.trial.registration import Registration, parse_registration
+
+REGISTERED = (
+    "model",
+    "mock_controller",
+    "firmware_protocol",
+    "daq/contracts",
+    "daq/trajectories",
+    "daq/runner",
+    "daq/cli/trial",
+)
+"""Parts of the source tree that decide the outcome."""
+_SUFFIXES = (".py", ".toml", ".json", ".csv")
+
+
+def source_tree() -> Path:
+    """The folder that holds the packages."""
+    return Path(daq.__file__).resolve().parents[1]
+
+
+def tree_hashes(paths: Iterable[str] = REGISTERED) -> dict[str, str]:
+    """SHA-256 of files, and of all source files in folders with their names, by path. Raises SpecError."""
+    root = source_tree()
+    return {path: _hash(root, root / path) for path in paths}
+
+
+def _hash(root: Path, path: Path) -> str:
+    if path.is_file():
+        return sha256(path.read_bytes()).hexdigest()
+    if not path.is_dir():
+        raise SpecError(f"{path}: a registered path that is not there")
+    found = sha256()
+    files = (file for file in path.rglob("*") if file.suffix in _SUFFIXES and "__pycache__" not in file.parts)
+    for file in sorted(files):
+        found.update(f"{file.relative_to(root).as_posix()}\0{sha256(file.read_bytes()).hexdigest()}\n".encode())
+    return found.hexdigest()
+
+
+def read_registration(path: Path) -> tuple[Registration, str]:
+    """The registration and the commit that last changed it. Raises SpecError unless it is committed as it stands and
+    the code is what it registers."""
+    try:
+        text = path.read_text("utf-8")
+    except OSError as error:
+        raise SpecError(f"registration {path}: cannot be read: {error.strerror}") from error
+    registration = parse_registration(text, str(path))
+    registration.check_hashes(tree_hashes(registration.hashes))
+    return registration, _commit(path)
+
+
+def _commit(path: Path) -> str:
+    if _git(path, "status", "--porcelain", "--", path.name):
+        raise SpecError(f"registration {path}: is not committed as it stands; the commit's hash draws the seeds")
+    commit = _git(path, "log", "-1", "--format=%H", "--", path.name)
+    if not commit:
+        raise SpecError(f"registration {path}: is in no commit; its hash draws the seeds")
+    return commit
+
+
+def _git(path: Path, *arguments: str) -> str:
+    try:
+        done = subprocess.run(
+            ["git", *arguments], cwd=path.resolve().parent, capture_output=True, text=True, check=True
+        )
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise SpecError(f"registration {path}: its commit cannot be asked for: {error}") from error
+    return done.stdout.strip()

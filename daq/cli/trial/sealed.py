@@ -1,0 +1,74 @@
+"""Diagnosis as a process that is given trace files and a model, and nothing else."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from daq.cli.trial.mock_side import TrialStageError
+from model.machine_model.model import Model
+from model.machine_model.model_file import save_model
+
+MODEL, ANSWER, HELD_OUT = "model.json", "answer.json", "held-out.mcap"
+TIME_LIMIT = 600.0
+"""s after which a diagnosis counts as failed."""
+_KEPT_VARIABLES = ("PATH", "HOME", "LANG", "LC_ALL", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE", "VIRTUAL_ENV")
+_KEPT_BEGINNINGS = ("NUMBA_", "OMP_", "OPENBLAS_", "MKL_")
+DIAGNOSER = (sys.executable, "-m", "daq.cli.trial.diagnoser")
+
+
+@dataclass(frozen=True)
+class SealedAnswer:
+    """An answer as bytes, with their SHA-256, and the seconds that the process took."""
+
+    text: bytes
+    seconds: float
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the answer as it was given."""
+        return sha256(self.text).hexdigest()
+
+
+def diagnose_sealed(
+    traces: Sequence[Path], holdout: Path | None, model: Model, diagnoser: Sequence[str] = DIAGNOSER
+) -> SealedAnswer:
+    """Starts `diagnoser` in a new folder with copies of the traces and the model; its answer.
+
+    Arguments are those of `diagnoser` alone; the environment is what any program needs to run. Raises TrialStageError.
+    """
+    with tempfile.TemporaryDirectory(prefix="diagnosis-") as name:
+        place = Path(name)
+        for number, trace in enumerate(traces, start=1):
+            shutil.copyfile(trace, place / f"trace-{number}.mcap")
+        if holdout is not None:
+            shutil.copyfile(holdout, place / HELD_OUT)
+        save_model(model, place / MODEL)
+        begun = time.monotonic()
+        try:
+            done = subprocess.run(
+                diagnoser, cwd=place, env=_environment(), stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                check=False, timeout=TIME_LIMIT, start_new_session=True,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            raise TrialStageError(f"no answer within {TIME_LIMIT:g} s") from None
+        seconds = time.monotonic() - begun
+        answer = place / ANSWER
+        if done.returncode or not answer.exists():
+            words = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
+            raise TrialStageError(f"the diagnosis ended with code {done.returncode}: {words}")
+        return SealedAnswer(answer.read_bytes(), seconds)
+
+
+def _environment() -> dict[str, str]:
+    return {
+        key: value for key, value in os.environ.items() if key in _KEPT_VARIABLES or key.startswith(_KEPT_BEGINNINGS)
+    }

@@ -1,0 +1,62 @@
+"""Which arms a trial looks at: the mock's seeds, 100·number + 10·kind + load, and how a registration draws them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from hashlib import sha256
+
+from daq.contracts.errors import SpecError
+
+KINDS: dict[str, int] = {"clean": 1, "single": 2, "open-set": 3, "pair": 4, "shared": 5, "wrong-priors": 6}
+"""Kinds of arms and their digit."""
+LOADS: dict[str, int] = {"nominal": 0, "light": 1, "heavy": 2}
+"""Announced loads and their digit."""
+LOAD_CYCLE = ("nominal", "nominal", "nominal", "light", "heavy")
+"""Loads in turn, by number."""
+_FIRST_DRAWN = 10**6
+"""Numbers below are for tuning and tests."""
+
+
+def parse_numbers(text: str) -> list[int]:
+    """Numbers of arms from `FIRST:LAST` (both included) or `1,2,5`. Raises SpecError."""
+    try:
+        if ":" in text:
+            first, last = (int(part) for part in text.split(":"))
+            numbers = list(range(first, last + 1))
+        else:
+            numbers = [int(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if not numbers or min(numbers) < 0:
+        raise SpecError(f"seeds {text!r}: write FIRST:LAST or numbers with commas, from 0 on")
+    return numbers
+
+
+def parse_choice(text: str, allowed: Iterable[str], what: str) -> tuple[str, ...]:
+    """Words with commas, each one of `allowed`. Raises SpecError."""
+    words = tuple(word.strip() for word in text.split(","))
+    for word in words:
+        if word not in allowed:
+            raise SpecError(f"{what} {word!r}: allowed are {', '.join(allowed)}")
+    return words
+
+
+def compose(number: int, kind: str, load: str) -> int:
+    """The mock's seed for an arm."""
+    return 100 * number + 10 * KINDS[kind] + LOADS[load]
+
+
+def arms(numbers: Sequence[int], kinds: Sequence[str], loads: Sequence[str] = LOAD_CYCLE) -> list[int]:
+    """Seeds of all kinds for each number; the load goes in turn by number."""
+    return [compose(number, kind, loads[number % len(loads)]) for number in numbers for kind in kinds]
+
+
+def drawn_arms(commit: str, cases: dict[str, int], loads: Sequence[str] = LOAD_CYCLE) -> list[int]:
+    """Seeds drawn from the hash of a commit: the n-th of a kind from SHA-256 of `commit kind n`, its load in turn."""
+    found = []
+    for kind, count in cases.items():
+        for index in range(count):
+            digest = sha256(f"{commit} {kind} {index}".encode()).hexdigest()
+            number = _FIRST_DRAWN + int(digest[:12], 16)
+            found.append(compose(number, kind, loads[index % len(loads)]))
+    return found

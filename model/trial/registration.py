@@ -1,0 +1,90 @@
+"""A trial written down before it is run: cases, experiments, and the hashes of the code that is to be judged."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from daq.contracts.errors import SpecError
+from model.trial.arms import KINDS, LOAD_CYCLE, LOADS, drawn_arms
+from model.trial.truth import DETECTABLE
+
+Experiment = Literal["diagnostic", "ramp"]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Run(_Part):
+    """One table of the trial: how many arms of each kind, by which experiment, whether more may be asked for."""
+
+    experiment: Experiment = "diagnostic"
+    acquire: bool = False
+    cases: dict[str, Annotated[int, Field(ge=1)]]
+
+    @field_validator("cases")
+    @classmethod
+    def _known_kinds(cls, cases: dict[str, int]) -> dict[str, int]:
+        for kind in cases:
+            if kind not in KINDS:
+                raise ValueError(f"kind {kind!r}: allowed are {', '.join(KINDS)}")
+        return cases
+
+
+class Registration(_Part):
+    """A registration file. `hashes`: SHA-256 of files and folders of the source tree, by path."""
+
+    version: Literal[1]
+    title: str
+    detectable: float
+    loads: tuple[str, ...] = LOAD_CYCLE
+    runs: dict[str, Run]
+    hashes: dict[str, str]
+
+    @field_validator("detectable")
+    @classmethod
+    def _as_scored(cls, value: float) -> float:
+        if value != DETECTABLE:
+            raise ValueError(f"{value}: the scoring takes d′ ≥ {DETECTABLE:g} as detectable")
+        return value
+
+    @field_validator("loads")
+    @classmethod
+    def _known_loads(cls, loads: tuple[str, ...]) -> tuple[str, ...]:
+        for load in loads:
+            if load not in LOADS:
+                raise ValueError(f"{load!r}: allowed are {', '.join(LOADS)}")
+        return loads
+
+    def run(self, name: str) -> Run:
+        """The run of that name. Raises SpecError."""
+        if name not in self.runs:
+            raise SpecError(f"run {name!r}: the registration has {', '.join(self.runs)}")
+        return self.runs[name]
+
+    def arms(self, name: str, commit: str) -> list[int]:
+        """Seeds of a run, drawn from the commit that registered it."""
+        return drawn_arms(commit, self.run(name).cases, self.loads)
+
+    def check_hashes(self, found: dict[str, str]) -> None:
+        """Raises SpecError when the code is not what was registered."""
+        changed = [path for path, registered in self.hashes.items() if found.get(path) != registered]
+        if changed:
+            raise SpecError(
+                f"{', '.join(changed)}: not as registered; a trial of other code needs a registration of its own"
+            )
+
+
+def parse_registration(text: str, origin: str) -> Registration:
+    """A registration from TOML. Raises SpecError with one line."""
+    try:
+        return Registration.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise SpecError(f"{origin}: no TOML: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise SpecError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}") from error

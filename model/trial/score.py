@@ -1,0 +1,241 @@
+"""One answer beside one truth. docs/trial.md says what counts as right; this is where it is counted."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from daq.contracts.machine import Machine
+from model.discrepancy.answer import Diagnosis, SignalError, Step, Verdict
+from model.trial.conventions import true_parameters
+from model.trial.truth import Detectability, HiddenEffect, Kind, Truth, merged
+
+FIRST = 3
+"""Names that are looked at for "among the first three"."""
+LEAST_EXCESS = 0.1
+"""Held-out variance above the floor, in floors, from which on a share of it that was removed means anything."""
+
+Place = Literal["named", "group", "unknown-effect", "nothing-significant", "failed"]
+
+
+class _Scored(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Covered(_Scored):
+    """A stated interval held against the truth, both in the model's conventions."""
+
+    parameter: str
+    value: float
+    low: float
+    high: float
+    truth: float
+
+    @property
+    def inside(self) -> bool:
+        """Whether the truth is in it."""
+        return self.low <= self.truth <= self.high
+
+
+class Score(_Scored):
+    """What an answer is worth. None: the question does not arise for this case.
+
+    `named_right`: every effect that was there was named, and no other. `merged_right`: the same with all friction kinds
+    as one, for which a group of friction kinds alone is that one name. `in_first`: the effect is among the
+    first three of the first step's ranking. `honest`: for an effect outside the library, no name was given and the
+    answer is "unknown effect" or a group.
+    """
+
+    seed: int
+    kind: Kind
+    load: str
+    effects: tuple[str, ...]
+    known_as: tuple[str, ...]
+    joints: tuple[tuple[int, ...], ...]
+    strengths: tuple[float, ...]
+    d_primes: tuple[float, ...]
+    detectable: bool
+    verdict: Verdict | None
+    """None where the diagnosis failed."""
+    place: Place
+    answered: tuple[str, ...]
+    """Names that were given; of a group, all in it."""
+    named_right: bool | None = None
+    merged_right: bool | None = None
+    in_answer: bool | None = None
+    """The effect was named, or is in the group that was given."""
+    in_first: bool | None = None
+    joint_right: bool | None = None
+    at_least_one: bool | None = None
+    alarm: bool | None = None
+    honest: bool | None = None
+    excess_removed: float | None = None
+    covered: tuple[Covered, ...] = ()
+    seconds: float
+    robot_seconds: float
+
+
+def score(truth: Truth, seen: Detectability, answer: Diagnosis, machine: Machine) -> Score:
+    """The answer's worth. `machine`: with the load that was announced."""
+    names = tuple(effect.known_as for effect in truth.effects)
+    named, group = named_effects(answer), group_of(answer)
+    common = {
+        **_case(truth, seen),
+        "verdict": answer.verdict,
+        "place": _place(answer, named, group),
+        "answered": tuple(dict.fromkeys((*named, *group))),
+        "seconds": answer.seconds,
+        "robot_seconds": answer.robot_seconds,
+    }
+    if truth.kind == "clean":
+        return Score(**common, alarm=answer.verdict != "nothing-significant" or bool(named))
+    if truth.kind == "open_set":
+        return Score(
+            **common,
+            honest=not named and answer.verdict in ("unknown-effect", "ambiguous"),
+            excess_removed=excess_removed(answer),
+        )
+    return Score(
+        **common,
+        named_right=_same_names(names, named) and not group,
+        merged_right=_merged_right(names, named, group),
+        in_answer=set(names) <= {*named, *group},
+        in_first=_in_first(names, answer),
+        at_least_one=bool(set(names) & set(named)),
+        joint_right=_joint_right(truth.effects[0], answer) if len(truth.effects) == 1 else None,
+        excess_removed=excess_removed(answer),
+        covered=_covered(truth, answer, machine) if _same_names(names, named) else (),
+    )
+
+
+def score_of_failure(truth: Truth, seen: Detectability, seconds: float) -> Score:
+    """A diagnosis that gave no answer: wrong in everything that it was asked."""
+    known = truth.kind not in ("clean", "open_set")
+    wrong = False if known else None
+    return Score(
+        **_case(truth, seen),
+        verdict=None,
+        place="failed",
+        answered=(),
+        named_right=wrong,
+        merged_right=wrong,
+        in_answer=wrong,
+        in_first=wrong,
+        at_least_one=wrong,
+        joint_right=False if known and truth.effects[0].joints and len(truth.effects) == 1 else None,
+        alarm=True if truth.kind == "clean" else None,
+        honest=False if truth.kind == "open_set" else None,
+        seconds=seconds,
+        robot_seconds=0.0,
+    )
+
+
+def _case(truth: Truth, seen: Detectability) -> dict[str, Any]:
+    return {
+        "seed": truth.seed,
+        "kind": truth.kind,
+        "load": truth.load,
+        "effects": tuple(effect.effect for effect in truth.effects),
+        "known_as": tuple(effect.known_as for effect in truth.effects),
+        "joints": tuple(effect.joints for effect in truth.effects),
+        "strengths": tuple(effect.strength for effect in truth.effects),
+        "d_primes": tuple(effect.d_prime for effect in seen.effects),
+        "detectable": seen.every_effect_detectable,
+    }
+
+
+def named_effects(answer: Diagnosis) -> tuple[str, ...]:
+    """Effects that were named: of steps that were adopted and gave one name, not a group."""
+    found = [step.effect for step in answer.steps if step.adopted and step.effect is not None and not step.group]
+    return tuple(dict.fromkeys(found))
+
+
+def group_of(answer: Diagnosis) -> tuple[str, ...]:
+    """Effects of the groups that were given instead of a name."""
+    return tuple(dict.fromkeys(candidate.effect for step in answer.steps for candidate in step.group))
+
+
+def excess_removed(answer: Diagnosis) -> float | None:
+    """Share of the held-out variance above the noise floor that all adopted steps removed; each joint in its floors.
+
+    None without a held-out trace, an adopted step, or an excess of LEAST_EXCESS before.
+    """
+    adopted = [step for step in answer.steps if step.adopted and step.rmse_holdout]
+    if not adopted:
+        return None
+    before = _excess(adopted[0].rmse_holdout, after=False)
+    after = _excess(adopted[-1].rmse_holdout, after=True)
+    return None if before < LEAST_EXCESS else 1.0 - after / before
+
+
+def _excess(errors: tuple[SignalError, ...], *, after: bool) -> float:
+    ratios = [((e.after if after else e.before) / e.floor) ** 2 - 1.0 for e in errors if e.floor > 0.0]
+    return sum(ratios) / max(len(ratios), 1)
+
+
+def _place(answer: Diagnosis, named: tuple[str, ...], group: tuple[str, ...]) -> Place:
+    if named:
+        return "named"
+    if group:
+        return "group"
+    return "nothing-significant" if answer.verdict == "nothing-significant" else "unknown-effect"
+
+
+def _same_names(names: tuple[str, ...], named: tuple[str, ...]) -> bool:
+    return set(names) == set(named)
+
+
+def _merged_right(names: tuple[str, ...], named: tuple[str, ...], group: tuple[str, ...]) -> bool:
+    truths, given = {merged(name) for name in names}, {merged(name) for name in named}
+    groups = {merged(name) for name in group}
+    if len(groups) > 1:
+        return False
+    return truths == given | groups
+
+
+def _in_first(names: tuple[str, ...], answer: Diagnosis) -> bool:
+    """The effect, of several any, is among the first names of the ranking that the answer began with."""
+    if not answer.steps:
+        return False
+    ranked = dict.fromkeys(candidate.effect for candidate in answer.steps[0].candidates)
+    own = answer.steps[0].effect
+    first = ([own] if own is not None else []) + [name for name in ranked if name != own]
+    return bool(set(names) & set(first[:FIRST]))
+
+
+def _joint_right(effect: HiddenEffect, answer: Diagnosis) -> bool | None:
+    """Whether the joints are those that the effect acts on; of answers that say there is something."""
+    if not effect.joints or answer.verdict == "nothing-significant" or not answer.steps:
+        return None
+    return _answered_joints(effect, answer.steps) == set(effect.joints)
+
+
+def _answered_joints(effect: HiddenEffect, steps: tuple[Step, ...]) -> set[int]:
+    """Joints of the steps that name the effect; else of the first step, which may say where without saying what."""
+    same = [step for step in steps if step.effect == effect.known_as and (step.adopted or step.group)]
+    if same:
+        return {joint for step in same for joint in step.joints}
+    first = steps[0]
+    if first.joints or first.effect is not None:
+        return set(first.joints)
+    return set() if first.where.joint is None else {first.where.joint}
+
+
+def _covered(truth: Truth, answer: Diagnosis, machine: Machine) -> tuple[Covered, ...]:
+    found: dict[str, Covered] = {}
+    for step in answer.steps:
+        effect = next((e for e in truth.effects if e.known_as == step.effect), None)
+        if effect is None or not step.adopted:
+            continue
+        for joint in effect.joints or (None,):
+            label = None if joint is None else f"joint{joint}"
+            for name, value in true_parameters(effect, joint, truth, machine).items():
+                for key, stated in step.parameters.items():
+                    place, own, last = key.split(".")[0], key.split(".")[-2], key.split(".")[-1]
+                    fits = own == effect.known_as and last == name and label in (None, place)
+                    if fits and stated.low is not None and stated.high is not None:
+                        found[key] = Covered(
+                            parameter=key, value=stated.value, low=stated.low, high=stated.high, truth=value
+                        )
+    return tuple(found.values())
