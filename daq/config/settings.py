@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict, SettingsError
 
 from daq.config.limits import merged_limits
+from daq.config.service import ServiceSettings
 from daq.contracts.errors import SpecError
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine, load_machine
@@ -60,6 +61,7 @@ class Settings(BaseSettings):
 
     robot: RobotSettings = RobotSettings()
     traces: TraceSettings = TraceSettings()
+    server: ServiceSettings = ServiceSettings()
     operator: Annotated[str, Field(max_length=100)] | None = None
 
     @classmethod

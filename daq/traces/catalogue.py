@@ -44,6 +44,8 @@ class TraceSummary(BaseModel):
     samples: int | None = None
     duration: float | None = None
     """s between the first and the last sample."""
+    operator: str | None = None
+    notes: str = ""
     problem: str | None = None
 
 
@@ -150,6 +152,8 @@ def _summary(
         outcome=record.outcome,
         samples=samples,
         duration=duration,
+        operator=record.operator,
+        notes=record.notes,
     )
 
 

@@ -8,7 +8,7 @@ from pydantic import AwareDatetime, Field
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Wire
-from daq.contracts.trace import Outcome
+from daq.contracts.trace import EventKind, Outcome
 
 ExperimentState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
 """`done`: the plan was carried out to its end. `failed`: refused, or ended by a guard. `cancelled`: taken back, or
@@ -105,14 +105,27 @@ class MotionPreview(Wire):
     moving: tuple[int, ...]
     duration: float
     violations: tuple[MotionViolation, ...]
+    marks: tuple[MotionMark, ...] = ()
 
 
 class MotionViolation(Wire):
-    """One limit that a motion breaks. `time` is in s from the start of the record; None for the motion as a whole."""
+    """One limit that a motion breaks: the worst place of one rule and joint (or link, for `floor` and `reach`). `time`
+    in s from the start of the record; `value` and `limit` in rad, rad/s or m, for `posture` in posture units."""
 
+    rule: Literal["finite", "posture", "range", "speed", "step", "floor", "reach"]
+    joint: int
+    time: float
+    value: float | None
+    limit: float | None
     message: str
-    joint: int | None = None
-    time: float | None = None
+
+
+class MotionMark(Wire):
+    """Something that begins or ends during the motion."""
+
+    time: float
+    kind: EventKind
+    message: str
 
 
 MotionPreview.model_rebuild()

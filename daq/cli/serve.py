@@ -1,0 +1,34 @@
+"""`daq serve`: the service, until a signal ends it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from daq.cli.context import console, invocation
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def serve(
+    context: typer.Context,
+    host: Annotated[str | None, typer.Option(help="Address to listen at (default: configured, 127.0.0.1).")] = None,
+    port: Annotated[int | None, typer.Option(min=0, max=65535, help="Port to listen at; 0 for any free one.")] = None,
+) -> None:
+    """Serve experiments, traces and the dashboard to people and programs."""
+    from server.serve import serve as run
+
+    call = invocation(context)
+    settings = call.settings
+    section = settings.server.model_copy(
+        update={key: value for key, value in (("host", host), ("port", port)) if value is not None}
+    )
+    robot = settings.robot.model_copy(update={"port": call.port})
+    run(settings.model_copy(update={"server": section, "robot": robot}), _tell)
+
+
+def _tell(address: str) -> None:
+    console().print(f"serving {address} (Ctrl-C ends it)")
+    print(address, flush=True)

@@ -1,0 +1,45 @@
+"""The configuration of the service: where it listens, where it keeps what is its own, what it may do unattended."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+DEFAULT_PORT = 8300
+
+
+class ServiceSettings(BaseModel):
+    """Section `[server]`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    host: Annotated[str, Field(min_length=1, max_length=253)] = "127.0.0.1"
+    """Address to listen at. Anything but loopback needs tokens (`daq token add`)."""
+    port: Annotated[int, Field(ge=0, le=65535)] = DEFAULT_PORT
+    """0: any free one, which is told."""
+    folder: Path = Path("service")
+    """The database, models and results of jobs."""
+    database: str | None = None
+    """URL of the database; None for a SQLite file in `folder`."""
+    connect_at_start: bool = True
+    """Connecting moves nothing."""
+    unattended: bool = False
+    """Whether the queue may move a real arm while no operator says to be there."""
+    jobs_at_once: Annotated[int, Field(ge=1, le=64)] = 1
+    """Worker processes for fits, validations and comparisons."""
+    history: Annotated[float, Field(ge=10, le=3600)] = 300.0
+    """s of live samples that a client finds when it joins."""
+    names: tuple[Annotated[str, Field(max_length=253)], ...] = ()
+    """Names by which browsers reach this service, beside its address: others are refused."""
+
+    @field_validator("folder")
+    @classmethod
+    def _expanded(cls, folder: Path) -> Path:
+        return folder.expanduser()
+
+    @property
+    def database_url(self) -> str:
+        """Of SQLAlchemy."""
+        return self.database or f"sqlite:///{self.folder.absolute() / 'service.sqlite'}"

@@ -1,0 +1,53 @@
+"""Who calls, and what they may do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from starlette.requests import HTTPConnection
+
+from daq.contracts.service.queue import Role
+from server.problems import ProblemError
+
+
+@dataclass(frozen=True)
+class Caller:
+    """A person or program. `name` is their token's; `local` where no tokens are configured."""
+
+    name: str
+    role: Role
+
+    @property
+    def may_operate(self) -> bool:
+        """Whether they may change anything."""
+        return self.role == "operator"
+
+
+LOCAL = Caller("local", "operator")
+"""Whoever reaches a service on loopback that has no tokens: a user of this computer."""
+
+
+def caller_of(connection: HTTPConnection) -> Caller | None:
+    """Who the gate let in; None where nobody has said who they are."""
+    found: Caller | None = getattr(connection.state, "caller", None)
+    return found
+
+
+def require_viewer(connection: HTTPConnection) -> Caller:
+    """Anybody who may see the robot. Raises a 401."""
+    caller = caller_of(connection)
+    if caller is None:
+        advice = "send the header Authorization: Bearer TOKEN; `daq token add` makes one"
+        raise ProblemError(
+            401, "token-needed", "this service needs a token", advice, (), {"WWW-Authenticate": "Bearer"}
+        )
+    return caller
+
+
+def require_operator(connection: HTTPConnection) -> Caller:
+    """Who may change something. Raises a 401 or a 403."""
+    caller = require_viewer(connection)
+    if not caller.may_operate:
+        line = f"{caller.name} may look, and stop the robot; this needs the role operator"
+        raise ProblemError(403, "operator-needed", line, "ask for a token with the role operator")
+    return caller

@@ -1,0 +1,133 @@
+"""Experiments: submit, list, follow, cancel."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from daq.contracts.service.base import Page
+from daq.contracts.service.experiments import (
+    Experiment,
+    ExperimentChange,
+    ExperimentRequest,
+    ExperimentState,
+    MotionMark,
+    MotionPreview,
+    MotionViolation,
+)
+from daq.safety import Violation, check_plan
+from daq.traces.room import RESERVE
+from daq.trajectories import plan, start_angles
+from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
+from server.problems import PROBLEMS, ProblemError
+from server.services import RobotServices
+
+router = APIRouter(prefix="/robots/{robot}/experiments", tags=["experiments"], responses=PROBLEMS)
+StateFilter = Annotated[list[ExperimentState] | None, Query(description="Only those in one of these states.")]
+
+
+@router.post("", status_code=201, response_model=Experiment, responses={200: {"model": Experiment}})
+def submit_experiment(
+    request: ExperimentRequest,
+    one: RobotPart,
+    who: Operator,
+    response: Response,
+    idempotency_key: IdempotencyKey = None,
+) -> Experiment:
+    """Puts an experiment into the queue. It is checked now, and again when it is run: 422 names what is wrong.
+
+    The same Idempotency-Key gives the same experiment (200), and never a second one.
+    """
+    _require_possible(one, request)
+    _require_room(one)
+    experiment, new = one.queue.submit(request, who.name, idempotency_key)
+    response.status_code = 201 if new else 200
+    response.headers["Location"] = f"/api/v1/robots/{one.robot.name}/experiments/{experiment.id}"
+    return one.queue.as_told(experiment)
+
+
+@router.get("")
+def list_experiments(
+    one: RobotPart,
+    found: ServicesPart,
+    _: Viewer,
+    state: StateFilter = None,
+    schedule: Annotated[str | None, Query(max_length=64)] = None,
+    limit: Limit = 50,
+    cursor: CursorOf = None,
+) -> Page[Experiment]:
+    """Experiments, the newest first."""
+    page = found.experiments.page(one.robot.name, state or (), schedule, cursor, limit)
+    return page.model_copy(update={"items": tuple(one.queue.as_told(item) for item in page.items)})
+
+
+@router.post("/preview")
+def preview_experiment(request: ExperimentRequest, one: RobotPart, _: Viewer) -> MotionPreview:
+    """The motion of an experiment and everything that speaks against it. Nothing is queued, nothing moves."""
+    machine = one.robot.machine
+    motion = plan(request.spec, machine, start_angles(request.spec, machine))
+    violations = check_plan(motion, machine, machine.limits)
+    return MotionPreview(
+        time=tuple(index * motion.period for index in range(len(motion))),
+        set_points=tuple(map(tuple, motion.angles.tolist())),
+        moving=motion.moving,
+        duration=motion.duration,
+        violations=tuple(_told(violation) for violation in violations),
+        marks=tuple(
+            MotionMark(time=mark.index * motion.period, kind=mark.kind, message=mark.message) for mark in motion.marks
+        ),
+    )
+
+
+@router.get("/{experiment}")
+def get_experiment(experiment: Identity, one: RobotPart, found: ServicesPart, _: Viewer) -> Experiment:
+    """One experiment: its state, how far it is, what became of it."""
+    return one.queue.as_told(found.experiments.get(one.robot.name, experiment))
+
+
+@router.patch("/{experiment}")
+def change_experiment(
+    experiment: Identity, change: ExperimentChange, one: RobotPart, found: ServicesPart, who: Operator
+) -> Experiment:
+    """A new priority of one that still waits."""
+    changed = found.experiments.set_priority(one.robot.name, experiment, change.priority)
+    found.tell(one.robot.name, "experiment", f"priority {change.priority}", actor=who.name, experiment=experiment)
+    one.queue.wake()
+    return changed
+
+
+@router.post("/{experiment}/cancel")
+def cancel_experiment(experiment: Identity, one: RobotPart, who: Operator) -> Experiment:
+    """Takes back what waits. One that runs is stopped as by a stop: the arm is frozen and needs a reset."""
+    return one.queue.cancel(experiment, who.name)
+
+
+def _told(violation: Violation) -> MotionViolation:
+    """JSON knows no infinity."""
+    value, limit = (number if math.isfinite(number) else None for number in (violation.value, violation.limit))
+    return MotionViolation(
+        rule=violation.rule, joint=violation.joint, time=violation.time, value=value, limit=limit,
+        message=violation.message,
+    )  # fmt: skip
+
+
+def _require_possible(one: RobotServices, request: ExperimentRequest) -> None:
+    """Raises SpecError, and a 422 for a motion beyond the limits."""
+    machine = one.robot.machine
+    motion = plan(request.spec, machine, start_angles(request.spec, machine))
+    violations = check_plan(motion, machine, machine.limits)
+    if violations:
+        more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""
+        line = f"spec.trajectory: {violations[0]}{more}"
+        raise ProblemError(422, "beyond-limits", line, "POST …/experiments/preview shows the motion and its violations")
+
+
+def _require_room(one: RobotServices) -> None:
+    folder = one.catalogue.folder
+    free = shutil.disk_usage(folder).free
+    if free < RESERVE:
+        line = f"{free / 1e6:.0f} MB are free for traces, {RESERVE / 1e6:.0f} MB stay free"
+        raise ProblemError(507, "no-room", line, "make room on the disk of the traces")

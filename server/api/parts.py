@@ -1,0 +1,44 @@
+"""What routes ask for: the services, the robot of the address, who calls."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import Depends, Header, Path, Query, Request
+
+from daq.contracts.service.base import PageLimit
+from server.access.caller import Caller, require_operator, require_viewer
+from server.services import RobotServices, Services
+
+
+def services(request: Request) -> Services:
+    """All of them."""
+    found: Services = request.app.state.services
+    return found
+
+
+ServicesPart = Annotated[Services, Depends(services)]
+
+
+def robot_services(
+    robot: Annotated[str, Path(max_length=64, examples=["ma2000"], description="Name of the robot.")],
+    found: ServicesPart,
+) -> RobotServices:
+    """Those of the robot in the address. Raises a 404."""
+    return found.robot(robot)
+
+
+RobotPart = Annotated[RobotServices, Depends(robot_services)]
+Viewer = Annotated[Caller, Depends(require_viewer)]
+Operator = Annotated[Caller, Depends(require_operator)]
+
+Limit = Annotated[PageLimit, Query(description="Length of this part of the list.")]
+CursorOf = Annotated[str | None, Query(max_length=200, description="`next` of the part before.")]
+IdempotencyKey = Annotated[
+    str | None,
+    Header(min_length=1, max_length=200, description="Sent again with the same request, it is carried out once."),
+]
+LeaseHeader = Annotated[
+    str | None, Header(alias="Control-Lease", max_length=200, description="The lease that POST …/control gave.")
+]
+Identity = Annotated[str, Path(max_length=64)]

@@ -1,0 +1,143 @@
+"""Traces: search, look into, download, upload, tag."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import FileResponse
+from pydantic import AwareDatetime
+from starlette.background import BackgroundTask
+
+from daq.contracts.service.base import Page
+from daq.contracts.service.traces import (
+    CatalogueEntry,
+    JointFigureSet,
+    Source,
+    TraceChange,
+    TraceDetails,
+    TraceSignals,
+)
+from daq.contracts.trace import Outcome
+from daq.traces.csv_table import export_csv
+from daq.traces.reader import read_trace
+from daq.traces.summary import joint_figures
+from server.api.parts import CursorOf, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
+from server.catalogue.thinning import thinned
+from server.catalogue.upload import store_upload
+from server.problems import PROBLEMS
+from server.store.traces import TraceSearch
+
+router = APIRouter(prefix="/robots/{robot}/traces", tags=["traces"], responses=PROBLEMS)
+
+MCAP = "application/octet-stream"
+CSV = "text/csv"
+Text = Annotated[
+    str | None, Query(max_length=100, description="Looked for in number, file, name, kind, operator, notes and tags.")
+]
+Points = Annotated[int, Query(ge=2, le=20000, description="About how many points the plot has.")]
+Seconds = Annotated[float | None, Query(ge=-1e9, le=1e9, description="s from the start of the record.")]
+_BINARY = {"schema": {"type": "string", "format": "binary"}}
+
+
+@router.get("")
+def list_traces(
+    one: RobotPart,
+    found: ServicesPart,
+    _: Viewer,
+    q: Text = None,
+    tag: Annotated[str | None, Query(max_length=40)] = None,
+    source: Source | None = None,
+    outcome: Outcome | None = None,
+    kind: Annotated[str | None, Query(max_length=32)] = None,
+    since: AwareDatetime | None = None,
+    until: AwareDatetime | None = None,
+    limit: Limit = 50,
+    cursor: CursorOf = None,
+) -> Page[CatalogueEntry]:
+    """Traces, the newest first."""
+    search = TraceSearch(q, tag, source, outcome, kind, since, until)
+    return found.traces.page(one.robot.name, search, cursor, limit)
+
+
+@router.post(
+    "",
+    status_code=201,
+    openapi_extra={"requestBody": {"required": True, "content": {MCAP: _BINARY, CSV: _BINARY}}},
+)
+async def upload_trace(request: Request, one: RobotPart, found: ServicesPart, who: Operator) -> CatalogueEntry:
+    """Takes in a trace from elsewhere: MCAP of this project (application/octet-stream) or plain CSV (text/csv)."""
+    return await store_upload(request, one, found, who)
+
+
+@router.get("/{trace}")
+def get_trace(trace: Identity, one: RobotPart, found: ServicesPart, _: Viewer) -> TraceDetails:
+    """What one trace says about itself, its figures and events."""
+    entry = found.traces.get(one.robot.name, trace)
+    read = read_trace(one.catalogue.path_of(trace))
+    return TraceDetails(
+        entry=entry,
+        record=read.record,
+        figures=tuple(JointFigureSet(**vars(figures)) for figures in joint_figures(read)),
+        events=read.events,
+        missing_samples=read.missing,
+    )
+
+
+@router.patch("/{trace}")
+def change_trace(
+    trace: Identity, change: TraceChange, one: RobotPart, found: ServicesPart, _: Operator
+) -> CatalogueEntry:
+    """New tags or notes. They are the catalogue's: the file stays as it was recorded."""
+    return found.traces.change(one.robot.name, trace, change)
+
+
+@router.delete("/{trace}", status_code=204)
+def delete_trace(trace: Identity, one: RobotPart, found: ServicesPart, who: Operator) -> Response:
+    """Deletes a trace for good. Refused while a model or a job refers to it."""
+    path = one.catalogue.path_of(trace)
+    found.traces.require_unused(trace)
+    found.traces.remove(one.robot.name, trace)
+    path.unlink(missing_ok=True)
+    found.tell(one.robot.name, "trace", f"trace {trace} ({path.name}) was deleted", actor=who.name)
+    return Response(status_code=204)
+
+
+@router.get("/{trace}/data.mcap", response_class=FileResponse, responses={200: {"content": {MCAP: _BINARY}}})
+def download_trace(trace: Identity, one: RobotPart, _: Viewer) -> FileResponse:
+    """The file as it was recorded; opens in Foxglove."""
+    path = one.catalogue.path_of(trace)
+    return FileResponse(path, media_type=MCAP, filename=path.name)
+
+
+@router.get("/{trace}/data.csv", response_class=FileResponse, responses={200: {"content": {CSV: _BINARY}}})
+def download_trace_as_csv(trace: Identity, one: RobotPart, _: Viewer) -> FileResponse:
+    """Time and signals as plain CSV, in s, rad and V."""
+    path = one.catalogue.path_of(trace)
+    folder = tempfile.TemporaryDirectory(prefix="daq-csv-")
+    made = export_csv(read_trace(path), Path(folder.name) / f"{path.stem}.csv")
+    return FileResponse(made, media_type=CSV, filename=made.name, background=BackgroundTask(folder.cleanup))
+
+
+@router.get("/{trace}/data.json")
+def get_trace_signals(
+    trace: Identity, one: RobotPart, _: Viewer, points: Points = 2000, start: Seconds = None, end: Seconds = None
+) -> TraceSignals:
+    """Signals for a plot, thinned to about `points` between `start` and `end`; no peak is lost."""
+    read = read_trace(one.catalogue.path_of(trace))
+    few = thinned(read, points, start, end)
+    columns = {name: None if s is None else tuple(map(tuple, s.T.tolist())) for name, s in few.signals.items()}
+    return TraceSignals(
+        id=trace,
+        joints=read.joints,
+        samples=len(read),
+        time=tuple(few.time.tolist()),
+        position=columns["position"] or (),
+        set_point=columns["set_point"],
+        error=columns["error"],
+        drive=columns["drive"],
+        drive_unit=read.record.drive_unit,
+        events=read.events,
+    )

@@ -1,0 +1,57 @@
+"""The web application: routes, problems, and the life of the services behind them."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+
+from fastapi import APIRouter, FastAPI
+from fastapi.concurrency import run_in_threadpool
+from fastapi.routing import APIRoute
+
+from server import problems
+from server.access.gate import Gate
+from server.api import experiments, queue, robots, traces
+from server.services import Services
+
+API = "/api/v1"
+DESCRIPTION = """Experiments on a robot arm: queued, run one at a time, recorded, kept.
+
+Angles are in rad, times in s, joints are numbered from 1. Errors are application/problem+json and say what to do.
+"""
+
+
+def make_app(services: Services, gate: Gate) -> FastAPI:
+    """The application over services that are not yet started."""
+
+    @asynccontextmanager
+    async def life(app: FastAPI) -> AsyncIterator[None]:
+        app.state.services = services
+        await run_in_threadpool(services.start)
+        yield
+        await run_in_threadpool(services.close)
+
+    app = FastAPI(
+        title="MA2000 DAQ",
+        version=version("ma2000-daq"),
+        description=DESCRIPTION,
+        lifespan=life,
+        openapi_url=f"{API}/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+        generate_unique_id_function=_name,
+        redirect_slashes=False,
+    )
+    problems.install(app)
+    api = APIRouter(prefix=API)
+    for part in (robots, experiments, queue, traces):
+        api.include_router(part.router)
+    app.include_router(api)
+    app.add_middleware(gate.middleware)
+    return app
+
+
+def _name(route: APIRoute) -> str:
+    """Operations are called as their functions: clients are generated from them."""
+    return route.name

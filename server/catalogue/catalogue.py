@@ -1,0 +1,98 @@
+"""Brings the catalogue's table up to the folder: new files in, salvaged ones in, those that are gone marked."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from pathlib import Path
+
+from daq.traces import layout
+from daq.traces.catalogue import TraceSummary, summary_of
+from daq.traces.salvage import salvage_folder
+from server.problems import ProblemError, not_found
+from server.store.experiments import ExperimentStore
+from server.store.traces import NewTrace, TraceStore
+
+log = logging.getLogger("server.catalogue")
+
+
+class Catalogue:
+    """One folder and its table. Safe to use from any thread."""
+
+    def __init__(self, folder: Path, robot: str, traces: TraceStore, experiments: ExperimentStore) -> None:
+        self.folder = folder
+        self._robot = robot
+        self._traces = traces
+        self._experiments = experiments
+        self._lock = threading.Lock()
+
+    def bring_up_to_date(self) -> int:
+        """Finishes what a crash left, and takes in every file that the table does not know. Returns how many."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with self._lock:
+            for salvaged in salvage_folder(self.folder):
+                if salvaged.problem:
+                    log.warning("salvage: %s", salvaged.problem)
+                else:
+                    log.info("salvaged %s: %s samples", salvaged.path, salvaged.samples)
+            there = {entry.name for entry in self.folder.iterdir() if entry.name.endswith(layout.SUFFIX)}
+            known = self._traces.files()
+            self._traces.mark_missing(known - there, missing=True)
+            self._traces.mark_missing(known & there, missing=False)
+            return sum(self._take_in(self.folder / name) for name in sorted(there - known))
+
+    def add(self, path: Path) -> str | None:
+        """Takes in one finished file. Returns its number; None when it is no trace, which the log tells."""
+        with self._lock:
+            return summary.trace_id if (summary := self._summary(path)) and self._insert(path, summary) else None
+
+    def path_of(self, identity: str) -> Path:
+        """The file of a trace. Raises a 404, also when the file has been taken away."""
+        name = self._traces.file_of(self._robot, identity)
+        path = self.folder / name
+        if not path.is_file():
+            raise not_found(f"file for trace {identity!r} any more", "it was taken out of the folder of traces")
+        return path
+
+    def _take_in(self, path: Path) -> bool:
+        summary = self._summary(path)
+        return summary is not None and self._insert(path, summary)
+
+    def _summary(self, path: Path) -> TraceSummary | None:
+        try:
+            summary = summary_of(path)
+        except FileNotFoundError:
+            return None
+        if summary.state != "finished" or summary.trace_id is None:
+            log.warning("not in the catalogue: %s", summary.problem or f"{path} is {summary.state}")
+            return None
+        return summary
+
+    def _insert(self, path: Path, summary: TraceSummary) -> bool:
+        assert summary.trace_id is not None
+        assert summary.created is not None
+        try:
+            self._traces.insert(
+                NewTrace(
+                    id=summary.trace_id,
+                    robot=self._robot,
+                    file=path.name,
+                    created=summary.created,
+                    source=summary.source or "imported",
+                    kind=summary.kind,
+                    name=summary.name,
+                    joints=summary.joints,
+                    outcome=summary.outcome,
+                    samples=summary.samples,
+                    duration=summary.duration,
+                    size=summary.size,
+                    operator=summary.operator,
+                    experiment=self._experiments.of_trace(summary.trace_id),
+                    notes=summary.notes,
+                )
+            )
+        except ProblemError as error:
+            log.warning("not in the catalogue: %s: %s", path, error)
+            return False
+        self._experiments.traced(summary.trace_id, summary.outcome)
+        return True

@@ -1,0 +1,161 @@
+"""Errors as application/problem+json: one line that says what is wrong, and one that says what to do."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from sqlalchemy.exc import OperationalError
+from starlette.exceptions import HTTPException
+
+from daq.contracts.errors import DaqError
+from daq.contracts.service.problems import FieldProblem, ProblemDetails
+
+MEDIA_TYPE = "application/problem+json"
+log = logging.getLogger("server")
+
+TITLES = {
+    400: "The request cannot be understood",
+    401: "A token is needed",
+    403: "Not allowed",
+    404: "Not found",
+    405: "This address does not know this method",
+    406: "Not in that form",
+    409: "Not now",
+    413: "Too large",
+    415: "In no form that is understood here",
+    422: "The request is not valid",
+    429: "Too many requests",
+    500: "A fault of this program",
+    503: "The robot cannot be reached",
+    507: "No room",
+}
+
+
+class ProblemError(Exception):
+    """A request that is not carried out. `kind` is the end of its type's address in docs/service.md."""
+
+    def __init__(
+        self,
+        status: int,
+        kind: str,
+        detail: str,
+        advice: str = "",
+        fields: Sequence[FieldProblem] = (),
+        headers: Mapping[str, str] | None = None,
+    ) -> None:
+        super().__init__(detail)
+        self.status = status
+        self.kind = kind
+        self.detail = detail
+        self.advice = advice
+        self.fields = tuple(fields)
+        self.headers = dict(headers or {})
+
+
+def not_found(what: str, advice: str = "") -> ProblemError:
+    """A 404 about something that has no such name."""
+    return ProblemError(404, "not-found", f"there is no {what}", advice)
+
+
+def conflict(kind: str, detail: str, advice: str) -> ProblemError:
+    """A 409: what is asked for is right, but not now."""
+    return ProblemError(409, kind, detail, advice)
+
+
+def of_error(error: DaqError) -> ProblemError:
+    """The problem that an error of the host side is."""
+    return of_exit_code(error.exit_code, str(error))
+
+
+def of_exit_code(exit_code: int, line: str) -> ProblemError:
+    """The problem that another process has told in a line, with the exit code of the command line."""
+    if exit_code == 2:
+        return ProblemError(422, "not-valid", line, "correct the request")
+    if exit_code == 3:
+        return ProblemError(503, "not-reached", line, "check cable and supply, then connect again")
+    if exit_code == 6:
+        return ProblemError(409, "stopped", line, "reset the robot when it is safe")
+    return ProblemError(409, "not-safe", line, "remove the cause, then try again")
+
+
+def response(request: Request, problem: ProblemError) -> JSONResponse:
+    """A problem on its way out."""
+    details = ProblemDetails(
+        type=f"docs/service.md#{problem.kind}",
+        title=TITLES.get(problem.status, "Problem"),
+        status=problem.status,
+        detail=problem.detail,
+        advice=problem.advice,
+        fields=problem.fields,
+        request_id=getattr(request.state, "request_id", None),
+    )
+    return JSONResponse(details.model_dump(mode="json"), problem.status, headers=problem.headers, media_type=MEDIA_TYPE)
+
+
+def install(app: FastAPI) -> None:
+    """Every error of `app` leaves it as a problem."""
+
+    @app.exception_handler(ProblemError)
+    async def problem(request: Request, error: ProblemError) -> JSONResponse:
+        return response(request, error)
+
+    @app.exception_handler(DaqError)
+    async def own(request: Request, error: DaqError) -> JSONResponse:
+        return response(request, of_error(error))
+
+    @app.exception_handler(RequestValidationError)
+    async def not_valid(request: Request, error: RequestValidationError) -> JSONResponse:
+        fields = [FieldProblem(field=_where(one["loc"]), message=_what(one)) for one in error.errors()[:20]]
+        detail = f"{fields[0].field}: {fields[0].message}" if fields else "the request is not valid"
+        advice = "correct the fields named; /docs shows what is allowed"
+        return response(request, ProblemError(422, "not-valid", detail, advice, fields))
+
+    @app.exception_handler(HTTPException)
+    async def http(request: Request, error: HTTPException) -> JSONResponse:
+        kind = {404: "not-found", 405: "no-such-method"}.get(error.status_code, "http")
+        path = request.url.path
+        detail = f"{request.method} {path}: {error.detail}"
+        return response(
+            request, ProblemError(error.status_code, kind, detail, "/docs lists every address", (), error.headers)
+        )
+
+    @app.exception_handler(OperationalError)
+    async def database(request: Request, error: OperationalError) -> JSONResponse:
+        log.error("database: %s", error.orig)
+        if "full" in str(error.orig):
+            return response(
+                request, ProblemError(507, "no-room", "the disk of the database is full", "make room on it")
+            )
+        return response(request, ProblemError(503, "database", f"the database: {error.orig}", "try again"))
+
+    @app.exception_handler(Exception)
+    async def fault(request: Request, error: Exception) -> JSONResponse:
+        log.exception("fault in %s %s", request.method, request.url.path, exc_info=error)
+        detail = f"{type(error).__name__} while this was carried out"
+        return response(request, ProblemError(500, "fault", detail, "the log has more, under the request's id"))
+
+
+def _where(place: tuple[int | str, ...]) -> str:
+    """A field as a client writes it: what pydantic says about unions and bodies is left out."""
+    parts = [str(part) for part in place if part not in ("body", "query", "path", "header")]
+    return ".".join(part for part in parts if not part.startswith(("constrained-", "function-"))) or "body"
+
+
+def _what(error: Mapping[str, Any]) -> str:
+    message = str(error["msg"]).removeprefix("Value error, ")
+    given = error.get("input")
+    if isinstance(given, str | int | float | bool) and error["type"] != "json_invalid":
+        return f"{message} (got {given!r:.80})"
+    return message
+
+
+PROBLEMS: dict[int | str, dict[str, Any]] = {
+    status: {"model": ProblemDetails, "description": TITLES[status], "content": {MEDIA_TYPE: {}}}
+    for status in (400, 401, 403, 404, 409, 413, 422, 429, 503, 507)
+}
+"""For every route's `responses`: what may come instead of its answer."""

@@ -1,0 +1,343 @@
+"""The queue of one robot: takes experiments in, lets them run one at a time, and waits for a person where it must."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Protocol
+
+from daq.contracts.errors import DaqError
+from daq.contracts.service.experiments import Experiment, ExperimentRequest
+from daq.contracts.service.queue import QueueStatus
+from server.clock import Clock
+from server.owner.messages import Answer, HaltRun, RunExperiment
+from server.problems import conflict
+from server.queue.endings import Ending, ending_of
+from server.queue.order import next_due
+from server.queue.readiness import Circumstances, what_is_missing
+from server.queue.states import Event, IllegalEventError
+from server.robot.control import ControlDesk
+from server.robot.robot import Robot
+from server.store.experiments import ExperimentStore
+from server.store.queues import QueueState, QueueStore
+from server.store.schedules import ScheduleStore
+
+LOOK_EVERY = 1.0
+"""s between two looks for what has become due: the wall clock may be set meanwhile."""
+ATTENDANCE = 60.0
+"""s for which an operator's word to be there holds: an assumption."""
+log = logging.getLogger("server.queue")
+
+
+class Told(Protocol):
+    """Who is told what the queue does."""
+
+    def __call__(self, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
+        """One thing that happened."""
+        ...
+
+
+@dataclass
+class Running:
+    """The experiment that runs now."""
+
+    id: str
+    progress: float = 0.0
+    text: str = ""
+    cancelled_by: str | None = None
+    answer: Future[Answer] | None = None
+
+
+@dataclass(frozen=True)
+class QueueParts:
+    """What the queue works with."""
+
+    robot: Robot
+    control: ControlDesk
+    experiments: ExperimentStore
+    schedules: ScheduleStore
+    queues: QueueStore
+    clock: Clock
+    told: Told
+    recorded: Callable[[Answer], None]
+    """Called with the answer of every run that left a trace."""
+    unattended: bool
+
+
+class QueueDesk:
+    """One queue with its worker thread."""
+
+    def __init__(self, parts: QueueParts) -> None:
+        self._parts = parts
+        self._changed = threading.Condition(threading.RLock())
+        self._closing = False
+        self._consent = False
+        self._attended_until: float | None = None
+        self._running: Running | None = None
+        self._waiting_for = ""
+        self._state = self._state_at_start()
+        self._worker = threading.Thread(target=self._work, name="queue", daemon=True)
+
+    def start(self) -> None:
+        """Begins to take experiments."""
+        self._worker.start()
+
+    @property
+    def running(self) -> Running | None:
+        """The experiment that runs now."""
+        return self._running
+
+    def submit(self, request: ExperimentRequest, by: str, key: str | None) -> tuple[Experiment, bool]:
+        """Takes an experiment in; False where the same key did before. Raises a 409 for a key used otherwise."""
+        experiment, new = self._parts.experiments.submit(
+            self._parts.robot.name, request, self._parts.clock.utc(), by, key
+        )
+        if new:
+            self._parts.told("experiment", "queued", actor=by, experiment=experiment.id)
+            self.wake()
+        return experiment, new
+
+    def cancel(self, identity: str, by: str) -> Experiment:
+        """Takes back what waits; stops the arm where it runs. Raises a 404, and a 409 for what has ended."""
+        name = self._parts.robot.name
+        with self._changed:
+            running = self._running
+            if running is not None and running.id == identity:
+                running.cancelled_by = by
+                if running.answer is not None:
+                    self._parts.robot.tell(HaltRun())
+                return self.as_told(self._parts.experiments.get(name, identity))
+        found = self._parts.experiments.cancel_waiting(name, identity, self._parts.clock.utc(), by)
+        self._parts.told("experiment", "cancelled", actor=by, experiment=identity)
+        return found
+
+    def pause(self, reason: str, by: str | None = None) -> None:
+        """Lets no other experiment begin; one that runs goes on."""
+        with self._changed:
+            if self._state.paused and by is None:
+                return
+            self._set_state(QueueState(True, reason, self._parts.clock.utc()))
+            self._attended_until = None
+        self._parts.told("queue", f"paused: {reason}", actor=by)
+
+    def resume(self, by: str, *, moves_real_arm: bool) -> None:
+        """The operator's word that the queue may move the arm. Raises a 409 while the arm is stopped or at fault."""
+        arm = self._parts.robot.arm
+        if arm is not None and arm.arm in ("stopped", "fault"):
+            line = f"the arm is {arm.arm}: {arm.cause}"
+            raise conflict("arm-stopped", line, "look at the arm, reset it, then resume the queue")
+        with self._changed:
+            self._consent = self._consent or moves_real_arm
+            self._set_state(QueueState(False, f"resumed by {by}", self._parts.clock.utc()))
+            self._attended_until = self._parts.clock.monotonic() + ATTENDANCE
+        self._parts.told("queue", "resumed", actor=by)
+        self.wake()
+
+    def attend(self) -> None:
+        """An operator says to be there, for a minute more."""
+        with self._changed:
+            self._attended_until = self._parts.clock.monotonic() + ATTENDANCE
+        self.wake()
+
+    def wake(self) -> None:
+        """Something has changed that may let the next experiment begin."""
+        with self._changed:
+            self._changed.notify_all()
+
+    def progressed(self, fraction: float, text: str) -> None:
+        """How far the experiment that runs is."""
+        running = self._running
+        if running is not None:
+            running.progress, running.text = fraction, text
+
+    def as_told(self, experiment: Experiment) -> Experiment:
+        """With the progress of the one that runs."""
+        running = self._running
+        if running is None or running.id != experiment.id or experiment.state != "running":
+            return experiment
+        return experiment.model_copy(update={"progress": running.progress, "progress_text": running.text})
+
+    def status(self) -> QueueStatus:
+        """Now."""
+        with self._changed:
+            state, running, waiting_for = self._state, self._running, self._waiting_for
+            left = None if self._attended_until is None else self._attended_until - self._parts.clock.monotonic()
+        needs_attendance = left is not None and left > 0 and self._needs_attendance()
+        until = self._parts.clock.utc() + timedelta(seconds=left) if needs_attendance and left is not None else None
+        return QueueStatus(
+            paused=state.paused,
+            reason=state.reason,
+            since=state.since,
+            queued=self._parts.experiments.count_waiting(self._parts.robot.name),
+            running=None if running is None else running.id,
+            waiting_for="" if state.paused or running is not None else waiting_for,
+            attended_until=until,
+        )
+
+    def close(self, patience: float) -> None:
+        """Lets nothing begin any more, and waits for what the robot's owner says about what ran."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        if self._worker.is_alive():
+            self._worker.join(patience)
+
+    def _state_at_start(self) -> QueueState:
+        parts, now = self._parts, self._parts.clock.utc()
+        name = parts.robot.name
+        interrupted = parts.experiments.settle_after_restart(name, now)
+        for one in interrupted:
+            parts.told("experiment", f"interrupted: {one.reason}", experiment=one.id)
+        waiting = parts.experiments.count_waiting(name)
+        before = parts.queues.get(name)
+        if before is not None and before.paused:
+            return before
+        if waiting or interrupted:
+            line = f"the service was started again with {waiting} waiting and {len(interrupted)} interrupted"
+            state = QueueState(True, f"{line}: look at the arm, then resume the queue", now)
+        else:
+            state = QueueState(False, "nothing was waiting when the service began", now)
+        parts.queues.set(name, state)
+        return state
+
+    def _set_state(self, state: QueueState) -> None:
+        self._parts.queues.set(self._parts.robot.name, state)
+        self._state = state
+
+    def _needs_attendance(self) -> bool:
+        identity = self._parts.robot.identity
+        return identity is not None and not identity.simulated and not self._parts.unattended
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                if self._closing:
+                    return
+            try:
+                self._submit_scheduled()
+                experiment = self._take()
+                if experiment is not None:
+                    self._carry_out(experiment)
+                    continue
+            except Exception:
+                # A disk that is full, a database that is locked: the queue must not end with it, nor go on blindly.
+                log.exception("queue")
+                self._waiting_for = "the queue met a fault of this program: see the log"
+            with self._changed:
+                if not self._closing:
+                    self._changed.wait(LOOK_EVERY)
+
+    def _submit_scheduled(self) -> None:
+        parts, now = self._parts, self._parts.clock.utc()
+        name = parts.robot.name
+        if not parts.schedules.any_due(name, now):
+            return
+        for schedule in parts.schedules.take_due(name, now):
+            if parts.experiments.page(name, ("queued", "running"), schedule.id, None, 1).items:
+                parts.told("schedule", f"schedule {schedule.id}: the run before still waits; this one is left out")
+                continue
+            request = ExperimentRequest(spec=schedule.spec, priority=schedule.priority)
+            made, _ = parts.experiments.submit(name, request, now, f"schedule {schedule.id}", schedule=schedule.id)
+            parts.told("experiment", f"queued by schedule {schedule.id}", experiment=made.id)
+
+    def _take(self) -> Experiment | None:
+        """The next experiment, with the control of the robot; None when none may begin now."""
+        parts = self._parts
+        with self._changed:
+            following = next_due(parts.experiments.waiting(parts.robot.name), parts.clock.utc())
+            if following is None:
+                self._waiting_for = ""
+                return None
+            self._waiting_for = self._what_is_missing()
+            if self._state.paused or self._waiting_for or self._closing:
+                return None
+            if not parts.control.take_for_queue(following.id):
+                self._waiting_for = "a client has the control of the robot"
+                return None
+            try:
+                experiment = parts.experiments.begin(parts.robot.name, following.id, parts.clock.utc())
+            except IllegalEventError:  # cancelled in this moment
+                parts.control.give_back_for_queue()
+                return None
+            except BaseException:
+                parts.control.give_back_for_queue()
+                raise
+            self._running = Running(experiment.id)
+            return experiment
+
+    def _what_is_missing(self) -> str:
+        robot = self._parts.robot
+        attended = self._attended() or not self._needs_attendance()
+        missing = what_is_missing(Circumstances(robot.identity, robot.arm, robot.problem, self._consent, attended))
+        if missing is not None and missing.pause:
+            self.pause(missing.pause)
+        return "" if missing is None else missing.line
+
+    def _attended(self) -> bool:
+        return self._attended_until is not None and self._parts.clock.monotonic() < self._attended_until
+
+    def _carry_out(self, experiment: Experiment) -> None:
+        parts = self._parts
+        parts.robot.experiment = experiment.id
+        parts.told("experiment", "started", experiment=experiment.id)
+        try:
+            ending = self._run(experiment)
+        finally:
+            parts.robot.experiment = None
+            parts.control.give_back_for_queue()
+        with self._changed:
+            running, self._running = self._running, None
+            ending = self._as_wished(ending, running)
+            parts.experiments.end(
+                parts.robot.name, experiment.id, ending.event, parts.clock.utc(), ending.reason, ending.outcome
+            )
+        parts.told("experiment", f"{ending.event}: {ending.reason}".rstrip(": "), experiment=experiment.id)
+        if ending.holds_queue and not self._closing:
+            self.pause(f"experiment {experiment.id} was {ending.event} ({ending.reason}): look at the arm, then resume")
+
+    def _run(self, experiment: Experiment) -> Ending:
+        parts = self._parts
+        try:
+            with self._changed:
+                running = self._running
+                assert running is not None
+                if running.cancelled_by is not None:
+                    return Ending(Event.STOPPED, "cancelled before it moved")
+                answer = running.answer = parts.robot.ask(
+                    RunExperiment,
+                    spec=experiment.spec,
+                    trace_id=parts.experiments.trace_number(experiment.id),
+                    moves_real_arm=self._consent,
+                )
+            found = self._await(answer)
+        except DaqError as error:
+            return Ending(Event.LOST, str(error))
+        if found.finished is not None:
+            parts.recorded(found)
+        return ending_of(found)
+
+    def _await(self, answer: Future[Answer]) -> Answer:
+        """The answer; on a real arm that must be attended, an operator's absence ends the run with a stop."""
+        while True:
+            try:
+                return answer.result(LOOK_EVERY)
+            except TimeoutError:
+                if self._needs_attendance() and not self._attended():
+                    running = self._running
+                    if running is not None and running.cancelled_by is None:
+                        running.cancelled_by = "the service: no operator said to be there"
+                        self._parts.robot.tell(HaltRun())
+
+    def _as_wished(self, ending: Ending, running: Running | None) -> Ending:
+        """Whose wish a stop was."""
+        if ending.event is not Event.STOPPED:
+            return ending
+        if self._closing:
+            return Ending(Event.LOST, "the service was shut down while this ran", ending.outcome)
+        if running is not None and running.cancelled_by is not None:
+            return Ending(Event.STOPPED, f"cancelled by {running.cancelled_by}", ending.outcome)
+        return ending

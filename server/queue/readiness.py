@@ -1,0 +1,54 @@
+"""What speaks against the queue's moving the arm now. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from daq.contracts.service.robot import RobotIdentity
+from server.owner.messages import ArmReport
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """All that counts. `attended`: an operator says to be there, or nobody has to be."""
+
+    identity: RobotIdentity | None
+    arm: ArmReport | None
+    connection_problem: str
+    consent: bool
+    attended: bool
+
+
+@dataclass(frozen=True)
+class Missing:
+    """What is missing, in one line. `pause`: why the queue is paused until a person has looked; empty where waiting is
+    enough."""
+
+    line: str
+    pause: str = ""
+
+
+def what_is_missing(now: Circumstances) -> Missing | None:
+    """The first thing that is missing; None when an experiment may begin."""
+    if now.identity is None or now.arm is None:
+        return Missing(f"the robot is not connected. {now.connection_problem}".strip())
+    state, cause = now.arm.arm, now.arm.cause
+    found = [
+        (now.arm.link == "lost", Missing("the link to the robot is lost")),
+        (
+            state in ("stopped", "fault"),
+            Missing(
+                f"the arm is {state}", f"the arm is {state} ({cause}): look at it, reset it, then resume the queue"
+            ),
+        ),
+        (now.arm.activity != "none", Missing(f"the arm is busy: {now.arm.activity}")),
+        (
+            not now.identity.simulated and not now.consent,
+            Missing("an operator's word that the queue may move this arm: resume the queue with moves_real_arm"),
+        ),
+        (
+            not now.attended,
+            Missing("an operator who is there", "no operator says to be there, and this arm may not run unattended"),
+        ),
+    ]
+    return next((missing for applies, missing in found if applies), None)

@@ -1,0 +1,163 @@
+"""Who may move the robot: one client with a lease that it renews, or the queue while an experiment runs. Pure rules,
+and a desk that keeps them under a lock."""
+
+from __future__ import annotations
+
+import secrets
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import timedelta
+
+from daq.contracts.service.queue import Control, ControlLease
+from server.clock import Clock
+from server.problems import ProblemError, conflict
+
+LEASE_TIME = 10.0
+"""s that a lease holds without a heartbeat: an assumption, longer than a page takes to load again."""
+HEARTBEAT_EVERY = 3.0
+"""s between heartbeats that clients are asked for: two may be lost."""
+
+
+@dataclass(frozen=True)
+class Lease:
+    """The control of a client. `expires` is on the monotonic clock (s): a wall clock that is set back lengthens
+    nothing."""
+
+    secret: str
+    name: str
+    expires: float
+    moves_real_arm: bool
+
+    def holds(self, now: float) -> bool:
+        """Whether it has not lapsed."""
+        return now < self.expires
+
+
+class ControlDesk:
+    """Gives the control of one robot out. `lapsed` is called, on a thread of its own, when a lease ends by silence."""
+
+    def __init__(self, clock: Clock, lapsed: Callable[[str], None]) -> None:
+        self._clock = clock
+        self._lapsed = lapsed
+        self._changed = threading.Condition()
+        self._lease: Lease | None = None
+        self._queue: str | None = None
+        self._closing = False
+        self._watch = threading.Thread(target=self._watch_lapse, name="lease-watch", daemon=True)
+        self._watch.start()
+
+    def take(self, name: str, *, moves_real_arm: bool) -> ControlLease:
+        """The control, for one client. Raises a 409 when somebody else has it."""
+        with self._changed:
+            now = self._clock.monotonic()
+            if self._queue is not None:
+                line = f"experiment {self._queue} of the queue runs"
+                raise conflict("control-held", line, "wait for its end, or cancel it; pause the queue to be next")
+            if self._lease is not None and self._lease.holds(now):
+                left = self._lease.expires - now
+                line = f"{self._lease.name} has the control, for {left:.0f} s more unless it is renewed"
+                raise conflict("control-held", line, "ask for it again when it is given back")
+            self._lease = Lease(secrets.token_urlsafe(24), name, now + LEASE_TIME, moves_real_arm)
+            self._changed.notify_all()
+            return self._told(self._lease, now)
+
+    def renew(self, secret: str) -> ControlLease:
+        """The heartbeat. Raises a 409 when the lease has lapsed, or is another's."""
+        with self._changed:
+            now = self._clock.monotonic()
+            lease = replace(self._require(secret, now), expires=now + LEASE_TIME)
+            self._lease = lease
+            self._changed.notify_all()
+            return self._told(lease, now)
+
+    def give_back(self, secret: str) -> None:
+        """Ends the lease. Raises a 409 when it is not this client's."""
+        with self._changed:
+            self._require(secret, self._clock.monotonic())
+            self._lease = None
+            self._changed.notify_all()
+
+    def require(self, secret: str | None) -> Lease:
+        """The lease that allows a motion now. Raises a 409 when there is none, or it is another's."""
+        with self._changed:
+            return self._require(secret, self._clock.monotonic())
+
+    def require_free_of_others(self, secret: str | None) -> None:
+        """Raises a 409 when somebody else has the control: for what changes the robot without moving it."""
+        with self._changed:
+            now = self._clock.monotonic()
+            held = self._lease is not None and self._lease.holds(now)
+            if self._queue is not None:
+                raise conflict("control-held", f"experiment {self._queue} of the queue runs", "wait for its end")
+            if held and self._lease is not None and not _same(self._lease.secret, secret):
+                raise conflict("control-held", f"{self._lease.name} has the control", "wait until it is given back")
+
+    def take_for_queue(self, experiment: str) -> bool:
+        """The queue's own control, for one experiment; False while a client has it."""
+        with self._changed:
+            if self._lease is not None and self._lease.holds(self._clock.monotonic()):
+                return False
+            self._lease, self._queue = None, experiment
+            return True
+
+    def give_back_for_queue(self) -> None:
+        """The experiment has ended."""
+        with self._changed:
+            self._queue = None
+
+    def status(self) -> Control:
+        """Who has it, without its secret."""
+        with self._changed:
+            now = self._clock.monotonic()
+            if self._queue is not None:
+                return Control(holder="queue")
+            if self._lease is None or not self._lease.holds(now):
+                return Control(holder="nobody")
+            left = self._lease.expires - now
+            expires = self._clock.utc() + timedelta(seconds=left)
+            return Control(holder="client", name=self._lease.name, expires=expires, remaining=left)
+
+    def close(self) -> None:
+        """Ends the thread."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        self._watch.join()
+
+    def _require(self, secret: str | None, now: float) -> Lease:
+        if secret is None:
+            advice = "take it with POST …/control, and send its lease in the header Control-Lease"
+            raise ProblemError(409, "control-needed", "this moves the robot and needs its control", advice)
+        if self._lease is None or not _same(self._lease.secret, secret):
+            raise conflict("control-lost", "this lease is not valid any more", "take the control again")
+        if not self._lease.holds(now):
+            raise conflict("control-lost", "this lease has lapsed: there was no heartbeat", "take the control again")
+        return self._lease
+
+    def _told(self, lease: Lease, now: float) -> ControlLease:
+        left = lease.expires - now
+        return ControlLease(
+            lease=lease.secret,
+            expires=self._clock.utc() + timedelta(seconds=left),
+            remaining=left,
+            heartbeat_every=HEARTBEAT_EVERY,
+        )
+
+    def _watch_lapse(self) -> None:
+        while True:
+            with self._changed:
+                if self._closing:
+                    return
+                lease = self._lease
+                left = None if lease is None else lease.expires - self._clock.monotonic()
+                if left is None or left > 0:
+                    self._changed.wait(left)
+                    continue
+                assert lease is not None
+                self._lease = None
+            self._lapsed(lease.name)
+
+
+def _same(one: str, other: str | None) -> bool:
+    return other is not None and secrets.compare_digest(one.encode(), other.encode())

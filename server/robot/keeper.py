@@ -1,0 +1,76 @@
+"""Keeps a robot connected for as long as somebody wants it to be: tries again, with doubling delays."""
+
+from __future__ import annotations
+
+import logging
+import threading
+
+from daq.contracts.errors import DaqError
+from daq.transport import ReconnectDelay
+from server.robot.robot import Robot
+
+DELAYS = ReconnectDelay(first_s=1.0, longest_s=30.0)
+log = logging.getLogger("server.robot")
+
+
+class Keeper:
+    """A thread that connects. Connecting moves nothing, and begins nothing that was interrupted."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._changed = threading.Condition()
+        self._wanted = False
+        self._closing = False
+        self._thread = threading.Thread(target=self._keep, name="robot-keeper", daemon=True)
+        robot.disconnected.append(lambda _why: self._wake())
+
+    def start(self, *, connect: bool) -> None:
+        """Begins to keep."""
+        self._wanted = connect
+        self._thread.start()
+
+    def connect(self) -> None:
+        """From now on it is to be connected. Raises ReachError when it cannot be reached now; it is tried again."""
+        with self._changed:
+            self._wanted = True
+        self._robot.connect()
+        self._wake()
+
+    def disconnect(self) -> bool:
+        """From now on it is to be left alone; what runs is stopped. True when the port is free."""
+        with self._changed:
+            self._wanted = False
+            self._changed.notify_all()
+        return self._robot.disconnect()
+
+    def close(self, patience: float) -> None:
+        """For good."""
+        with self._changed:
+            self._wanted, self._closing = False, True
+            self._changed.notify_all()
+        if not self._robot.disconnect(patience):
+            log.warning("the owner of %s still closes its trace; it ends by itself", self._robot.name)
+        if self._thread.is_alive():
+            self._thread.join(patience)
+
+    def _wake(self) -> None:
+        with self._changed:
+            self._changed.notify_all()
+
+    def _keep(self) -> None:
+        delays = DELAYS.delays()
+        while True:
+            with self._changed:
+                if self._closing:
+                    return
+                missing = self._wanted and self._robot.connection == "disconnected"
+                if not missing:
+                    delays = DELAYS.delays()
+                    self._changed.wait()
+                    continue
+                if self._changed.wait_for(lambda: self._closing or not self._wanted, next(delays)):
+                    continue
+            try:
+                self._robot.connect()
+            except DaqError as error:
+                log.warning("robot %s: %s", self._robot.name, error)

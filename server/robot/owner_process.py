@@ -1,0 +1,102 @@
+"""The service's side of a robot's owner: starts the process, sends orders, hears reports."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import logging
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+from daq.contracts.errors import DaqError
+from server.owner.messages import REPORT, Answer, Close, Open, Order, Report
+
+GRACE = 4.0
+"""s that the process has to freeze the arm and close its trace when the service ends; it goes on alone after that."""
+log = logging.getLogger("server.robot")
+
+
+class OwnerGoneError(DaqError):
+    """The process that owned the port has ended before it answered."""
+
+    exit_code = 3
+
+
+class OwnerProcess:
+    """A running owner. `report` and `ended` are called on a thread of its own; `ended` once, last."""
+
+    def __init__(self, opening: Open, report: Callable[[Report], None], ended: Callable[[str], None]) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "server.owner"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,  # Ctrl-C in the terminal is the service's to handle
+        )
+        self._report = report
+        self._ended = ended
+        self._writing = threading.Lock()
+        self._numbers = itertools.count(1)
+        self._asked: dict[int, Future[Answer]] = {}
+        self._gone = False
+        self.send(opening)
+        self._thread = threading.Thread(target=self._listen, name="owner-reports", daemon=True)
+        self._thread.start()
+
+    @property
+    def pid(self) -> int:
+        """Of the process, and in the name of its stop socket."""
+        return self._process.pid
+
+    def send(self, order: Order) -> None:
+        """Writes an order. One that finds nobody is lost: `ended` tells so."""
+        assert self._process.stdin is not None
+        with self._writing, contextlib.suppress(OSError, ValueError):
+            self._process.stdin.write(order.model_dump_json().encode() + b"\n")
+            self._process.stdin.flush()
+
+    def ask(self, kind: Callable[..., Any], **fields: object) -> Future[Answer]:
+        """Sends a request; the future has its answer, or OwnerGoneError."""
+        number = next(self._numbers)
+        future: Future[Answer] = Future()
+        future.set_running_or_notify_cancel()
+        with self._writing:
+            if self._gone:
+                future.set_exception(OwnerGoneError("the robot is not connected"))
+                return future
+            self._asked[number] = future
+        self.send(kind(number=number, **fields))
+        return future
+
+    def close(self, patience: float = GRACE) -> bool:
+        """Gives the port back; True when the process has ended within `patience` s."""
+        self.send(Close())
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
+        self._thread.join(patience)
+        return not self._thread.is_alive()
+
+    def _listen(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            report = REPORT.validate_json(line)
+            if isinstance(report, Answer):
+                future = self._asked.pop(report.number, None)
+                if future is not None:
+                    future.set_result(report)
+            else:
+                self._report(report)
+        code = self._process.wait()
+        self._process.stdout.close()
+        with self._writing:
+            self._gone = True
+            left, self._asked = self._asked, {}
+        why = f"signal {-code}" if code < 0 else f"exit code {code}"
+        for future in left.values():
+            future.set_exception(OwnerGoneError(f"the process that owned the port has ended ({why})"))
+        log.info("owner process %s ended: %s", self.pid, why)
+        self._ended(why)

@@ -1,0 +1,213 @@
+"""One robot: connected or not, what it says, and what it is asked. Safe to use from any thread."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from daq.acquisition.messages import EventHappened, Progress
+from daq.contracts.errors import DaqError, ReachError
+from daq.contracts.machine import Machine
+from daq.contracts.service.robot import ConnectionState, RobotIdentity
+from server.clock import Clock
+from server.owner.messages import (
+    Answer,
+    ArmReport,
+    CannotOpen,
+    LiveSample,
+    Open,
+    Opened,
+    Order,
+    Report,
+    Told,
+)
+from server.robot.owner_process import OwnerProcess
+
+OPEN_WITHIN = 60.0
+"""s for a process to start, and a mock with its physics engine, on a busy computer."""
+ANSWER_WITHIN = 5.0
+"""s for an order that moves nothing."""
+log = logging.getLogger("server.robot")
+
+
+@dataclass(frozen=True)
+class RobotPlace:
+    """Which robot, and where."""
+
+    name: str
+    url: str
+    machine: Machine
+    folder: Path
+    memory_map: str | None = None
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A report and when it came (s, monotonic)."""
+
+    report: Any
+    at: float
+
+
+class Robot:
+    """A robot, and the process that owns its port while it is connected.
+
+    listeners are called with every report of that process, on its thread; they must not wait.
+    """
+
+    def __init__(self, place: RobotPlace, clock: Clock) -> None:
+        self.place = place
+        self.clock = clock
+        self.listeners: list[Callable[[Report], None]] = []
+        self.disconnected: list[Callable[[str], None]] = []
+        self.experiment: str | None = None
+        """The experiment of the queue that runs now."""
+        self._lock = threading.RLock()
+        self._owner: OwnerProcess | None = None
+        self._opened: Future[RobotIdentity] | None = None
+        self._identity: RobotIdentity | None = None
+        self._problem = ""
+        self._arm: Seen | None = None
+        self._sample: Seen | None = None
+
+    @property
+    def name(self) -> str:
+        """As in addresses, rows and files."""
+        return self.place.name
+
+    @property
+    def machine(self) -> Machine:
+        """With the configuration's limits in it."""
+        return self.place.machine
+
+    @property
+    def identity(self) -> RobotIdentity | None:
+        """What the controller says about itself; None while it is not connected."""
+        return self._identity
+
+    @property
+    def problem(self) -> str:
+        """Why it is not connected."""
+        return self._problem
+
+    @property
+    def arm(self) -> ArmReport | None:
+        """The newest report of the arm's state."""
+        return self._arm.report if self._arm else None
+
+    @property
+    def arm_seen(self) -> Seen | None:
+        """The same, with its time."""
+        return self._arm
+
+    @property
+    def sample(self) -> Seen | None:
+        """The newest sample, with its time."""
+        return self._sample
+
+    @property
+    def connection(self) -> ConnectionState:
+        """How it is reached."""
+        with self._lock:
+            if self._identity is None:
+                return "disconnected" if self._owner is None else "connecting"
+            return "lost" if self.arm is not None and self.arm.link == "lost" else "connected"
+
+    @property
+    def owner_pid(self) -> int | None:
+        """Of the process that owns the port; None when there is none."""
+        owner = self._owner
+        return None if owner is None else owner.pid
+
+    def connect(self) -> RobotIdentity:
+        """Connects, or waits for a connection that is being made. Moves nothing. Raises ReachError, SpecError."""
+        with self._lock:
+            if self._owner is None:
+                self._begin()
+            opened = self._opened
+        assert opened is not None
+        try:
+            return opened.result(OPEN_WITHIN)
+        except TimeoutError:
+            self.disconnect()
+            raise ReachError(f"{self.place.url}: no greeting within {OPEN_WITHIN:g} s") from None
+
+    def disconnect(self, patience: float = 4.0) -> bool:
+        """Gives the port back; what runs is stopped first. True when that is done within `patience` s."""
+        owner = self._owner
+        return True if owner is None else owner.close(patience)
+
+    def ask(self, kind: Callable[..., Any], **fields: object) -> Future[Answer]:
+        """Sends an order to the robot's owner. Raises ReachError when it is not connected."""
+        with self._lock:
+            if self._owner is None or self._identity is None:
+                raise ReachError(f"robot {self.name} is not connected")
+            return self._owner.ask(kind, **fields)
+
+    def tell(self, order: Order) -> None:
+        """Sends an order that has no answer; nobody is told when it is not connected."""
+        owner = self._owner
+        if owner is not None:
+            owner.send(order)
+
+    def _begin(self) -> None:
+        place = self.place
+        self._problem = ""
+        self._opened = Future()
+        opening = Open(
+            url=place.url,
+            machine=place.machine,
+            limits=place.machine.limits,
+            folder=place.folder,
+            robot=place.name,
+            memory_map=place.memory_map,
+        )
+        self._owner = OwnerProcess(opening, self._heard, self._gone)
+
+    def _heard(self, report: Report) -> None:
+        seen = Seen(report, self.clock.monotonic())
+        match report:
+            case LiveSample():
+                self._sample = seen
+            case ArmReport():
+                self._arm = seen
+            case Opened():
+                self._set_opened(report)
+            case CannotOpen():
+                self._cannot_open(report)
+            case Progress() | EventHappened() | Told() | _:
+                pass
+        for listener in self.listeners:
+            listener(report)
+
+    def _set_opened(self, report: Opened) -> None:
+        identity = RobotIdentity(
+            simulated=report.simulated, protocol=report.protocol, period=report.period, boots=report.boots
+        )
+        with self._lock:
+            self._identity = identity
+            assert self._opened is not None
+            self._opened.set_result(identity)
+
+    def _cannot_open(self, report: CannotOpen) -> None:
+        with self._lock:
+            self._problem = report.problem
+            if self._opened is not None and not self._opened.done():
+                error: type[DaqError] = ReachError
+                self._opened.set_exception(error(report.problem))
+
+    def _gone(self, why: str) -> None:
+        with self._lock:
+            was = self._identity is not None
+            self._owner = self._identity = self._arm = self._sample = None
+            if was and not self._problem:
+                self._problem = f"the connection has ended ({why})"
+            if self._opened is not None and not self._opened.done():
+                self._opened.set_exception(ReachError(self._problem or f"the robot's process ended: {why}"))
+        for listener in self.disconnected:
+            listener(why)

@@ -1,0 +1,62 @@
+"""The status of a robot, every value with its age."""
+
+from __future__ import annotations
+
+from datetime import UTC
+from typing import TYPE_CHECKING
+
+from daq.contracts.service.robot import LinkStatus, RobotStatus, Sample
+from firmware_protocol.commands import StatusFlag
+from server.robot.robot import Seen
+
+if TYPE_CHECKING:
+    from server.services import RobotServices
+
+
+def status_of(one: RobotServices) -> RobotStatus:
+    """Now."""
+    robot = one.robot
+    arm, seen = robot.arm, robot.arm_seen
+    now, utc = robot.clock.monotonic(), robot.clock.utc()
+    connected = robot.identity is not None
+    link = LinkStatus(state="none")
+    if arm is not None and seen is not None and connected:
+        link = LinkStatus(state=arm.link, counters=arm.counters, age=now - seen.at)
+    return RobotStatus(
+        robot=robot.name,
+        machine=robot.machine.name,
+        port=robot.place.url,
+        connection=robot.connection,
+        connection_problem="" if connected else robot.problem,
+        identity=robot.identity,
+        arm=arm.arm if arm is not None and connected else "disconnected",
+        cause=arm.cause if arm is not None and connected else "",
+        activity=arm.activity if arm is not None else "none",
+        experiment=robot.experiment,
+        limp=arm.limp if arm is not None else (),
+        sample=sample_of(robot.sample, now, utc.timestamp()),
+        link=link,
+        control=one.control.status(),
+        queue=one.queue.status(),
+        utc=utc.astimezone(UTC),
+    )
+
+
+def sample_of(seen: Seen | None, now: float, utc: float) -> Sample | None:
+    """A sample as clients see it; `now` on the monotonic clock, `utc` the wall clock at the same moment (s)."""
+    if seen is None:
+        return None
+    sample = seen.report
+    age = now - sample.host_time
+    return Sample(
+        tick=sample.tick,
+        host_time=sample.host_time,
+        utc=utc - age,
+        age=age,
+        joints=sample.joints,
+        set_point=sample.set_point,
+        position=sample.position,
+        error=sample.error,
+        drive=sample.drive,
+        frozen=bool(sample.status & StatusFlag.FROZEN.value),
+    )

@@ -1,0 +1,161 @@
+"""Everything the service is made of, put together once and ended in order."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from daq.acquisition.messages import EventHappened, Progress
+from daq.config import Settings
+from daq.config.robot_files import load_memory_map
+from daq.contracts.errors import DaqError
+from server.catalogue.catalogue import Catalogue
+from server.clock import Clock, SystemClock
+from server.owner.messages import Answer, ArmReport, Finish, Opened, Report
+from server.problems import ProblemError, not_found
+from server.queue.desk import QueueDesk, QueueParts
+from server.robot.control import ControlDesk
+from server.robot.keeper import Keeper
+from server.robot.robot import Robot, RobotPlace
+from server.robot.stop import StopDesk
+from server.store.engine import Store
+from server.store.events import EventStore
+from server.store.experiments import ExperimentStore
+from server.store.queues import QueueStore
+from server.store.schedules import ScheduleStore
+from server.store.traces import TraceStore
+
+SHUTDOWN = 4.0
+"""s for the arm to be frozen and the trace to be closed when the service ends."""
+log = logging.getLogger("server")
+
+
+@dataclass(frozen=True)
+class RobotServices:
+    """What belongs to one robot."""
+
+    robot: Robot
+    keeper: Keeper
+    stop: StopDesk
+    control: ControlDesk
+    queue: QueueDesk
+    catalogue: Catalogue
+
+    def finish_teaching(self) -> None:
+        """Whatever is taught by hand ends in good order; an experiment of the queue is left alone."""
+        if self.robot.experiment is None:
+            self.robot.tell(Finish())
+
+
+class Services:
+    """The service without its web server. `start` after construction, `close` at the end."""
+
+    def __init__(self, settings: Settings, clock: Clock | None = None) -> None:
+        self.settings = settings
+        self.clock = clock or SystemClock()
+        self.store = Store(settings.server.database_url)
+        self.store.migrate()
+        self.experiments = ExperimentStore(self.store)
+        self.schedules = ScheduleStore(self.store)
+        self.traces = TraceStore(self.store)
+        self.events = EventStore(self.store)
+        self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
+        self._robots = {settings.robot.name: self._make_robot(settings)}
+
+    def robots(self) -> list[RobotServices]:
+        """All of them: one, for now."""
+        return list(self._robots.values())
+
+    def robot(self, name: str) -> RobotServices:
+        """Raises a 404."""
+        if name not in self._robots:
+            raise not_found(f"robot {name!r}", f"this service has {', '.join(self._robots)}")
+        return self._robots[name]
+
+    def start(self) -> None:
+        """Traces into the catalogue, robots connected, queues begun."""
+        for one in self.robots():
+            found = one.catalogue.bring_up_to_date()
+            log.info("catalogue of %s: %s new traces in %s", one.robot.name, found, one.catalogue.folder)
+            one.queue.start()
+            one.keeper.start(connect=self.settings.server.connect_at_start)
+
+    def close(self) -> None:
+        """Freezes what moves, closes traces, ends threads and processes. Within SHUTDOWN s, or it says so."""
+        for one in self.robots():
+            closing = threading.Thread(target=one.keeper.close, args=(SHUTDOWN,))
+            closing.start()
+            one.queue.close(SHUTDOWN)
+            closing.join()
+            one.control.close()
+            one.stop.close()
+        self._later.shutdown(wait=True)
+        self.store.close()
+
+    def _make_robot(self, settings: Settings) -> RobotServices:
+        name, folder = settings.robot.name, settings.traces.folder.absolute()
+        memory_map: str | None = None
+        if settings.robot.memory_map is not None:
+            load_memory_map(settings.robot.memory_map)
+            memory_map = settings.robot.memory_map.read_text("utf-8")
+        robot = Robot(RobotPlace(name, settings.port, settings.machine(), folder, memory_map), self.clock)
+        control = ControlDesk(self.clock, lambda holder: self._lapsed(robot, holder))
+        catalogue = Catalogue(folder, name, self.traces, self.experiments)
+
+        def told(kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
+            self.tell(name, kind, text, actor=actor, experiment=experiment)
+
+        def recorded(answer: Answer) -> None:
+            assert answer.finished is not None
+            catalogue.add(Path(answer.finished.trace))
+
+        queue = QueueDesk(
+            QueueParts(
+                robot=robot,
+                control=control,
+                experiments=self.experiments,
+                schedules=self.schedules,
+                queues=QueueStore(self.store),
+                clock=self.clock,
+                told=told,
+                recorded=recorded,
+                unattended=settings.server.unattended,
+            )
+        )
+
+        def heard(report: Report) -> None:
+            if isinstance(report, Progress):
+                queue.progressed(report.fraction, report.text)
+            elif isinstance(report, ArmReport | Opened | EventHappened):
+                queue.wake()
+
+        robot.listeners.append(heard)
+        robot.disconnected.append(lambda _why: queue.wake())
+        # After the loss of a process that wrote a trace, its part file is finished and found.
+        robot.disconnected.append(lambda _why: self._take_in(catalogue))
+        return RobotServices(robot, Keeper(robot), StopDesk(robot, self.clock), control, queue, catalogue)
+
+    def tell(
+        self, robot: str, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None
+    ) -> None:
+        """Something that happened: into the log, the database, and to whoever listens."""
+        log.info("%s: %s: %s", robot, kind, text, extra={"actor": actor, "experiment": experiment})
+        self.events.add(robot, kind, text, self.clock.utc(), actor, experiment)
+
+    def tell_later(self, robot: str, kind: str, text: str, *, actor: str) -> None:
+        """The same, for whoever must not wait for a disk."""
+        self._later.submit(self.tell, robot, kind, text, actor=actor)
+
+    def _lapsed(self, robot: Robot, holder: str) -> None:
+        """A client went silent: the arm holds."""
+        robot.tell(Finish())
+        self.tell(robot.name, "control", f"the control of {holder} has lapsed: the arm holds", actor=holder)
+
+    def _take_in(self, catalogue: Catalogue) -> None:
+        try:
+            catalogue.bring_up_to_date()
+        except (DaqError, ProblemError, OSError) as error:
+            log.warning("catalogue: %s", error)

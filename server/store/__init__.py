@@ -1,0 +1,1 @@
+"""The database: queue and catalogue survive a restart. Its URL is the seam for another one than SQLite."""

@@ -1,0 +1,95 @@
+"""Opening the database, and bringing it to this version's tables."""
+
+from __future__ import annotations
+
+import sqlite3
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from alembic import command
+from alembic.config import Config
+from sqlalchemy import Engine, create_engine, event
+from sqlalchemy.engine import make_url
+from sqlalchemy.exc import OperationalError
+from sqlalchemy.orm import Session, sessionmaker
+
+from daq.contracts.errors import DaqError
+
+BUSY_TIMEOUT_MS = 5000
+"""Another process (`daq token`, a backup) may hold the write lock for a moment."""
+
+
+class StoreError(DaqError):
+    """The database cannot be opened or brought up to date."""
+
+    exit_code = 2
+
+
+class Store:
+    """One database. Sessions may be had from any thread; one writes at a time."""
+
+    def __init__(self, url: str) -> None:
+        parsed = make_url(url)
+        if parsed.get_backend_name() == "sqlite" and parsed.database:
+            Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+        self.url = url
+        self.engine: Engine = create_engine(url)
+        if parsed.get_backend_name() == "sqlite":
+            event.listen(self.engine, "connect", _safe_and_shared)
+            event.listen(self.engine, "begin", _begin)
+        self._readers = sessionmaker(self.engine, expire_on_commit=False)
+        self._writers = sessionmaker(self.engine.execution_options(writing=True), expire_on_commit=False)
+        self._writing = threading.RLock()
+
+    def migrate(self) -> None:
+        """Brings the tables up to this version's. Raises StoreError, also for a database of a newer version."""
+        try:
+            with self.engine.connect() as connection:
+                config = migrations()
+                config.attributes["connection"] = connection
+                command.upgrade(config, "head")
+                connection.commit()
+        except OperationalError as error:
+            raise StoreError(f"database {self.url}: cannot be opened: {error.orig}") from error
+        except Exception as error:
+            raise StoreError(f"database {self.url}: its tables cannot be brought up to date: {error}") from error
+
+    @contextmanager
+    def reading(self) -> Iterator[Session]:
+        """A session that changes nothing."""
+        with self._readers() as session:
+            yield session
+
+    @contextmanager
+    def writing(self) -> Iterator[Session]:
+        """A session whose changes are on the disk when it is left; all of them or none."""
+        with self._writing, self._writers.begin() as session:
+            yield session
+
+    def close(self) -> None:
+        """Closes all connections."""
+        self.engine.dispose()
+
+
+def migrations() -> Config:
+    """Alembic's configuration: the migrations that ship."""
+    config = Config()
+    config.set_main_option("script_location", str(resources.files("server.store") / "migrations"))
+    return config
+
+
+def _safe_and_shared(connection: sqlite3.Connection, _record: Any) -> None:
+    """Readers beside a writer; what is committed is on the disk, also after a power cut."""
+    connection.isolation_level = None  # SQLAlchemy begins transactions below: the driver would do so too late
+    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", f"busy_timeout={BUSY_TIMEOUT_MS}"):
+        connection.execute(f"PRAGMA {pragma}")
+
+
+def _begin(connection: Any) -> None:
+    """A transaction that will write takes the lock at once: one that began as a reader might never get it."""
+    writing = connection.get_execution_options().get("writing", False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if writing else "BEGIN")

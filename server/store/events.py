@@ -1,0 +1,47 @@
+"""What happened, and by whom: kept, so that it can be asked for later."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from sqlalchemy import select
+
+from daq.contracts.service.base import Page
+from daq.contracts.service.events import ServiceEvent
+from server.store.engine import Store
+from server.store.pages import Cursor, page_of
+from server.store.tables import EventRow
+
+
+class EventStore:
+    """Events of all robots."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def add(
+        self, robot: str, kind: str, text: str, at: datetime, actor: str | None = None, experiment: str | None = None
+    ) -> ServiceEvent:
+        """A new one."""
+        row = EventRow(robot=robot, at=at, kind=kind, text=text, actor=actor, experiment=experiment)
+        with self._store.writing() as session:
+            session.add(row)
+            session.flush()
+            return _event(row)
+
+    def page(self, robot: str, experiment: str | None, cursor: str | None, limit: int) -> Page[ServiceEvent]:
+        """The newest first."""
+        query = select(EventRow).where(EventRow.robot == robot).order_by(EventRow.sequence.desc())
+        if experiment is not None:
+            query = query.where(EventRow.experiment == experiment)
+        if cursor is not None:
+            query = query.where(EventRow.sequence < Cursor.parse(cursor).number)
+        with self._store.reading() as session:
+            rows = list(session.scalars(query.limit(limit + 1)))
+        return page_of(rows, limit, _event, lambda row: Cursor(row.sequence))
+
+
+def _event(row: EventRow) -> ServiceEvent:
+    return ServiceEvent(
+        number=row.sequence, at=row.at, kind=row.kind, text=row.text, actor=row.actor, experiment=row.experiment
+    )

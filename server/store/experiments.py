@@ -1,0 +1,218 @@
+"""Experiments in the database. Every change of state goes through the state machine, where it is written."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from collections.abc import Sequence
+from datetime import datetime
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.service.base import Page
+from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState
+from daq.contracts.trace import Outcome
+from daq.traces.naming import new_trace_id
+from server.problems import conflict, not_found
+from server.queue.order import Waiting
+from server.queue.states import Event, IllegalEventError, advance, after_restart
+from server.store.engine import Store
+from server.store.pages import Cursor, page_of
+from server.store.tables import ExperimentRow
+
+
+class ExperimentStore:
+    """Experiments of all robots."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def submit(
+        self,
+        robot: str,
+        request: ExperimentRequest,
+        now: datetime,
+        by: str,
+        key: str | None = None,
+        schedule: str | None = None,
+    ) -> tuple[Experiment, bool]:
+        """A new experiment, queued, and True; or the one that the same key made before, and False.
+
+        Raises a 409 when the key was used for something else.
+        """
+        digest = hashlib.sha256(request.model_dump_json().encode()).hexdigest()
+        with self._store.writing() as session:
+            if key is not None:
+                found = session.scalar(select(ExperimentRow).filter_by(robot=robot, idempotency_key=key))
+                if found is not None:
+                    _require_same(found.request_digest, digest, key)
+                    return as_experiment(found), False
+            row = ExperimentRow(
+                id=secrets.token_hex(6),
+                robot=robot,
+                spec=request.spec.model_dump(mode="json"),
+                state="queued",
+                priority=request.priority,
+                at=request.at,
+                schedule=schedule,
+                idempotency_key=key,
+                request_digest=digest,
+                submitted=now,
+                submitted_by=by,
+                reason="",
+                trace=new_trace_id(),
+            )
+            session.add(row)
+            session.flush()
+            return as_experiment(row), True
+
+    def get(self, robot: str, identity: str) -> Experiment:
+        """One of them. Raises a 404."""
+        with self._store.reading() as session:
+            return as_experiment(_row(session, robot, identity))
+
+    def page(
+        self, robot: str, states: Sequence[ExperimentState], schedule: str | None, cursor: str | None, limit: int
+    ) -> Page[Experiment]:
+        """The newest first."""
+        query = select(ExperimentRow).where(ExperimentRow.robot == robot).order_by(ExperimentRow.sequence.desc())
+        if states:
+            query = query.where(ExperimentRow.state.in_(states))
+        if schedule is not None:
+            query = query.where(ExperimentRow.schedule == schedule)
+        if cursor is not None:
+            query = query.where(ExperimentRow.sequence < Cursor.parse(cursor).number)
+        with self._store.reading() as session:
+            rows = list(session.scalars(query.limit(limit + 1)))
+        return page_of(rows, limit, as_experiment, lambda row: Cursor(row.sequence))
+
+    def waiting(self, robot: str) -> list[Waiting]:
+        """All that are queued, in no order."""
+        columns = (ExperimentRow.id, ExperimentRow.sequence, ExperimentRow.priority, ExperimentRow.at)
+        with self._store.reading() as session:
+            found = session.execute(select(*columns).filter_by(robot=robot, state="queued"))
+            return [Waiting(*row) for row in found]
+
+    def in_order(self, robot: str) -> list[Experiment]:
+        """All that are queued, in the order in which they will be run."""
+        query = select(ExperimentRow).filter_by(robot=robot, state="queued")
+        query = query.order_by(ExperimentRow.priority.desc(), ExperimentRow.sequence)
+        with self._store.reading() as session:
+            return [as_experiment(row) for row in session.scalars(query.limit(500))]
+
+    def count_waiting(self, robot: str) -> int:
+        """How many are queued."""
+        with self._store.reading() as session:
+            return (
+                session.scalar(select(func.count()).select_from(ExperimentRow).filter_by(robot=robot, state="queued"))
+                or 0
+            )
+
+    def begin(self, robot: str, identity: str, now: datetime) -> Experiment:
+        """The worker takes it. Raises IllegalEventError when it was cancelled meanwhile."""
+        with self._store.writing() as session:
+            row = _row(session, robot, identity)
+            row.state = advance(_state(row), Event.TAKEN)
+            row.started = now
+            session.flush()
+            return as_experiment(row)
+
+    def end(
+        self, robot: str, identity: str, event: Event, now: datetime, reason: str, outcome: Outcome | None = None
+    ) -> Experiment:
+        """What became of it. Raises IllegalEventError."""
+        with self._store.writing() as session:
+            row = _row(session, robot, identity)
+            row.state = advance(_state(row), event)
+            row.ended, row.reason, row.outcome = now, reason, outcome
+            session.flush()
+            return as_experiment(row)
+
+    def cancel_waiting(self, robot: str, identity: str, now: datetime, by: str) -> Experiment:
+        """Takes one back that has not begun. Raises a 409 when it is not queued any more."""
+        try:
+            return self.end(robot, identity, Event.CANCELLED, now, f"cancelled by {by}")
+        except IllegalEventError as error:
+            raise conflict(
+                "experiment-state", str(error), "see its state: only what is queued or running can end"
+            ) from error
+
+    def set_priority(self, robot: str, identity: str, priority: int) -> Experiment:
+        """Of one that is queued. Raises a 409 for any other."""
+        with self._store.writing() as session:
+            row = _row(session, robot, identity)
+            if row.state != "queued":
+                raise conflict(
+                    "experiment-state", f"experiment {identity} is {row.state}", "only what waits has an order"
+                )
+            row.priority = priority
+            session.flush()
+            return as_experiment(row)
+
+    def settle_after_restart(self, robot: str, now: datetime) -> list[Experiment]:
+        """What ran when the service ended is interrupted. Returns those."""
+        with self._store.writing() as session:
+            rows = list(session.scalars(select(ExperimentRow).filter_by(robot=robot, state="running")))
+            for row in rows:
+                row.state = after_restart(_state(row))
+                row.ended = now
+                row.reason = "the service ended while this ran; it does not run again by itself"
+            session.flush()
+            return [as_experiment(row) for row in rows]
+
+    def trace_number(self, identity: str) -> str:
+        """The number that its trace has, or will have."""
+        with self._store.reading() as session:
+            return session.scalars(select(ExperimentRow.trace).filter_by(id=identity)).one()
+
+    def of_trace(self, trace: str) -> str | None:
+        """The experiment whose trace has this number."""
+        with self._store.reading() as session:
+            return session.scalar(select(ExperimentRow.id).filter_by(trace=trace))
+
+    def traced(self, trace: str, outcome: Outcome | None) -> None:
+        """A trace was found for an experiment whose end nobody saw."""
+        with self._store.writing() as session:
+            row = session.scalar(select(ExperimentRow).filter_by(trace=trace))
+            if row is not None and row.outcome is None:
+                row.outcome = outcome
+
+
+def as_experiment(row: ExperimentRow) -> Experiment:
+    """A row as clients see it. The trace's number is told once there may be one."""
+    has_trace = row.outcome is not None or row.state == "running"
+    return Experiment(
+        id=row.id,
+        robot=row.robot,
+        spec=ExperimentSpec.model_validate(row.spec),
+        state=_state(row),
+        priority=row.priority,
+        at=row.at,
+        schedule=row.schedule,
+        submitted=row.submitted,
+        submitted_by=row.submitted_by,
+        started=row.started,
+        ended=row.ended,
+        outcome=row.outcome,
+        reason=row.reason,
+        trace=row.trace if has_trace else None,
+    )
+
+
+def _state(row: ExperimentRow) -> ExperimentState:
+    return row.state  # type: ignore[return-value]
+
+
+def _row(session: Session, robot: str, identity: str) -> ExperimentRow:
+    row = session.scalar(select(ExperimentRow).filter_by(robot=robot, id=identity))
+    if row is None:
+        raise not_found(f"experiment {identity!r}", "GET …/experiments lists those there are")
+    return row
+
+
+def _require_same(before: str | None, now: str, key: str) -> None:
+    if before != now:
+        line = f"Idempotency-Key {key!r} was used for another request"
+        raise conflict("idempotency-key", line, "use a new key for a new request")

@@ -1,0 +1,48 @@
+"""Lists in parts: a cursor is where the next part begins, in the order of the list, so nothing is left out or doubled
+when rows come and go meanwhile."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Self, TypeVar
+
+from daq.contracts.service.base import Page
+from server.problems import ProblemError
+
+Row = TypeVar("Row")
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True)
+class Cursor:
+    """The last row of a part: its number, or moment, and where rows have no number their identity."""
+
+    number: float
+    identity: str = ""
+
+    def __str__(self) -> str:
+        return base64.urlsafe_b64encode(json.dumps([self.number, self.identity]).encode()).decode()
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Raises a 422 for anything that no list gave out."""
+        try:
+            number, identity = json.loads(base64.urlsafe_b64decode(text.encode()))
+            if isinstance(number, int | float) and isinstance(identity, str) and abs(number) < 2**62:
+                return cls(number, identity)
+        except (ValueError, TypeError, binascii.Error):
+            pass
+        raise ProblemError(422, "not-valid", "cursor: is none that a list gave out", "begin without a cursor")
+
+
+def page_of(
+    rows: Sequence[Row], limit: int, convert: Callable[[Row], Item], place: Callable[[Row], Cursor]
+) -> Page[Item]:
+    """A part made of up to `limit` rows; one row more than that says that there is another part."""
+    shown = rows[:limit]
+    following = str(place(shown[-1])) if len(rows) > limit and shown else None
+    return Page(items=tuple(convert(row) for row in shown), next=following)

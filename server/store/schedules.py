@@ -1,0 +1,117 @@
+"""Schedules in the database."""
+
+from __future__ import annotations
+
+import secrets
+from datetime import datetime
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.service.base import Page
+from daq.contracts.service.experiments import Schedule, ScheduleRequest
+from server.problems import not_found
+from server.queue.schedule import Plan, following, is_due
+from server.store.engine import Store
+from server.store.pages import Cursor, page_of
+from server.store.tables import ScheduleRow
+
+
+class ScheduleStore:
+    """Schedules of all robots."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def create(self, robot: str, request: ScheduleRequest, now: datetime, by: str) -> Schedule:
+        """A new one, active."""
+        starts = request.starts or now
+        row = ScheduleRow(
+            id=secrets.token_hex(6),
+            robot=robot,
+            spec=request.spec.model_dump(mode="json"),
+            every=request.every,
+            starts=starts,
+            count=request.count,
+            priority=request.priority,
+            active=True,
+            submitted_runs=0,
+            next=starts,
+            created=now,
+            created_by=by,
+        )
+        with self._store.writing() as session:
+            session.add(row)
+            session.flush()
+            return _schedule(row)
+
+    def get(self, robot: str, identity: str) -> Schedule:
+        """One of them. Raises a 404."""
+        with self._store.reading() as session:
+            return _schedule(_row(session, robot, identity))
+
+    def page(self, robot: str, cursor: str | None, limit: int) -> Page[Schedule]:
+        """The newest first."""
+        query = select(ScheduleRow).where(ScheduleRow.robot == robot).order_by(ScheduleRow.sequence.desc())
+        if cursor is not None:
+            query = query.where(ScheduleRow.sequence < Cursor.parse(cursor).number)
+        with self._store.reading() as session:
+            rows = list(session.scalars(query.limit(limit + 1)))
+        return page_of(rows, limit, _schedule, lambda row: Cursor(row.sequence))
+
+    def switch(self, robot: str, identity: str, *, active: bool) -> Schedule:
+        """On or off. Raises a 404."""
+        with self._store.writing() as session:
+            row = _row(session, robot, identity)
+            row.active = active
+            session.flush()
+            return _schedule(row)
+
+    def remove(self, robot: str, identity: str) -> None:
+        """Takes it away; what it submitted stays. Raises a 404."""
+        with self._store.writing() as session:
+            session.delete(_row(session, robot, identity))
+
+    def take_due(self, robot: str, now: datetime) -> list[Schedule]:
+        """Those whose run is due now; the run counts as made, and the next one is set."""
+        with self._store.writing() as session:
+            rows = session.scalars(select(ScheduleRow).filter_by(robot=robot, active=True))
+            due = [row for row in rows if is_due(row.next, now)]
+            for row in due:
+                assert row.next is not None
+                row.submitted_runs += 1
+                plan = Plan(row.starts, row.every, row.count)
+                row.next = following(plan, row.submitted_runs, row.next, now)
+            session.flush()
+            return [_schedule(row) for row in due]
+
+    def any_due(self, robot: str, now: datetime) -> bool:
+        """Whether `take_due` would return something: without the write lock."""
+        with self._store.reading() as session:
+            query = select(ScheduleRow.next).filter_by(robot=robot, active=True)
+            return any(is_due(moment, now) for moment in session.scalars(query))
+
+
+def _schedule(row: ScheduleRow) -> Schedule:
+    return Schedule(
+        id=row.id,
+        robot=row.robot,
+        spec=ExperimentSpec.model_validate(row.spec),
+        every=row.every,
+        starts=row.starts,
+        count=row.count,
+        priority=row.priority,
+        active=row.active,
+        submitted_runs=row.submitted_runs,
+        next=row.next if row.active else None,
+        created=row.created,
+        created_by=row.created_by,
+    )
+
+
+def _row(session: Session, robot: str, identity: str) -> ScheduleRow:
+    row = session.scalar(select(ScheduleRow).filter_by(robot=robot, id=identity))
+    if row is None:
+        raise not_found(f"schedule {identity!r}", "GET …/schedules lists those there are")
+    return row

@@ -1,0 +1,209 @@
+"""The tables. A change here needs a migration beside it (docs/service.md); a test compares the two."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import JSON, DateTime, Dialect, ForeignKey, Index, String, Text, TypeDecorator, UniqueConstraint
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+
+class Utc(TypeDecorator[datetime]):
+    """A moment with its time zone, kept as UTC; SQLite knows no time zones."""
+
+    impl = DateTime
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """On its way in."""
+        del dialect
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            raise ValueError("a moment without time zone")
+        return value.astimezone(UTC).replace(tzinfo=None)
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """On its way out."""
+        del dialect
+        return None if value is None else value.replace(tzinfo=UTC)
+
+
+class Table(DeclarativeBase):
+    """Base of all tables."""
+
+    type_annotation_map = {datetime: Utc, dict[str, Any]: JSON, list[Any]: JSON, str: String(200)}  # noqa: RUF012
+
+
+class ExperimentRow(Table):
+    """One experiment. `sequence` orders those submitted: clocks may be set back."""
+
+    __tablename__ = "experiments"
+    __table_args__ = (
+        UniqueConstraint("robot", "idempotency_key", name="one_experiment_a_key"),
+        Index("experiments_by_state", "robot", "state", "priority", "sequence"),
+    )
+
+    sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
+    id: Mapped[str] = mapped_column(String(12), unique=True)
+    robot: Mapped[str] = mapped_column(String(32))
+    spec: Mapped[dict[str, Any]]
+    state: Mapped[str] = mapped_column(String(16))
+    priority: Mapped[int] = mapped_column(default=0)
+    at: Mapped[datetime | None]
+    schedule: Mapped[str | None] = mapped_column(String(12))
+    idempotency_key: Mapped[str | None] = mapped_column(String(200))
+    request_digest: Mapped[str | None] = mapped_column(String(64))
+    submitted: Mapped[datetime]
+    submitted_by: Mapped[str]
+    started: Mapped[datetime | None]
+    ended: Mapped[datetime | None]
+    outcome: Mapped[str | None] = mapped_column(String(16))
+    reason: Mapped[str] = mapped_column(Text, default="")
+    trace: Mapped[str] = mapped_column(String(12), unique=True)
+    """Number of its trace, chosen before it runs: after a crash the trace is found by it."""
+
+
+class ScheduleRow(Table):
+    """An experiment that is submitted every so often."""
+
+    __tablename__ = "schedules"
+
+    sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
+    id: Mapped[str] = mapped_column(String(12), unique=True)
+    robot: Mapped[str] = mapped_column(String(32), index=True)
+    spec: Mapped[dict[str, Any]]
+    every: Mapped[float]
+    starts: Mapped[datetime]
+    count: Mapped[int | None]
+    priority: Mapped[int] = mapped_column(default=0)
+    active: Mapped[bool] = mapped_column(default=True)
+    submitted_runs: Mapped[int] = mapped_column(default=0)
+    next: Mapped[datetime | None]
+    created: Mapped[datetime]
+    created_by: Mapped[str]
+
+
+class QueueRow(Table):
+    """Whether a robot's queue is paused, and why."""
+
+    __tablename__ = "queues"
+
+    robot: Mapped[str] = mapped_column(String(32), primary_key=True)
+    paused: Mapped[bool]
+    reason: Mapped[str] = mapped_column(Text)
+    since: Mapped[datetime]
+
+
+class TraceRow(Table):
+    """One trace of the folder. `searched` holds what a search looks into, in small letters."""
+
+    __tablename__ = "traces"
+    __table_args__ = (Index("traces_by_time", "robot", "created", "id"),)
+
+    id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    robot: Mapped[str] = mapped_column(String(32))
+    file: Mapped[str] = mapped_column(String(255), unique=True)
+    created: Mapped[datetime]
+    source: Mapped[str] = mapped_column(String(16))
+    kind: Mapped[str | None] = mapped_column(String(32))
+    name: Mapped[str | None] = mapped_column(String(64))
+    joints: Mapped[list[Any]]
+    outcome: Mapped[str | None] = mapped_column(String(16))
+    samples: Mapped[int | None]
+    duration: Mapped[float | None]
+    size: Mapped[int]
+    operator: Mapped[str | None] = mapped_column(String(100))
+    experiment: Mapped[str | None] = mapped_column(String(12), index=True)
+    notes: Mapped[str] = mapped_column(Text, default="")
+    searched: Mapped[str] = mapped_column(Text, default="")
+    missing: Mapped[bool] = mapped_column(default=False)
+
+
+class TraceTagRow(Table):
+    """One tag of a trace."""
+
+    __tablename__ = "trace_tags"
+
+    trace: Mapped[str] = mapped_column(ForeignKey("traces.id", ondelete="CASCADE"), primary_key=True)
+    tag: Mapped[str] = mapped_column(String(40), primary_key=True, index=True)
+
+
+class JobRow(Table):
+    """A computation in the background: a fit, a validation, a comparison."""
+
+    __tablename__ = "jobs"
+    __table_args__ = (
+        UniqueConstraint("robot", "idempotency_key", name="one_job_a_key"),
+        Index("jobs_by_state", "robot", "state", "sequence"),
+    )
+
+    sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
+    id: Mapped[str] = mapped_column(String(12), unique=True)
+    robot: Mapped[str] = mapped_column(String(32))
+    kind: Mapped[str] = mapped_column(String(32))
+    request: Mapped[dict[str, Any]]
+    state: Mapped[str] = mapped_column(String(16))
+    idempotency_key: Mapped[str | None] = mapped_column(String(200))
+    request_digest: Mapped[str | None] = mapped_column(String(64))
+    submitted: Mapped[datetime]
+    submitted_by: Mapped[str]
+    started: Mapped[datetime | None]
+    ended: Mapped[datetime | None]
+    reason: Mapped[str] = mapped_column(Text, default="")
+    model: Mapped[str | None] = mapped_column(String(64))
+    """The model that it made."""
+
+
+class ModelRow(Table):
+    """A model in the folder of models, and where it comes from."""
+
+    __tablename__ = "models"
+
+    id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    robot: Mapped[str] = mapped_column(String(32), index=True)
+    name: Mapped[str] = mapped_column(String(64))
+    file: Mapped[str] = mapped_column(String(255), unique=True)
+    created: Mapped[datetime]
+    created_by: Mapped[str]
+    parent: Mapped[str | None] = mapped_column(String(64))
+    job: Mapped[str | None] = mapped_column(String(12))
+    notes: Mapped[str] = mapped_column(Text, default="")
+
+
+class TraceUseRow(Table):
+    """A job or a model that refers to a trace, which is not deleted then."""
+
+    __tablename__ = "trace_uses"
+
+    trace: Mapped[str] = mapped_column(String(64), primary_key=True, index=True)
+    used_by: Mapped[str] = mapped_column(String(80), primary_key=True)
+    """`job ID` or `model ID`."""
+
+
+class EventRow(Table):
+    """Something that happened, for whoever asks later who did what."""
+
+    __tablename__ = "events"
+
+    sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
+    robot: Mapped[str] = mapped_column(String(32), index=True)
+    at: Mapped[datetime]
+    kind: Mapped[str] = mapped_column(String(32))
+    text: Mapped[str] = mapped_column(Text)
+    actor: Mapped[str | None]
+    experiment: Mapped[str | None] = mapped_column(String(12))
+
+
+class TokenRow(Table):
+    """A token by its hash; the token itself is shown once, when it is made."""
+
+    __tablename__ = "tokens"
+
+    id: Mapped[str] = mapped_column(String(12), primary_key=True)
+    name: Mapped[str] = mapped_column(String(64), unique=True)
+    role: Mapped[str] = mapped_column(String(16))
+    digest: Mapped[str] = mapped_column(String(64), unique=True)
+    created: Mapped[datetime]
+    revoked: Mapped[datetime | None]

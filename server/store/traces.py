@@ -1,0 +1,185 @@
+"""The catalogue's table: search, tags, notes, and which traces something refers to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from sqlalchemy import delete, select, tuple_, update
+from sqlalchemy.orm import Session
+
+from daq.contracts.service.base import Page
+from daq.contracts.service.traces import CatalogueEntry, Source, TraceChange
+from daq.contracts.trace import Outcome
+from server.problems import conflict, not_found
+from server.store.engine import Store
+from server.store.pages import Cursor, page_of
+from server.store.tables import TraceRow, TraceTagRow, TraceUseRow
+
+
+@dataclass(frozen=True)
+class NewTrace:
+    """A row to be."""
+
+    id: str
+    robot: str
+    file: str
+    created: datetime
+    source: str
+    kind: str | None
+    name: str | None
+    joints: tuple[int, ...]
+    outcome: Outcome | None
+    samples: int | None
+    duration: float | None
+    size: int
+    operator: str | None
+    experiment: str | None
+    notes: str
+
+
+@dataclass(frozen=True)
+class TraceSearch:
+    """What a list is narrowed to; None and empty leave it as it is. `text` is looked for in number, file, name, kind,
+    operator, notes and tags, whatever its case."""
+
+    text: str | None = None
+    tag: str | None = None
+    source: Source | None = None
+    outcome: Outcome | None = None
+    kind: str | None = None
+    since: datetime | None = None
+    until: datetime | None = None
+
+
+class TraceStore:
+    """Traces of all robots."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def insert(self, new: NewTrace) -> None:
+        """A new trace. Raises a 409 when another file with this number is there."""
+        with self._store.writing() as session:
+            found = session.get(TraceRow, new.id)
+            if found is not None:
+                line = f"trace {new.id} is in the catalogue already, as {found.file}"
+                raise conflict("trace-exists", line, "it is the same trace: nothing needs to be done")
+            row = TraceRow(**{**new.__dict__, "joints": list(new.joints)}, searched="", missing=False)
+            row.searched = _searched(row, ())
+            session.add(row)
+
+    def files(self) -> set[str]:
+        """Names of all files in the table."""
+        with self._store.reading() as session:
+            return set(session.scalars(select(TraceRow.file)))
+
+    def mark_missing(self, files: Iterable[str], *, missing: bool) -> None:
+        """Files that have gone, or are there again."""
+        names = list(files)
+        with self._store.writing() as session:
+            for first in range(0, len(names), 500):
+                part = names[first : first + 500]
+                query = update(TraceRow).where(TraceRow.file.in_(part), TraceRow.missing.is_(not missing))
+                session.execute(query.values(missing=missing))
+
+    def file_of(self, robot: str, identity: str) -> str:
+        """Raises a 404."""
+        with self._store.reading() as session:
+            return _row(session, robot, identity).file
+
+    def get(self, robot: str, identity: str) -> CatalogueEntry:
+        """One of them. Raises a 404."""
+        with self._store.reading() as session:
+            row = _row(session, robot, identity)
+            return _entry(row, _tags(session, [row.id]).get(row.id, ()))
+
+    def page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
+        """The newest first."""
+        query = select(TraceRow).where(TraceRow.robot == robot)
+        for column, wanted in (("source", search.source), ("outcome", search.outcome), ("kind", search.kind)):
+            if wanted is not None:
+                query = query.where(getattr(TraceRow, column) == wanted)
+        if search.text:
+            query = query.where(TraceRow.searched.contains(search.text.lower(), autoescape=True))
+        if search.tag is not None:
+            query = query.where(TraceRow.id.in_(select(TraceTagRow.trace).filter_by(tag=search.tag)))
+        if search.since is not None:
+            query = query.where(TraceRow.created >= search.since)
+        if search.until is not None:
+            query = query.where(TraceRow.created < search.until)
+        if cursor is not None:
+            place = Cursor.parse(cursor)
+            moment = datetime.fromtimestamp(place.number, UTC)
+            query = query.where(tuple_(TraceRow.created, TraceRow.id) < tuple_(moment, place.identity))
+        query = query.order_by(TraceRow.created.desc(), TraceRow.id.desc()).limit(limit + 1)
+        with self._store.reading() as session:
+            rows = list(session.scalars(query))
+            tags = _tags(session, [row.id for row in rows])
+        return page_of(
+            rows,
+            limit,
+            lambda row: _entry(row, tags.get(row.id, ())),
+            lambda row: Cursor(row.created.timestamp(), row.id),
+        )
+
+    def change(self, robot: str, identity: str, change: TraceChange) -> CatalogueEntry:
+        """New tags or notes. Raises a 404."""
+        with self._store.writing() as session:
+            row = _row(session, robot, identity)
+            if change.notes is not None:
+                row.notes = change.notes
+            if change.tags is not None:
+                session.execute(delete(TraceTagRow).filter_by(trace=row.id))
+                for tag in dict.fromkeys(change.tags):
+                    session.add(TraceTagRow(trace=row.id, tag=tag))
+            session.flush()
+            tags = _tags(session, [row.id]).get(row.id, ())
+            row.searched = _searched(row, tags)
+            return _entry(row, tags)
+
+    def refer(self, session: Session, traces: Iterable[str], used_by: str) -> None:
+        """Notes, within a transaction of the caller's, that `used_by` refers to traces."""
+        for trace in traces:
+            session.merge(TraceUseRow(trace=trace, used_by=used_by))
+
+    def require_unused(self, identity: str) -> None:
+        """Raises a 409 when a model or a job refers to it."""
+        with self._store.reading() as session:
+            users = list(session.scalars(select(TraceUseRow.used_by).filter_by(trace=identity).limit(5)))
+        if users:
+            line = f"trace {identity} is what {', '.join(users)} was made from"
+            raise conflict("trace-in-use", line, "it is kept as long as they are")
+
+    def remove(self, robot: str, identity: str) -> None:
+        """Takes the row away. Raises a 404."""
+        with self._store.writing() as session:
+            session.delete(_row(session, robot, identity))
+
+
+def _row(session: Session, robot: str, identity: str) -> TraceRow:
+    row = session.get(TraceRow, identity)
+    if row is None or row.robot != robot:
+        raise not_found(f"trace {identity!r}", "GET …/traces lists those there are")
+    return row
+
+
+def _tags(session: Session, identities: list[str]) -> dict[str, tuple[str, ...]]:
+    found: dict[str, tuple[str, ...]] = {}
+    query = select(TraceTagRow).where(TraceTagRow.trace.in_(identities)).order_by(TraceTagRow.tag)
+    for row in session.scalars(query):
+        found[row.trace] = (*found.get(row.trace, ()), row.tag)
+    return found
+
+
+def _searched(row: TraceRow, tags: Iterable[str]) -> str:
+    parts = (row.id, row.file, row.name, row.kind, row.operator, row.notes, row.source, row.outcome, *tags)
+    return "\n".join(part for part in parts if part).lower()
+
+
+def _entry(row: TraceRow, tags: tuple[str, ...]) -> CatalogueEntry:
+    return CatalogueEntry.model_validate(
+        {name: getattr(row, name) for name in CatalogueEntry.model_fields if name not in ("tags", "joints")}
+        | {"tags": tags, "joints": tuple(row.joints)}
+    )

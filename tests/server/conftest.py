@@ -1,0 +1,28 @@
+"""One service for most tests: starting one costs more than most of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.server.service import Service, running_service
+
+
+@pytest.fixture(scope="session")
+def shared_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    """A service on a mock behind a pseudo-terminal, connected."""
+    with running_service(tmp_path_factory.mktemp("service")) as service:
+        service.until_connected()
+        yield service
+
+
+@pytest.fixture
+def service(shared_service: Service) -> Service:
+    """The same, as every test wants to find it: not stopped, nobody in control, the queue open and empty."""
+    for one in shared_service.robot.get("/queue/experiments").json():
+        shared_service.robot.post(f"/experiments/{one['id']}/cancel")
+    shared_service.robot.post("/reset", json={})
+    shared_service.robot.post("/queue/resume", json={})
+    shared_service.seen.clear()
+    return shared_service

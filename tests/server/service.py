@@ -1,0 +1,98 @@
+"""A real service for tests: `daq serve` in a process of its own, on a mock behind a pseudo-terminal."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+DAQ = [sys.executable, "-c", "from daq.cli import main; main()"]
+MOCK = "mock://?pty=1&seed=3"
+START_WITHIN = 60.0
+END_WITHIN = 15.0
+
+
+@dataclass
+class Service:
+    """A running service. `robot` speaks to its robot's part of the API."""
+
+    process: subprocess.Popen[bytes]
+    url: str
+    folder: Path
+    client: httpx.Client
+    robot: httpx.Client
+    seen: list[dict[str, Any]] = field(default_factory=list)
+
+    def until_connected(self) -> dict[str, Any]:
+        """Connects, or waits for the connection that is being made. Its status."""
+        answer = self.robot.post("/connect")
+        assert answer.status_code == 200, answer.text
+        found: dict[str, Any] = answer.json()
+        return found
+
+    def status(self) -> dict[str, Any]:
+        """Of the robot."""
+        found: dict[str, Any] = self.client.get("/robots/ma2000").json()
+        return found
+
+    def end_of(self, experiment: str) -> dict[str, Any]:
+        """Asks until an experiment has ended; the test's own time limit ends the wait."""
+        while True:
+            found: dict[str, Any] = self.robot.get(f"/experiments/{experiment}").json()
+            if found["state"] not in ("queued", "running"):
+                return found
+            self.seen.append(found)
+
+    def until_recording(self, experiment: str) -> dict[str, Any]:
+        """Asks until the record of an experiment has begun."""
+        while True:
+            found: dict[str, Any] = self.robot.get(f"/experiments/{experiment}").json()
+            if found["state"] != "queued" and " of " in found["progress_text"]:
+                return found
+            assert found["state"] in ("queued", "running"), found
+
+    def end(self, number: int = signal.SIGTERM) -> int:
+        """Sends a signal; the exit code."""
+        self.process.send_signal(number)
+        return self.process.wait(END_WITHIN)
+
+
+@contextmanager
+def running_service(
+    folder: Path, port: str = MOCK, *options: str, headers: dict[str, str] | None = None
+) -> Iterator[Service]:
+    """A service whose database, traces and stop sockets lie in `folder`."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("DAQ_")}
+    environment |= {"DAQ_RUNTIME_FOLDER": str(folder / "run"), "XDG_CONFIG_HOME": str(folder / "configuration")}
+    process = subprocess.Popen(
+        [*DAQ, "--port", port, "serve", "--port", "0", *options],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+    )
+    try:
+        assert process.stdout is not None
+        url = process.stdout.readline().decode().strip()
+        assert url, f"the service did not start: exit code {process.wait()}"
+        with (
+            httpx.Client(base_url=f"{url}/api/v1", timeout=START_WITHIN, headers=headers) as client,
+            httpx.Client(base_url=f"{url}/api/v1/robots/ma2000", timeout=START_WITHIN, headers=headers) as robot,
+        ):
+            yield Service(process, url, folder, client, robot)
+    finally:
+        process.terminate()
+        try:
+            process.wait(END_WITHIN)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
