@@ -15,7 +15,8 @@ from typing import Any
 import httpx
 
 DAQ = [sys.executable, "-c", "from daq.cli import main; main()"]
-MOCK = "mock://?pty=1&seed=3"
+MOCK = "mock://?pty=1&lock_step=1&seed=3"
+"""In lock-step: what the arm does depends on no clock, however busy this computer is."""
 START_WITHIN = 60.0
 END_WITHIN = 15.0
 
