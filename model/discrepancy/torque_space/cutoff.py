@@ -1,0 +1,125 @@
+"""What a trace measures, how noisy it is, and how far up its accelerations can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
+from scipy.signal import welch
+
+from daq.contracts.errors import SpecError, TraceError
+from daq.contracts.machine import Machine
+from daq.contracts.trace import Trace
+
+Floats = NDArray[np.float64]
+
+CUTOFFS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)
+"""Hz that are tried."""
+NOISE_SHARE = 0.1
+"""Share of the acceleration's root mean square that its noise may have."""
+QUIET_BAND = (0.3, 0.45)
+"""Band, as a share of the sampling rate, in which a record is taken to hold noise alone."""
+
+
+@dataclass(frozen=True)
+class RawSignal:
+    """A trace on an even grid of its own sampling, not smoothed. speed: (k, n) where it is measured."""
+
+    name: str
+    time: Floats
+    position: Floats
+    speed: Floats | None
+    drive: Floats
+    period: float
+
+    @property
+    def _noise_density(self) -> Floats:
+        """Of speed, or of position where no speed is measured."""
+        return _quiet_density(self.position if self.speed is None else self.speed, self.period)
+
+    def speed_noise(self, cutoff: float) -> Floats:
+        """Standard deviation (n,) of the speed's noise below a cutoff, rad/s (m/s)."""
+        power = cutoff if self.speed is not None else (2 * np.pi) ** 2 * cutoff**3 / 3
+        return np.asarray(np.sqrt(self._noise_density * power))
+
+    def acceleration_noise(self, cutoff: float) -> Floats:
+        """Standard deviation (n,) of the acceleration's noise below a cutoff, rad/s² (m/s²)."""
+        power = (2 * np.pi) ** 2 * cutoff**3 / 3 if self.speed is not None else (2 * np.pi) ** 4 * cutoff**5 / 5
+        return np.asarray(np.sqrt(self._noise_density * power))
+
+    def acceleration_power(self, cutoff: float) -> Floats:
+        """Root mean square (n,) of the acceleration below a cutoff, noise included."""
+        signal = self.position if self.speed is None else self.speed
+        order = 2 if self.speed is None else 1
+        frequency = np.fft.rfftfreq(len(signal), self.period)
+        taper = np.hanning(len(signal))[:, None]
+        spectrum = np.fft.rfft((signal - signal.mean(axis=0)) * taper, axis=0)
+        weights = (2 * np.pi * frequency[:, None]) ** order * (frequency[:, None] <= cutoff)
+        return np.asarray(np.sqrt(2 * (np.abs(spectrum * weights) ** 2).sum(axis=0) / (taper**2).sum() / len(signal)))
+
+
+def _quiet_density(signal: Floats, period: float) -> Floats:
+    """One-sided power density (n,) per Hz of the noise of a signal (k, n): of its band without motion."""
+    rate = 1 / period
+    frequency, density = welch(np.diff(signal, axis=0) / period, rate, nperseg=min(len(signal) - 1, 1024), axis=0)
+    band = (frequency > QUIET_BAND[0] * rate) & (frequency < QUIET_BAND[1] * rate)
+    difference = (2 * np.sin(np.pi * frequency[band] * period) / period) ** 2
+    return np.asarray(np.median(density[band] / difference[:, None], axis=0))
+
+
+def measured_signal(trace: Trace, machine: Machine) -> RawSignal:
+    """Position, speed and drive of the modelled joints on an even grid.
+
+    Where the machine's sensors measure speed, positions are its integral from the first one recorded.
+
+    Raises TraceError for a trace without drive, of another machine, or with fewer than 32 samples.
+    """
+    name = trace.record.trace_id
+    if trace.drive is None:
+        raise TraceError(f"trace {name}: has no recorded drive, which torque space needs")
+    if trace.record.machine is not None and trace.record.machine.name != machine.name:
+        raise TraceError(f"trace {name}: made on {trace.record.machine.name}, the model describes {machine.name}")
+    if len(trace) < 32:
+        raise TraceError(f"trace {name}: {len(trace)} samples; torque space needs at least 32")
+    columns = [trace.column(j) for j in machine.modelled_joints]
+    steps = np.diff(trace.time)
+    period = float(np.median(steps))
+    if steps.max() > 10 * period + 0.05:
+        raise TraceError(f"trace {name}: a gap of {steps.max():.3g} s; use a piece without any")
+    time = np.arange(trace.time[0], trace.time[-1], period)
+
+    def even(signal: Floats) -> Floats:
+        return np.stack([np.interp(time, trace.time, signal[:, c]) for c in columns], axis=1)
+
+    position = even(trace.position)
+    speed = None if trace.velocity is None else even(trace.velocity)
+    sensors = [machine.joint(j).sensor for j in machine.modelled_joints]
+    if any(s is not None and s.measures == "velocity" for s in sensors):
+        if speed is None:
+            raise TraceError(f"trace {name}: has no velocity, which the sensors of {machine.name} measure")
+        position = position[0] + cumulative_trapezoid(speed, dx=period, axis=0, initial=0.0)
+    return RawSignal(name, time, position, speed, even(trace.drive), period)
+
+
+def chosen_cutoff(traces: Sequence[Trace], machine: Machine) -> float:
+    """The highest cutoff (Hz) at which the acceleration's noise stays below a share of the acceleration, on every joint
+    that moves.
+
+    Raises SpecError when there is none: nothing moves beyond the noise of its readings.
+    """
+    raw = [measured_signal(t, machine) for t in traces]
+    found = None
+    for cutoff in CUTOFFS:
+        if cutoff > min(0.4 / r.period for r in raw):
+            break
+        noise = np.sqrt(np.mean([r.acceleration_noise(cutoff) ** 2 for r in raw], axis=0))
+        whole = np.sqrt(np.mean([r.acceleration_power(cutoff) ** 2 for r in raw], axis=0))
+        moving = whole > 3 * noise
+        if moving.any() and (noise[moving] < NOISE_SHARE * whole[moving]).all():
+            found = cutoff
+    if found is None:
+        raise SpecError("no joint accelerates beyond the noise of its readings: there is nothing to explain")
+    return found

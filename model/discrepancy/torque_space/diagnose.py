@@ -1,0 +1,247 @@
+"""The workflow in torque space: find what is missing, add it, see whether it holds, and again until nothing is left."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import TraceError
+from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
+from daq.contracts.trace import Trace
+from model.discrepancy.answer import Candidate, Diagnosis, Step, Verdict
+from model.discrepancy.torque_space import judging
+from model.discrepancy.torque_space.balance import TorqueBalance
+from model.discrepancy.torque_space.candidates import NOT_IN_TORQUE_SPACE
+from model.discrepancy.torque_space.cutoff import chosen_cutoff
+from model.discrepancy.torque_space.fitting import Data, TorqueFit, fit
+from model.discrepancy.torque_space.likelihood import stretches_of
+from model.discrepancy.torque_space.locating import located, remaining_shapes
+from model.discrepancy.torque_space.noise_floor import noise_floor
+from model.discrepancy.torque_space.options import TorqueOptions
+from model.discrepancy.torque_space.reasons import reason
+from model.discrepancy.torque_space.records import TorqueRecord, torque_records
+from model.discrepancy.torque_space.search import Fitted, Turn, evidence, look
+from model.discrepancy.torque_space.tolerances import tolerances
+from model.machine_model.model import Lineage, Model
+
+Floats = NDArray[np.float64]
+
+FLOOR_SHARE = 0.3
+"""Share of the estimated noise below which no residual is believed to be: the estimate itself is rough."""
+CHANCES = 3
+"""Candidates of a turn that may fail on records not fitted to before the search ends."""
+SHOWN = 12
+"""Candidates that a step lists."""
+
+
+def diagnose_torques(
+    model: Model, traces: Sequence[Trace], holdout: Sequence[Trace] = (), options: TorqueOptions | None = None,
+    progress: Progress = silent, cancel: Cancel | None = None,
+) -> Diagnosis:  # fmt: skip
+    """Name the effects that recorded drive and motion show and the model lacks, add them, and show the gap shrink.
+
+    No controller and no simulation is needed. Where nothing is held out, an effect must hold on quarters of the traces
+    that are predicted from the others.
+
+    Raises:
+        TraceError, SpecError: for traces or options that cannot give an answer. CancelledError: when asked to end.
+    """
+    begun = time.perf_counter()
+    if not traces:
+        raise TraceError("no traces: a diagnosis needs at least one")
+    options = options or TorqueOptions()
+    cutoff = options.cutoff or chosen_cutoff(traces, model.machine)
+    progress(0.0, f"low-passing the records at {cutoff:g} Hz")
+    work = _Workflow(
+        model, torque_records(traces, model.machine, cutoff), torque_records(holdout, model.machine, cutoff),
+        noise_floor(model, traces, cutoff), options, progress, cancel or Never(),
+    )  # fmt: skip
+    work.run()
+    robot = sum(float(t.time[-1] - t.time[0]) for t in (*traces, *holdout))
+    names = [t.record.trace_id for t in traces]
+    return work.answer(model, names, [t.record.trace_id for t in holdout], time.perf_counter() - begun, robot, cutoff)
+
+
+@dataclass
+class _Workflow:
+    """State of a diagnosis: the model so far, its fit, and the steps taken."""
+
+    model: Model
+    records: tuple[TorqueRecord, ...]
+    held: tuple[TorqueRecord, ...]
+    floor: Floats
+    options: TorqueOptions
+    progress: Progress
+    cancel: Cancel
+    added: frozenset[str] = frozenset()
+    steps: list[Step] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.data = Data(stretches_of(self.records), np.maximum(FLOOR_SHARE * self.floor, 1e-12))
+        self.begin = self.model
+        self.now = self._fit(self.model)
+        self.notes.append(tolerances(self.model)[1])
+
+    def run(self) -> None:
+        """Turn after turn, until nothing more is significant or holds."""
+        while len([s for s in self.steps if s.adopted]) < self.options.most_steps:
+            done = len(self.steps)
+            self._tell(0.1, "what is missing")
+            turn = look(self.model, self.now, self.data, self.options.effects, self._tell, self.cancel)
+            if not self._decide(turn):
+                break
+            self._tell(0.9, "what is not needed any more")
+            self._prune(done)
+
+    def _tell(self, fraction: float, text: str) -> None:
+        if self.cancel.is_set():
+            raise CancelledError("the diagnosis was cancelled")
+        whole = self.options.most_steps
+        self.progress(min(0.99, (len(self.steps) + fraction) / (whole + 1)), f"step {len(self.steps) + 1}: {text}")
+
+    def _fit(self, model: Model, begin: dict[str, float] | None = None) -> TorqueFit:
+        parameters, _ = tolerances(self.begin)
+        known = {p.name for p in parameters}
+        found = tuple(p for p in tolerances(model, self.added)[0] if p.name not in known)
+        return fit(TorqueBalance(model, self.records), (*parameters, *found), begin or {}, self.data)
+
+    def _decide(self, turn: Turn) -> bool:
+        """Adopts the best candidate that holds. False when there is none."""
+        tried = 0
+        for chosen in turn.fitted:
+            if chosen.evidence < self.options.least_evidence or tried == CHANCES:
+                return False
+            before, after = self._judged(self.now, chosen.fit)
+            fitted = [judging.mean_squares(self.data.stretches, f.residual) for f in (self.now, chosen.fit)]
+            removed = judging.share_removed(*fitted, before, after)
+            holds = removed >= self.options.least_share
+            self.steps.append(self._step(turn, chosen, before, after, removed, holds=holds))
+            tried += 1
+            if holds:
+                self.added |= {p.name for p in chosen.parameters}
+                self.model = chosen.model.with_values(chosen.fit.values)
+                self.now = self._fit(self.model, chosen.fit.values)
+                return True
+        return False
+
+    def _judged(self, before: TorqueFit, after: TorqueFit) -> tuple[Floats, Floats]:
+        """Mean squares of both on records not fitted to: held-out ones, else blocks of the fitted ones."""
+        if self.held:
+            squares = [judging.held_out_squares(f.balance.model, f.values, self.held) for f in (before, after)]
+        else:
+            squares = [judging.block_squares(f, self.data) for f in (before, after)]
+        return squares[0], squares[1]
+
+    def _step(self, turn: Turn, chosen: Fitted, before: Floats, after: Floats, removed: float, *, holds: bool) -> Step:
+        rivals = [c for c in turn.fitted if c.rivals(chosen) and not c.imitates(chosen, self.now)]
+        margin = chosen.evidence - max([0.0, *(r.evidence for r in rivals)])
+        near = [r for r in rivals if chosen.evidence - r.evidence < self.options.least_margin]
+        group = {c.effect: c for c in reversed([chosen, *near])}
+        values = judging.found_values(chosen, self.data)
+        squares = [judging.mean_squares(self.data.stretches, f.residual) for f in (self.now, chosen.fit)]
+        excess = np.maximum(before - self.floor**2, 1e-300)
+        usable = np.isfinite(before) & np.isfinite(after) & (before > 1.2 * self.floor**2)
+        weight = np.where(usable, 1 / np.maximum(squares[0], 1e-300), 0.0)
+        lost = (
+            float((weight * (before - after))[usable].sum() / (weight * excess)[usable].sum()) if usable.any() else None
+        )
+        return Step(
+            effect=chosen.effect, joints=chosen.joints, parameters=values, evidence=chosen.evidence, margin=margin,
+            candidates=self._candidates(turn),
+            group=tuple(self._candidate(c) for c in sorted(group.values(), key=lambda c: -c.evidence)) if near else (),
+            rmse_fit=judging.signal_errors(self.model, squares[0], squares[1], self.floor),
+            rmse_holdout=judging.signal_errors(self.model, before, after, self.floor) if self.held else (),
+            excess_removed_holdout=lost if self.held else None,
+            where=located(self.model, self.records, self.now.residual, self.data.stretches, self.floor),
+            reason=reason(chosen.effect, chosen.joints, values, removed),
+            adopted=holds,
+            rejected_because=None if holds else f"on records not fitted to, the mean square falls by {removed:.1%} only",
+        )  # fmt: skip
+
+    def _candidates(self, turn: Turn) -> tuple[Candidate, ...]:
+        fitted = [self._candidate(c) for c in turn.fitted[:SHOWN]]
+        done = {(c.effect, c.joints) for c in turn.fitted}
+        cost = float(np.log(max(self.data.stretches.samples, 2)))
+        others = [
+            Candidate(effect=p.trial.effect, joints=p.trial.joints, evidence=p.gain - p.trial.size * cost)
+            for p in turn.probed
+            if (p.trial.effect, p.trial.joints) not in done
+        ]
+        return (*fitted, *others[: max(0, SHOWN - len(fitted))])
+
+    def _candidate(self, c: Fitted) -> Candidate:
+        squares = judging.mean_squares(self.data.stretches, c.fit.residual)
+        return Candidate(
+            effect=c.effect, joints=c.joints, evidence=c.evidence, refitted=True,
+            misfit=float(np.nanmean(squares / self.floor**2)),
+        )  # fmt: skip
+
+    def _prune(self, latest: int) -> None:
+        """Takes out effects of earlier steps that the latest one made superfluous."""
+        for index, step in enumerate(self.steps[:latest]):
+            if not step.adopted or step.effect is None:
+                continue
+            without = self.model.without_effect(step.effect, step.joints or None)
+            kept = {n: v for n, v in self.now.values.items() if n in without.by_name}
+            smaller = self._fit(without, kept)
+            memory = self.now.noise.memory
+            lost = evidence(smaller, self.now, self.data, memory, len(step.parameters), 1)
+            if lost < 0:
+                self.model, self.now = without.with_values(smaller.values), smaller
+                self.added -= set(step.parameters)
+                names = step.effect.replace("_", " ")
+                self.steps[index] = step.model_copy(
+                    update={"adopted": False, "rejected_because": "superfluous once a later effect was in"}
+                )
+                self.notes.append(f"{names}, step {index + 1}, was taken out again: a later effect explains it")
+
+    def answer(
+        self, before: Model, traces: list[str], holdout: list[str], seconds: float, robot: float, cutoff: float
+    ) -> Diagnosis:
+        """The whole answer."""
+        shapes = remaining_shapes(self.model, self.records, self.now.residual, self.data.stretches, self.floor)
+        adopted = [s for s in self.steps if s.adopted]
+        verdict: Verdict = "nothing-significant"
+        if any(s.group for s in adopted):
+            verdict = "ambiguous"
+        elif adopted:
+            verdict = "named"
+        elif shapes:
+            verdict = "unknown-effect"
+        lineage = Lineage(
+            parent=before.identity, traces=tuple(traces), fit={"fitted": [p.name for p in self.now.adjustables]},
+            note="; ".join(s.reason for s in adopted),
+        )  # fmt: skip
+        after = self.model.with_values(self.now.values).with_lineage(lineage)
+        return Diagnosis(
+            verdict=verdict, summary=_summary(adopted, bool(shapes)), steps=tuple(self.steps), remaining=shapes,
+            model_before=before, model_after=after, traces=tuple(traces), holdout=tuple(holdout), seconds=seconds,
+            robot_seconds=robot, notes=(*_assumptions(cutoff), *self.notes),
+        )  # fmt: skip
+
+
+def _summary(adopted: Sequence[Step], more: bool) -> str:
+    rest = "something that none of the known effects explains is left" if more else ""
+    if not adopted:
+        return rest or "nothing significant: the torques are what the model expects, within its tolerances and noise"
+    named = []
+    for step in adopted:
+        where = f" on joint {', '.join(map(str, step.joints))}" if step.joints else ""
+        names = " or ".join(c.effect for c in step.group) if step.group else str(step.effect)
+        named.append(names.replace("_", " ") + where)
+    return "; ".join([*named, *([rest] if rest else [])])
+
+
+def _assumptions(cutoff: float) -> tuple[str, ...]:
+    unseen = ", ".join(n.replace("_", " ") for n in NOT_IN_TORQUE_SPACE)
+    return (
+        f"compared as torques below {cutoff:g} Hz; faster effects are not seen",
+        "samples at which a joint rests are left out: friction holds it with whatever torque it takes",
+        f"not looked for, since they act before the recorded drive: {unseen}",
+        "positions are taken to be those of the links, behind the transmission",
+    )

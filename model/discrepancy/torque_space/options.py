@@ -1,0 +1,28 @@
+"""What a diagnosis in torque space may be told."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+
+class TorqueOptions(BaseModel):
+    """How to diagnose from torques.
+
+    cutoff: Hz of the low-pass; None: the highest at which noise of the acceleration stays small.
+    effects: names to try; None: every effect of the library, and the user's own, that acts on recorded torque.
+    most_steps: effects added at most, one after the other.
+    least_evidence: what an effect must take off −2 log posterior, its own parameters and the places looked at paid for.
+    least_margin: evidence by which it must lead over every other answer, to be named alone.
+    least_share: share by which the torque left on held-out records (in mean square) must fall.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    cutoff: Annotated[FiniteFloat, Field(gt=0)] | None = None
+    effects: tuple[str, ...] | None = None
+    most_steps: Annotated[int, Field(ge=1, le=20)] = 8
+    least_evidence: FiniteFloat = 30.0
+    least_margin: FiniteFloat = 12.0
+    least_share: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.01

@@ -1,0 +1,115 @@
+"""Torque that motors, friction and effects supply along a measured motion. Compiled; the physics is the simulation's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.drives.amplifier import motor_volts, warmed
+from model.drives.piecewise import clamped
+from model.dynamics import recursive
+from model.dynamics.compilation import compiled, internal
+from model.kinematics.chain import ChainArrays
+from model.machine_model import layout as at
+from model.simulation.dynamics_of_run import chain_levels
+from model.simulation.joint_torques import (
+    CURRENT,
+    DEFLECTION,
+    RISE,
+    STATE,
+    STUCK,
+    current_after,
+    extra_torque,
+    mean_current,
+    steady_current,
+    still_stuck,
+)
+from model.simulation.own_torque import own_torque
+from model.simulation.period import extra_flags
+
+
+@compiled
+def needed_torque(
+    chain: ChainArrays, position: NDArray[Any], speed: NDArray[Any], acceleration: NDArray[Any], out: NDArray[Any]
+) -> None:
+    """Torques (k, n) that a motion needs of motors and friction: D q̈ + H + G (3.40)."""
+    for k in range(position.shape[0]):
+        found = recursive.inverse_dynamics(chain, position[k], speed[k], acceleration[k])
+        for j in range(position.shape[1]):
+            out[k, j] = found[j]
+
+
+@compiled
+def friction_loads(
+    chain: ChainArrays, position: NDArray[Any], joints: NDArray[Any], settings: NDArray[Any], out: NDArray[Any]
+) -> None:
+    """Levels of Coulomb friction (k, n), N·m."""
+    for k in range(position.shape[0]):
+        chain_levels(position[k], joints, chain, settings, out[k])
+
+
+@compiled
+def gravity_along(chain: ChainArrays, position: NDArray[Any], out: NDArray[Any]) -> None:
+    """Gravity torques (k, n), N·m."""
+    for k in range(position.shape[0]):
+        found = recursive.gravity_torques(chain, position[k])
+        for j in range(position.shape[1]):
+            out[k, j] = found[j]
+
+
+@compiled
+def amplified(drive: NDArray[Any], joints: NDArray[Any], out: NDArray[Any]) -> None:
+    """Volts at the motors (k, n) for a commanded drive."""
+    for k in range(drive.shape[0]):
+        for j in range(drive.shape[1]):
+            out[k, j] = motor_volts(drive[k, j], joints[j])
+
+
+@compiled
+def supplied_torque(
+    position: NDArray[Any], speed: NDArray[Any], rotor_speed: NDArray[Any], volts: NDArray[Any], time: NDArray[Any],
+    joints: NDArray[Any], flags: NDArray[Any], level: NDArray[Any], load: NDArray[Any], own: NDArray[Any],
+    motor: NDArray[Any], beside: NDArray[Any], contact: NDArray[Any],
+) -> None:  # fmt: skip
+    """Torques (k, n) on the joints: `motor` of the motors, before any loss; `beside` of friction and every other effect.
+
+    position, speed: of the links; rotor_speed: of the motors, seen at the joint; volts: after the amplifier, as they
+    act at `time`; level, load: friction levels and gravity torques along the motion. `contact` is the friction contact's
+    deflection in [−1, 1].
+    """
+    n = position.shape[1]
+    modes = extra_flags(joints, flags)
+    state = np.zeros((n, STATE), dtype=position.dtype)
+    for k in range(position.shape[0]):
+        h = time[k] - time[k - 1] if k > 0 else time[1] - time[0]
+        for j in range(n):
+            joint, q, v, w = joints[j], position[k, j], speed[k, j], rotor_speed[k, j]
+            moved = q - position[k - 1, j] if k > 0 else 0.0 * q
+            z = clamped(state[j, DEFLECTION] + moved / joint[at.PRESLIDING], 1.0)
+            state[j, DEFLECTION] = z
+            if modes[j] & at.HAS_STICTION:
+                still_stuck(joint, level[k, j], v, state[j, DEFLECTION : DEFLECTION + 1], state[j, STUCK : STUCK + 1])
+                z = state[j, DEFLECTION]
+            contact[k, j] = z
+            motor[k, j] = _motor_torque(joint, modes[j], state[j], volts[k, j], w, h)
+            torque = -joint[at.GEAR] * joint[at.GEAR] * joint[at.VISCOUS] * w - z * level[k, j]
+            if modes[j] != 0:
+                torque += extra_torque(joint, modes[j], time[k], q, v, z, state[j, STUCK], 0.0)
+            if modes[j] & at.HAS_USER_EFFECT:
+                torque += own_torque(own[j], joint, q, v, volts[k, j], load[k, j], time[k])
+            beside[k, j] = torque
+
+
+@internal
+def _motor_torque(joint: NDArray[Any], flags: int, state: NDArray[Any], volts: float, speed: float, h: float) -> Any:
+    """Torque of a motor at its joint; warms its winding, and advances its current where that lags."""
+    if joint[at.HEATING] != 0.0:
+        state[RISE] = warmed(state[RISE], volts, speed, h, joint)
+    current = steady_current(joint, state[RISE], volts, speed)
+    if flags & at.HAS_INDUCTANCE:
+        steady = current
+        current = mean_current(joint, state[RISE], state[CURRENT], steady, h)
+        state[CURRENT] = current_after(joint, state[RISE], state[CURRENT], steady, h)
+    return joint[at.GEAR] * joint[at.TORQUE_CONSTANT] * current
