@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,7 +107,7 @@ def _answer(model: Model, record: Record, j: int, signal: Signal) -> Floats:
 
     An impulse p at joint j changes all speeds by D⁻¹ e_j p.
     """
-    loop = "open" if isinstance(model.machine.controller, NoController) else "closed"
+    loop: Literal["open", "closed"] = "open" if isinstance(model.machine.controller, NoController) else "closed"
     run = simulate(model, record.inputs, Options(loop=loop, quantise=False))
     begin = _sliding(run.velocity[:, j])
     part = slice(begin, begin + MEMORY)

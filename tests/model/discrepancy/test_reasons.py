@@ -1,0 +1,135 @@
+"""Reasons say what a record shows: for every effect of the shared list, put into an arm and read off its record."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from daq.contracts.effects import effect_names
+from model.discrepancy.answer import Candidate, FoundValue, RemainingShape, Where
+from model.discrepancy.reasons import nothing, reason, undecided, unexplained
+from model.discrepancy.reasons_table import TELLING
+from model.effects.library import effect
+from model.fitting.records import records_of
+from model.machine_model.model import Model
+from tests.model.discrepancy.motions import trace_of
+from tests.model.fitting import imagined
+
+SIZES: dict[str, dict[str, float]] = {
+    "viscous_friction": {"coefficient": 4e-4},
+    "coulomb_friction": {"torque": 4.0},
+    "load_dependent_friction": {"arm": 0.15},
+    "stribeck_friction": {"torque": 4.0, "speed": 0.05},
+    "stiction": {"breakaway": 4.0},
+    "direction_dependent_friction": {"difference": 4.0},
+    "back_emf_error": {"relative": 0.3},
+    "resistance_drift": {"heating": 0.05, "time_constant": 60.0},
+    "motor_inductance": {"inductance": 0.03},
+    "dead_zone": {"width": 1.0},
+    "supply_limit": {"voltage": 4.0},
+    "torque_ripple": {"sine": 3.0, "cosine": 0.0, "cycles": 30.0},
+    "gear_loss": {"loss": 0.3},
+    "backlash": {"gap": 0.02},
+    "joint_compliance": {"compliance": 0.004},
+    "payload": {"mass": 1.5},
+    "link_mass": {"added": 1.0},
+    "centre_of_mass": {"shift": 0.14},
+    "base_tilt": {"about_x": 0.2, "about_y": 0.2},
+    "spring_torque": {"stiffness": 8.0, "rest": 0.0},
+    "periodic_disturbance": {"sine": 3.0, "cosine": 0.0, "frequency": 1.5},
+    "potentiometer_gain": {"relative": 0.05},
+    "potentiometer_offset": {"offset": 0.1},
+    "potentiometer_nonlinearity": {"bend_2": 0.03},
+    "input_delay": {"time": 0.03},
+    "wrong_gain": {"relative": 0.25},
+    "lost_set_points": {"share": 0.3},
+}
+"""Strong, so that a reason must find them."""
+
+SAYS = {
+    "viscous_friction": r"a lag that grows with speed",
+    "coulomb_friction": r"lags by [\d.]+° in slow motion and by [\d.]+° in fast, always against the motion",
+    "backlash": r"lags by [\d.]+° after each of \d+ reversals and by −?[\d.e-]+° before",
+    "direction_dependent_friction": r"by [\d.e-]+° moving forwards and by −[\d.e-]+° backwards",
+    "supply_limit": r"where more than 4 V are asked for",
+    "torque_ripple": r"30 times a turn",
+    "periodic_disturbance": r"at 1\.5 Hz",
+    "wrong_gain": r"gets 1\.2\d* times the V that its controller's gain gives for the same error",
+    "spring_torque": r"below -?[\d.]+ ° and by [+−]",
+    "input_delay": r"within 0\.1 s of changes of speed",
+}
+"""What must be in the sentence, where an effect has one sign of its own."""
+
+NOWHERE = Where(
+    joint=None, phase=None, summary="joint 2, after reversals: 2.1 ADC counts rms", cells=(), dependences=()
+)
+
+
+@pytest.fixture(scope="module")
+def arm() -> Model:
+    return imagined.arm()
+
+
+def put_in(arm: Model, name: str, joint: int) -> tuple[Model, tuple[int, ...], dict[str, FoundValue]]:
+    """The arm with an effect, and its parameters as an answer has them."""
+    joints = () if effect(name).whole_machine else (joint,)
+    present = any(use.name == name and (not joints or joint in use.joints) for use in arm.effects)
+    if present:
+        names = {p.name: p for p in arm.parameters if p.effect == name and joint in p.joints}
+        strange = arm.with_values({n: SIZES[name][n.rpartition(".")[2]] for n in names})
+    else:
+        strange = arm.with_effect(name, joints, SIZES[name])
+    own = [p for p in strange.parameters if p.effect == name and (not joints or joint in p.joints)]
+    return strange, joints, {p.name: FoundValue(value=p.value, low=None, high=None, unit=p.unit) for p in own}
+
+
+def test_every_effect_of_the_shared_list_has_its_entry() -> None:
+    assert set(TELLING) == set(effect_names())
+    assert set(SIZES) == set(effect_names())
+    for name, entry in TELLING.items():
+        assert entry.size is None or entry.size in {p.name for p in effect(name).parameters}
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_a_reason_says_what_the_record_shows(arm: Model, name: str) -> None:
+    strange, joints, parameters = put_in(arm, name, 2)
+    records = records_of([trace_of(strange)], arm.machine, "position")
+    text = reason(name, joints, parameters, 900.0, 300.0, model=strange, before=arm, records=records)
+    print(text)
+    told = re.fullmatch(r"joint (\d) (.*): (.*), which takes its rms error from ([\d.]+) to ([\d.]+) ADC counts", text)
+    assert told is not None, text
+    assert float(told[4]) > float(told[5]), text
+    assert TELLING[name].called in told[3]
+    if joints:
+        assert told[1] == "2"
+    if name in SAYS:
+        assert re.search(SAYS[name], told[2]), text
+
+
+def test_a_reason_names_the_rival_and_the_other_joints(arm: Model) -> None:
+    strange = arm.with_effect("coulomb_friction", (1, 2), {"torque": 4.0})
+    records = records_of([trace_of(strange)], arm.machine, "position")
+    found = {f"joint{j}.coulomb_friction.torque": FoundValue(value=4.0, low=3.8, high=4.2, unit="N·m") for j in (1, 2)}
+    rival = Candidate(effect="stiction", joints=(1, 2), evidence=600.0)
+    text = reason(
+        "coulomb_friction", (1, 2), found, 900.0, 300.0, model=strange, before=arm, records=records,
+        runner_up=rival,
+    )  # fmt: skip
+    assert "(and likewise joint " in text
+    assert "Coulomb friction of 4 N·m (3.8 to 4.2)" in text
+    assert text.endswith("; stiction on joints 1 and 2 would explain 300 less of 900")
+
+
+def test_other_answers_have_their_reasons() -> None:
+    group = [
+        Candidate(effect=e, joints=(2,), evidence=v) for e, v in (("stiction", 120.0), ("coulomb_friction", 118.0))
+    ]
+    assert "2 of evidence is all that lies between them" in undecided(group, NOWHERE)
+    assert "stiction on joint 2, has evidence 120 only" in nothing(NOWHERE, group[0])
+    shape = RemainingShape(
+        joint=3, against="speed", unit="rad/s", torque_unit="N·m", centres=(0.0, 1.0), torque=(None, 2.5),
+        deviation=(None, 0.1), explained=0.7,
+    )  # fmt: skip
+    text = unexplained(NOWHERE, [shape])
+    assert "a torque at joint 3 of 2.5 to 2.5 N·m that goes with speed explains 70 % of what is left" in text
