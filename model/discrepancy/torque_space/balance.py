@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -63,13 +63,13 @@ class TorqueBalance:
         chain = chain_body(np.ascontiguousarray(vector[: at.SHARED]), joints, self.model.flags)
         bodies = vector[: at.SHARED].tobytes() + joints[:, list(BODY_COLUMNS)].tobytes()
         sensors = joints[:, list(SENSOR_COLUMNS)].tobytes()
-        motions = self._once("motion", sensors, lambda r, _: sensed(r, joints, self.model))
-        needed = self._once("needed", sensors + bodies, lambda r, i: _needed(chain, motions[i]))
+        motions = self._once("motion", sensors, lambda i: sensed(self.records[i], joints, self.model))
+        needed = self._once("needed", sensors + bodies, lambda i: _needed(chain, motions[i]))
         friction = joints[:, list(FRICTION_COLUMNS)].tobytes()
-        levels = self._once("levels", sensors + bodies + friction, lambda r, i: self._levels(chain, motions[i], joints))
+        levels = self._once("levels", sensors + bodies + friction, lambda i: self._levels(chain, motions[i], joints))
         loads = levels
         if self._own.shape[1] > 0:
-            loads = self._once("loads", sensors + bodies, lambda r, i: _gravity(chain, motions[i]))
+            loads = self._once("loads", sensors + bodies, lambda i: _gravity(chain, motions[i]))
         result = []
         for i, record in enumerate(self.records):
             volts = self._volts(record, vector, joints)
@@ -84,10 +84,10 @@ class TorqueBalance:
         gain = joints[:, at.GEAR] * joints[:, at.TORQUE_CONSTANT] / joints[:, at.RESISTANCE]
         return [record.compared(record.drive * gain) for record in self.records]
 
-    def _once(self, what: str, key: bytes, work: Any) -> list[Any]:
+    def _once(self, what: str, key: bytes, work: Callable[[int], Any]) -> list[Any]:
         kept = self._kept.get(what)
         if kept is None or kept[0] != key:
-            kept = key, [work(record, i) for i, record in enumerate(self.records)]
+            kept = key, [work(i) for i in range(len(self.records))]
             self._kept[what] = kept
         return kept[1]
 

@@ -80,7 +80,7 @@ def trials(
     for name, effect in known.items():
         if name in NOT_IN_TORQUE_SPACE or (names is not None and name not in names):
             continue
-        places = [()] if effect.whole_machine else [(j,) for j in model.machine.modelled_joints]
+        places: list[tuple[int, ...]] = [()] if effect.whole_machine else [(j,) for j in model.machine.modelled_joints]
         for joints in places:
             if _present(model, name, joints) or not _possible(model, effect, joints):
                 continue
@@ -116,23 +116,21 @@ def _present(model: Model, name: str, joints: tuple[int, ...]) -> bool:
 
 def _possible(model: Model, effect: Effect, joints: tuple[int, ...]) -> bool:
     """Whether the effect can do anything on this machine."""
-    if effect.joints and not set(joints) <= set(effect.joints):
-        return False
+    falls = any(model.machine.gravity)
     if not joints:
-        return effect.name != "base_tilt" or any(model.machine.gravity)
-    joint = model.machine.joint(joints[0])
-    if effect.name in MOTOR_EFFECTS and not isinstance(joint.drive, DcMotor):
-        return False
-    if effect.name in SENSOR_EFFECTS:
-        return joint.sensor is not None and joint.sensor.measures == "position" and joint.sensor.linearity is not None
-    if effect.name in ROTOR_EFFECTS:
-        inertia = model.vector[at.slot(joints[0], at.ROTOR_INERTIA)]
-        return bool(inertia > 0)
-    if effect.name == "centre_of_mass":
-        return bool(model.vector[at.slot(joints[0], at.A)] != 0.0)
-    if effect.name == "load_dependent_friction":
-        return any(model.machine.gravity)
-    return True
+        return effect.name != "base_tilt" or falls
+    joint, row = model.machine.joint(joints[0]), at.slot(joints[0], 0)
+    needs = {
+        "centre_of_mass": model.vector[row + at.A] != 0.0,
+        "load_dependent_friction": falls,
+        **dict.fromkeys(MOTOR_EFFECTS, isinstance(joint.drive, DcMotor)),
+        **dict.fromkeys(ROTOR_EFFECTS, model.vector[row + at.ROTOR_INERTIA] > 0),
+        **dict.fromkeys(
+            SENSOR_EFFECTS,
+            joint.sensor is not None and joint.sensor.measures == "position" and joint.sensor.linearity is not None,
+        ),
+    }
+    return bool(needs.get(effect.name, True)) and (not effect.joints or set(joints) <= set(effect.joints))
 
 
 def _starts(

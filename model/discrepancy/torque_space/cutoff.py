@@ -100,7 +100,7 @@ def measured_signal(trace: Trace, machine: Machine) -> RawSignal:
     if any(s is not None and s.measures == "velocity" for s in sensors):
         if speed is None:
             raise TraceError(f"trace {name}: has no velocity, which the sensors of {machine.name} measure")
-        position = position[0] + cumulative_trapezoid(speed, dx=period, axis=0, initial=0.0)
+        position = position[0] + cumulative_trapezoid(speed, dx=period, axis=0, initial=0)
     return RawSignal(name, time, position, speed, even(trace.drive), period)
 
 

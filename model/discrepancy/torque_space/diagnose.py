@@ -112,16 +112,14 @@ class _Workflow:
 
     def _decide(self, turn: Turn) -> bool:
         """Adopts the best candidate that holds. False when there is none."""
-        tried = 0
-        for chosen in turn.fitted:
-            if chosen.evidence < self.options.least_evidence or tried == CHANCES:
+        for chosen in turn.fitted[:CHANCES]:
+            if chosen.evidence < self.options.least_evidence:
                 return False
             before, after = self._judged(self.now, chosen.fit)
-            fitted = [judging.mean_squares(self.data.stretches, f.residual) for f in (self.now, chosen.fit)]
-            removed = judging.share_removed(*fitted, before, after)
+            fell, left = (judging.mean_squares(self.data.stretches, f.residual) for f in (self.now, chosen.fit))
+            removed = judging.share_removed(fell, left, before, after)
             holds = removed >= self.options.least_share
             self.steps.append(self._step(turn, chosen, before, after, removed, holds=holds))
-            tried += 1
             if holds:
                 self.added |= {p.name for p in chosen.parameters}
                 self.model = chosen.model.with_values(chosen.fit.values)
@@ -160,7 +158,7 @@ class _Workflow:
             where=located(self.model, self.records, self.now.residual, self.data.stretches, self.floor),
             reason=reason(chosen.effect, chosen.joints, values, removed),
             adopted=holds,
-            rejected_because=None if holds else f"on records not fitted to, the mean square falls by {removed:.1%} only",
+            rejected_because=None if holds else f"on records not fitted to the mean square falls by only {removed:.1%}",
         )  # fmt: skip
 
     def _candidates(self, turn: Turn) -> tuple[Candidate, ...]:

@@ -151,7 +151,7 @@ def gauss_newton(now: TorqueFit, data: Data, known: Slopes | None = None) -> dic
     low, high = np.array([p.low for p in parameters]), np.array([p.high for p in parameters])
     room = 1e-9 * np.maximum(high - low, scale)
     # orthogonal triangles first: the bounded search then works on p rows, not on all samples
-    triangle = np.linalg.qr(np.column_stack([A * scale, -b]), mode="r")
+    triangle: Floats = np.asarray(np.linalg.qr(np.column_stack([A * scale, -b]), mode="r"))
     solved = lsq_linear(
         np.concatenate([triangle[:, :-1], rows * scale]), np.concatenate([triangle[:, -1], aims]),
         bounds=((low - at - room) / scale, (high - at + room) / scale), method="bvls",

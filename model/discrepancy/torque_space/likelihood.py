@@ -72,8 +72,8 @@ def _pieces(record: int, mask: NDArray[np.bool_]) -> list[Stretch]:
 class NoiseModel:
     """How large residual torques are (n,), N·m or N, and over how many samples each says the same, by joint.
 
-    `memory` is 1 + 2 Σ ρ², ρ the residual's autocorrelation: what the sampling variance of a product of two such signals
-    is larger by than for white ones (Bartlett 1935).
+    `memory` is 1 + 2 Σ ρ², ρ the residual's autocorrelation: what the sampling variance of a product of two such
+    signals is larger by than for white ones (Bartlett 1935).
     """
 
     deviation: Floats

@@ -59,7 +59,7 @@ def located(
     """Map of the residual, in units of its noise, and what it goes with."""
     cells: list[PhaseCell] = []
     dependences: list[Dependence] = []
-    worst: tuple[float, int, str] | None = None
+    worst: tuple[float, int, Phase] | None = None
     for j, joint in enumerate(model.machine.modelled_joints):
         pieces = stretches.of_joint(residual, j)
         if not pieces:
@@ -81,9 +81,7 @@ def located(
                     mean_square=square, trace=i,
                     significance=float(significance_of_chi_square(square, correlation.samples_of_square(count))),
                 ))  # fmt: skip
-        dependences += [
-            _dependence(model, joint, a, b, u) for a, b, u in _bins(model, records, residual, stretches, j, floor)
-        ]
+        dependences += [_dependence(joint, a, b, u) for a, b, u in _bins(model, records, residual, stretches, j, floor)]
         phase = max(squares, key=lambda p: squares[p])
         relative = float(np.sqrt(np.mean(np.concatenate(pieces) ** 2))) / floor[j]
         if worst is None or relative > worst[0]:
@@ -94,7 +92,7 @@ def located(
     unit = torque_unit(model, joint)
     rms = ratio * floor[model.machine.modelled_joints.index(joint)]
     summary = f"joint {joint}, mostly {SPOKEN[where]}: {rms:.3g} {unit} rms, {ratio:.2g} times its noise"
-    return Where(joint=joint, phase=where, summary=summary, cells=tuple(cells), dependences=tuple(dependences))  # type: ignore[arg-type]
+    return Where(joint=joint, phase=where, summary=summary, cells=tuple(cells), dependences=tuple(dependences))
 
 
 def remaining_shapes(
@@ -159,7 +157,7 @@ def _bins(
     return found
 
 
-def _dependence(model: Model, joint: int, against: AgainstWhat, bins: Bins, unit: str) -> Dependence:
+def _dependence(joint: int, against: AgainstWhat, bins: Bins, unit: str) -> Dependence:
     return Dependence(
         joint=joint, against=against, unit=unit, centres=tuple(map(float, bins.centres)), residual=_optional(bins.mean),
         deviation=_optional(bins.deviation), significance=bins.significance,

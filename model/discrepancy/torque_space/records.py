@@ -1,4 +1,4 @@
-"""A recorded motion on an even grid: position, speed, acceleration and drive, all low-passed alike and without delay."""
+"""A recorded motion on an even grid: position, speed, acceleration and drive, low-passed alike and without delay."""
 
 from __future__ import annotations
 
@@ -103,14 +103,16 @@ def _record(trace: Trace, machine: Machine, cutoff: float) -> TorqueRecord:
     position, speed = _motion(raw, wide)
     acceleration = np.gradient(speed, raw.period, axis=0)
     drive = low_passed(raw.drive, wide, raw.period)
-    signals = [np.ascontiguousarray(s[::thin]) for s in (position, speed, acceleration, drive)]
+    position, speed, acceleration, drive = (
+        np.ascontiguousarray(s[::thin]) for s in (position, speed, acceleration, drive)
+    )
     time, period = raw.time[::thin], raw.period * thin
     every = max(1, int(1 / (KEPT * cutoff * period)))
     edge = max(1, int(EDGE / cutoff / period))
-    moving = _moving(signals[1], raw.speed_noise(wide), period)[edge : len(time) - edge : every]
+    moving = _moving(speed, raw.speed_noise(wide), period)[edge : len(time) - edge : every]
     if not moving.any():
         raise TraceError(f"trace {raw.name}: no joint moves beyond the noise of its readings")
-    return TorqueRecord(raw.name, time, *signals, period, cutoff, every, edge, moving)
+    return TorqueRecord(raw.name, time, position, speed, acceleration, drive, period, cutoff, every, edge, moving)
 
 
 def _motion(raw: RawSignal, wide: float) -> tuple[Floats, Floats]:

@@ -1,4 +1,4 @@
-"""Torque that motors, friction and effects supply along a measured motion. Compiled; the physics is the simulation's."""
+"""Torque of motors, friction and effects along a measured motion. Compiled; the physics is the simulation's."""
 
 from __future__ import annotations
 
@@ -73,11 +73,11 @@ def supplied_torque(
     joints: NDArray[Any], flags: NDArray[Any], level: NDArray[Any], load: NDArray[Any], own: NDArray[Any],
     motor: NDArray[Any], beside: NDArray[Any], contact: NDArray[Any],
 ) -> None:  # fmt: skip
-    """Torques (k, n) on the joints: `motor` of the motors, before any loss; `beside` of friction and every other effect.
+    """Torques (k, n) on the joints: `motor` of the motors, before any loss; `beside` of friction and all other effects.
 
     position, speed: of the links; rotor_speed: of the motors, seen at the joint; volts: after the amplifier, as they
-    act at `time`; level, load: friction levels and gravity torques along the motion. `contact` is the friction contact's
-    deflection in [−1, 1].
+    act at `time`; level, load: friction levels and gravity torques along the motion. `contact` is the deflection of
+    the friction contact, in [−1, 1].
     """
     n = position.shape[1]
     modes = extra_flags(joints, flags)
