@@ -9,17 +9,21 @@ import typer
 
 from daq.cli.context import JsonOption, console, print_json
 from daq.cli.effect_choice import patterns
-from daq.cli.model_input import MODEL_HELP, EffectFileOption, load_effects, read_model
+from daq.cli.model_input import MODEL_HELP, EffectFileOption, ReportOption, load_effects, read_model
 from daq.contracts.errors import SafetyError, SpecError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy as np
     from numpy.typing import NDArray
 
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import Machine
     from model.design.information import InformationGain
+    from model.design.search import DesignedExperiments
     from model.fitting.result import FitResult
+    from model.machine_model.model import Model
 
 app = typer.Typer(add_completion=False)
 
@@ -38,6 +42,7 @@ def design(
     duration: Annotated[float, typer.Option(min=1.0, max=600.0, help="Of each, in s.")] = 12.0,
     candidates: Annotated[int, typer.Option(min=1, max=10_000, help="Experiments to choose from.")] = 60,
     seed: Annotated[int, typer.Option(min=0, help="Of the candidates.")] = 0,
+    report: ReportOption = None,
     effect_file: EffectFileOption = None,
     json: JsonOption = False,
 ) -> None:
@@ -61,13 +66,13 @@ def design(
     if judge:
         from daq.cli.spec_file import read_spec
 
-        gain = information_gain(
-            chosen, [read_spec(p) for p in judge], plan, options=options, fitted=_fitted(model, parameters)
-        )
+        specs = [read_spec(p) for p in judge]
+        gain = information_gain(chosen, specs, plan, options=options, fitted=_fitted(model, parameters))
         if json:
             print_json(gain.model_dump(mode="json"))
         else:
             _print_gain(gain)
+        _report(report, chosen, specs, gain, "The experiments were given, and judged by this model.")
         return
     with shown_progress("designing") as tell:
         search_options = DesignOptions(experiments=experiments, duration=duration, candidates=candidates, seed=seed)
@@ -75,13 +80,39 @@ def design(
     files = [] if out is None else _written(found.specs, out)
     if json:
         print_json(found.model_dump(mode="json") | {"files": files})
-        return
+    else:
+        _print_design(found, files)
+    how = (
+        f"{found.considered} candidates were drawn with seed {seed}, {found.refused} of them outside the limits; from "
+        "the others those were taken that make the ellipsoid of uncertainty smallest (D-optimal), then exchanged."
+    )
+    _report(report, chosen, found.specs, found.gain, how, found.nats)
+
+
+def _print_design(found: DesignedExperiments, files: Sequence[Path]) -> None:
     print(f"{len(found.specs)} of {found.considered} candidates, {found.refused} outside the limits")
     for spec, nats in zip(found.specs, found.nats, strict=True):
         print(f"  {spec.name}: {spec.trajectory.kind}; with those before it {nats:.1f} nats")
     _print_gain(found.gain)
     for file in files:
         console().print(f"daq run spec {file}")
+
+
+def _report(
+    path: Path | None, model: Model, specs: Sequence[ExperimentSpec], gain: InformationGain, how: str,
+    nats: Sequence[float] | None = None,
+) -> None:  # fmt: skip
+    """The page of these experiments, where one is asked for."""
+    if path is None:
+        return
+    from model.reports.design_report import PlannedExperiment, design_report
+    from model.reports.page import write_report
+
+    plans = [
+        PlannedExperiment(spec, planned(spec, model.machine), None if nats is None else nats[number])
+        for number, spec in enumerate(specs)
+    ]
+    console().print(f"report: {write_report(design_report(model, plans, gain, how), path)}")
 
 
 def planned(spec: ExperimentSpec, machine: Machine) -> NDArray[np.float64]:

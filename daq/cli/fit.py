@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -21,6 +20,7 @@ from daq.cli.model_input import (
     read_model,
     read_traces,
 )
+from daq.cli.parameter_table import print_parameters
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from daq.contracts.trace import Trace
     from model.comparison.compare import Comparison
-    from model.fitting.result import FitResult, FittedParameter
+    from model.fitting.result import FitResult
     from model.machine_model.model import Model
 
 app = typer.Typer(add_completion=False)
@@ -149,18 +149,9 @@ def _print_json(found: FitResult, comparison: Comparison, out: Path) -> None:
 
 
 def _print(found: FitResult, comparison: Comparison) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
     from daq.cli.agreement_table import print_agreement
 
-    table = Table(box=None, header_style="bold")
-    for name, side in (("parameter", "left"), ("value", "right"), ("95 % interval", "right"), ("unit", "left"),
-                       ("before", "right"), ("", "left")):  # fmt: skip
-        table.add_column(name, justify="right" if side == "right" else "left", overflow="fold")
-    for p in found.parameters:
-        table.add_row(*_row(p))
-    Console(highlight=False, width=140).print(table)
+    print_parameters(found.parameters)
     known = sum(p.verdict == "known" for p in found.parameters)
     print(f"\nknown: {known} of {len(found.parameters)}", end="")
     print("; no number is given for the others" if known < len(found.parameters) else "")
@@ -170,26 +161,3 @@ def _print(found: FitResult, comparison: Comparison) -> None:
     print_agreement(comparison.models)
     if not found.converged:
         print(f"the search did not converge: {found.message}")
-
-
-def _row(p: FittedParameter) -> tuple[str, ...]:
-    bound = "" if p.at_bound is None else f"at its {'lower' if p.at_bound == 'low' else 'upper'} bound"
-    if p.value is None or p.low is None or p.high is None or p.deviation is None:
-        what = {"combination": "only in combination", "unknown": "not determined"}.get(p.verdict, p.verdict)
-        return p.name, "–", "–", p.unit, f"{p.before:.5g}", what
-    digits = significant(p.value, p.deviation)
-    return (
-        p.name,
-        f"{p.value:.{digits}g}",
-        f"{p.low:.{digits}g} to {p.high:.{digits}g}",
-        p.unit,
-        f"{p.before:.5g}",
-        bound,
-    )
-
-
-def significant(value: float, deviation: float) -> int:
-    """Digits of a value so that its deviation shows with two; at most seven."""
-    if value == 0 or deviation <= 0:
-        return 3
-    return max(2, min(7, 2 + math.floor(math.log10(abs(value))) - math.floor(math.log10(deviation))))

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.cli.context import console, print_json
-from daq.contracts.errors import SpecError
+from daq.cli.parameter_table import print_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from model.fitting.options import FitOptions
     from model.machine_model.model import Model
     from model.torque_space.fit import TorqueFit
+
+MOST_DRAWN = 6
+"""Traces in the report's pictures."""
 
 
 def fit_recorded_torques(
@@ -26,36 +29,34 @@ def fit_recorded_torques(
     from model.machine_model.model_file import save_model
     from model.torque_space.fit import fit_torques
 
-    if report is not None:
-        raise SpecError("--report: there is none of a fit of torques; `daq validate --report` takes its model")
     with shown_progress("fitting torques") as tell:
         found = fit_torques(begin, traces, held_out, options, progress=tell)
     save_model(found.model, out)
     if as_json:
         print_json(found.model_dump(mode="json", exclude={"model"}) | {"model": found.model.identity, "file": out})
-        return
-    _print(found)
-    console().print(f"model {found.model.identity}: {out}")
+    else:
+        _print(found)
+        console().print(f"model {found.model.identity}: {out}")
+    if report is not None:
+        from model.reports.page import write_report
+        from model.reports.torque_report import torque_report
+        from model.torque_space.curves import torque_curves
+
+        curves = [torque_curves(found.model, t, found.cutoff) for t in (*traces, *held_out)[:MOST_DRAWN]]
+        console().print(f"report: {write_report(torque_report(found, curves), report)}")
 
 
 def _print(found: TorqueFit) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table("parameter", "value", "unit", "", box=None, header_style="bold")
-    for verdict in found.identifiability.parameters:
-        known = verdict.verdict == "known"
-        value = f"{found.model.parameter(verdict.name).value:.4g}" if known else "–"
-        words = {"known": "", "combination": "only in combination", "unknown": "not determined"}[verdict.verdict]
-        table.add_row(verdict.name, value, verdict.unit, words)
-    shown = Console(highlight=False, width=120)
-    shown.print(table)
+    print_parameters(found.parameters)
     for combination in found.identifiability.undetermined:
         print(f"  not determined: {combination.text}")
     errors = Table("trace", "", "left of the torque", "rms by joint", box=None, header_style="bold")
     for one in found.errors:
         rms = ", ".join(f"{left:.3f} of {torque:.3f}" for left, torque in zip(one.rms, one.torque, strict=True))
         errors.add_row(one.trace, "held out" if one.held_out else "in sample", f"{100 * one.share:.1f} %", rms)
-    shown.print(errors)
+    Console(highlight=False, width=120).print(errors)
     print(f"left of the torque, all together: in sample {100 * found.in_sample:.1f} %", end="")
     print("" if found.held_out is None else f", held out {100 * found.held_out:.1f} %")

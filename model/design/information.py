@@ -18,6 +18,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import NoController
 from daq.contracts.trace import Trace, TraceRecord
+from model.fitting.covariance import inverse
 from model.fitting.fit import INTERVAL, fit_problem
 from model.fitting.options import FitOptions
 from model.fitting.problem import whitened
@@ -84,7 +85,7 @@ def information_gain(
     known = prior_information(unknowns) if fitted is None else _fitted_information(unknowns, fitted)
     total = known + sum(information for _, information in added)
     natural = scales(unknowns)
-    before, after = np.linalg.inv(known), np.linalg.inv(total)
+    before, after = inverse(known), inverse(total)
     parameters = tuple(
         ParameterGain(name=u.name, unit=u.unit, before=2 * INTERVAL * s * b**0.5, after=2 * INTERVAL * s * a**0.5)
         for u, s, b, a in zip(unknowns, natural, np.diag(before), np.diag(after), strict=True)
@@ -176,4 +177,4 @@ def _fitted_information(unknowns: Sequence[Unknown], fitted: FitResult) -> Float
         rows.append(fitted.names.index(u.name))
     natural = scales(tuple(unknowns))
     covariance = fitted.covariance_matrix[np.ix_(rows, rows)] / np.outer(natural, natural)
-    return np.asarray(np.linalg.inv(covariance))
+    return inverse(covariance)

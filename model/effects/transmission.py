@@ -76,7 +76,7 @@ TRANSMISSION = (
     ),
     Effect(
         "joint_compliance",
-        physics="τ = (q_m − q)/c + d (q̇_m − q̇) between rotor and link",
+        physics="τ = (q_m − q)/c + d (q̇_m − q̇) between rotor and link; with backlash on the same joint, one d for both",
         source="Spong 1987, elastic joints",
         parameters=(
             EffectParameter(

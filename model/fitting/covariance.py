@@ -45,9 +45,24 @@ def sandwich(information: Floats, scores: Sequence[Floats], prior: Floats, bandw
         scores: as for `score_covariance`, whitened. Neither may lack information in any direction beyond the prior's.
     """
     count, size = sum(len(run) for run in scores), information.shape[0]
-    bread = np.linalg.inv(information + np.diag(prior))
+    bread = inverse(information + np.diag(prior))
     middle = score_covariance(scores, bandwidth) * count / max(1, count - size) + np.diag(prior)
-    robust = bread @ middle @ bread
+    eigenvalues, vectors = np.linalg.eigh(middle)
+    half = bread @ (vectors * np.sqrt(np.maximum(eigenvalues, 0.0)))
+    robust = half @ half.T
     ratio = np.sqrt(np.diag(bread) / np.diag(robust))
     stretch = np.maximum(1.0, ratio)
     return robust * np.outer(stretch, stretch)
+
+
+def inverse(information: Floats) -> Floats:
+    """Inverse (p, p) of a symmetric matrix that is positive but for rounding, positive whatever rounding did.
+
+    Where the data say nothing of a direction, rounding may leave a little less than nothing; then the smallest amount
+    that rounding cannot hide stands for it. Rows and columns are brought to one size first.
+    """
+    sizes = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
+    eigenvalues, vectors = np.linalg.eigh(information / np.outer(sizes, sizes))
+    least = len(sizes) * np.finfo(float).eps
+    half = vectors / np.sqrt(np.maximum(eigenvalues, least)) / sizes[:, None]
+    return np.asarray(half @ half.T)

@@ -245,7 +245,7 @@ def _result(
     fitted = model.with_values(own).with_lineage(Lineage(parent=model.identity, traces=identities, fit=summary))
     deviations = np.sqrt(np.diag(estimate.covariance))
     parameters = tuple(
-        _parameter(u, float(v), float(d), estimate.report.verdict(u.name))
+        fitted_parameter(u, float(v), float(d), estimate.report.verdict(u.name))
         for u, v, d in zip(problem.unknowns, solution.values, deviations, strict=True)
         if not u.nuisance
     )
@@ -258,7 +258,8 @@ def _result(
     )  # fmt: skip
 
 
-def _parameter(u: Unknown, value: float, deviation: float, verdict: ParameterVerdict) -> FittedParameter:
+def fitted_parameter(u: Unknown, value: float, deviation: float, verdict: ParameterVerdict) -> FittedParameter:
+    """What is said of a parameter: no number and no interval where the data do not determine it."""
     near = 1e-6 * u.scale
     at_bound = "low" if value - u.low < near else "high" if u.high - value < near else None
     known = verdict.verdict == "known"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from model.fitting.covariance import inverse
 from model.fitting.unknowns import Unknown
 from model.identifiability.directions import NEGLIGIBLE, Direction, undetermined
 
@@ -93,7 +94,7 @@ def judged(jacobian: Floats, values: Floats, unknowns: Sequence[Unknown]) -> Ide
     claimed = np.array([u.nuisance and u.deviation is not None for u in unknowns])
     scaled = jacobian * natural
     information = scaled.T @ scaled + np.diag(np.where(claimed, 1.0, WEAKEST_PRIOR**-2))
-    marginal = np.sqrt(np.diag(np.linalg.inv(information)))
+    marginal = np.sqrt(np.diag(inverse(information)))
     alone = np.linalg.norm(scaled, axis=0)
     reduced, kept = _without_nuisances(scaled, nuisance, claimed), np.flatnonzero(~nuisance).tolist()
     own = [unknowns[k] for k in kept]
@@ -101,7 +102,7 @@ def judged(jacobian: Floats, values: Floats, unknowns: Sequence[Unknown]) -> Ide
     combinations = tuple(_combination(d, own, values[kept]) for d in directions)
     verdicts = tuple(_verdict(unknowns[k], marginal[k], alone[k], combinations) for k in kept)
     prior = np.array([1.0 if u.deviation is not None else WEAKEST_PRIOR**-2 for u in unknowns])
-    both = np.linalg.inv(scaled.T @ scaled + np.diag(prior))
+    both = inverse(scaled.T @ scaled + np.diag(prior))
     return IdentifiabilityReport(
         parameters=verdicts, undetermined=combinations, torque_scale_free=any(d.torque_scale for d in directions),
         correlated=_groups(both[np.ix_(kept, kept)], [u.name for u in own]),

@@ -108,7 +108,7 @@ class Model(_Part):
         found = [*base_parameters(self.machine)]
         for use in self.effects:
             beyond = self.own_columns.get(use.name, 0)
-            found.extend(effect_parameters(self.machine, use.name, use.joints, use.shared, beyond))
+            found.extend(_not_taken(effect_parameters(self.machine, use.name, use.joints, use.shared, beyond), found))
         for name, members in self.ties.items():
             found = _tied(found, name, members)
         return tuple(
@@ -275,6 +275,13 @@ def _check_use(machine: Machine, use: EffectUse) -> None:
 
 def _overlap(one: EffectUse, other: EffectUse) -> bool:
     return one.name == other.name and (not one.joints or bool(set(one.joints) & set(other.joints)))
+
+
+def _not_taken(own: tuple[Parameter, ...], before: list[Parameter]) -> list[Parameter]:
+    """Without places that a parameter of an effect before it fills: play and give of one joint have one damping."""
+    taken = {slot for p in before if p.effect is not None for slot in p.slots}
+    left = [Parameter(**{**vars(p), "slots": tuple(s for s in p.slots if s not in taken)}) for p in own]
+    return [p for p in left if p.slots]
 
 
 def _tied(found: list[Parameter], name: str, members: tuple[str, ...]) -> list[Parameter]:

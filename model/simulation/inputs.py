@@ -32,6 +32,7 @@ class RunInputs:
         set_points: (k, n) rad, held where the record has gaps. drive: (k, n) motor volts, for a run in open loop.
         initial: (n, 2) position (rad) and speed (rad/s). first_drive: (n,) commanded volts before the first period.
         rows: (m,) position of each sample on the grid. gains: (n, GAINS).
+        has_set_points, has_drive: whether the record has them; what it has not is held at the reading, or at zero.
     """
 
     joints: tuple[int, ...]
@@ -45,6 +46,8 @@ class RunInputs:
     gains: Floats
     noise: Floats = field(repr=False)
     name: str = ""
+    has_set_points: bool = True
+    has_drive: bool = True
 
     def __len__(self) -> int:
         return len(self.time)
@@ -58,7 +61,7 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
 
     Raises:
         TraceError: for fewer than three samples, a joint that is missing, angles that look like degrees, or neither
-            set points (with a controller) nor drive (without).
+            set points (with a controller) nor drive.
     """
     joints = machine.modelled_joints
     if len(trace) < 3:
@@ -70,8 +73,8 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
     rows = _rows(trace, period)
     count = int(np.ceil(rows[-1] - 1e-6)) + 1
     controlled = not isinstance(machine.controller, NoController)
-    if controlled and trace.set_point is None:
-        raise TraceError(f"trace {trace.record.trace_id}: has no set points; simulate it in open loop from its drive")
+    if controlled and trace.set_point is None and trace.drive is None:
+        raise TraceError(f"trace {trace.record.trace_id}: has neither set points nor drive: nothing moves the model")
     if not controlled and trace.drive is None:
         raise TraceError(
             f"trace {trace.record.trace_id}: has no drive, and {machine.name} has no controller to form one"
@@ -85,6 +88,7 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
     return RunInputs(
         joints, period, trace.time[0] + period * np.arange(count), set_points, drive, initial, drive[0].copy(), rows,
         _gains(machine, trace), np.zeros((count, len(joints))), trace.record.trace_id,
+        trace.set_point is not None, trace.drive is not None,
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import BoardPid, NoController, SampledPid
 from daq.contracts.trace import Trace
 from model.dynamics.dual import DUAL_STEP
@@ -201,12 +201,19 @@ class Prepared:
 
 
 def prepare(model: Model, inputs: RunInputs, options: Options) -> Prepared:
-    """Inputs of a run as compiled code reads them."""
+    """Inputs of a run as compiled code reads them.
+
+    Raises TraceError when the record lacks what moves the model in this loop, SpecError for other joints or noise.
+    """
     machine = model.machine
     if inputs.joints != machine.modelled_joints:
         raise SpecError(f"inputs are for joints {inputs.joints}, the model moves joints {machine.modelled_joints}")
     settings = np.zeros(at.SETTINGS, dtype=np.int64)
     controller = machine.controller
+    if options.loop == "closed" and not isinstance(controller, NoController) and not inputs.has_set_points:
+        raise TraceError(f"trace {inputs.name}: has no set points; simulate it in open loop from its drive")
+    if options.loop == "open" and not inputs.has_drive:
+        raise TraceError(f"trace {inputs.name}: has no drive, which a simulation in open loop needs")
     settings[at.QUANTISE] = int(options.quantise)
     settings[at.PUBLISHED_LOADS] = int(is_rod_arm(machine))
     set_points = inputs.set_points

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.fitting.choice import chosen_unknowns
+from model.fitting.covariance import sandwich
+from model.fitting.fit import fitted_parameter
 from model.fitting.least_squares import Search, solve
 from model.fitting.options import FitOptions
 from model.fitting.problem import whitened
 from model.fitting.records import records_of
+from model.fitting.result import FittedParameter
+from model.fitting.robust import influence
+from model.fitting.unknowns import prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
 from model.identifiability.report import IdentifiabilityReport, judged
 from model.machine_model.model import Lineage, Model
@@ -25,6 +32,24 @@ Floats = NDArray[np.float64]
 
 LONGEST_MEMORY = 40
 """Samples that the whitening of torques looks back: a low-passed residual is correlated over many."""
+
+
+_SENSOR = "positions are taken as they were recorded"
+_ROTOR = "the rotor's own motion is not recorded"
+_CONTROLLER = "the controller takes no part in it"
+NOT_IN_TORQUES = {
+    "stiction": "whether the joint sticks is not recorded",
+    "backlash": _ROTOR,
+    "joint_compliance": _ROTOR,
+    "motor_inductance": "the current is taken as settled",
+    "resistance_drift": "how warm the winding was is not recorded",
+    "potentiometer_gain": _SENSOR,
+    "potentiometer_offset": _SENSOR,
+    "potentiometer_nonlinearity": _SENSOR,
+    "wrong_gain": _CONTROLLER,
+    "lost_set_points": _CONTROLLER,
+}
+"""Effects that leave no mark in the torque that a recorded motion needs, and why. All others take part."""
 
 
 class TorqueError(BaseModel):
@@ -46,6 +71,7 @@ class TorqueFit(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     model: Model
+    parameters: tuple[FittedParameter, ...]
     identifiability: IdentifiabilityReport
     errors: tuple[TorqueError, ...]
     in_sample: float
@@ -61,12 +87,14 @@ def fit_torques(
 ) -> TorqueFit:  # fmt: skip
     """Fit the parameters that the options choose so that the motion needs the torque that was recorded.
 
-    Least squares with priors; the verdicts take the correlation of the residual into account.
+    Least squares with priors; verdicts and 95 % intervals take the correlation of the residual into account.
 
     Raises:
-        TraceError, SpecError: for traces or options that cannot give a result. CancelledError: when asked to end.
+        TraceError, SpecError: for traces or options that cannot give a result, and for an effect in the model that
+            torques cannot show (`NOT_IN_TORQUES`). CancelledError: when asked to end.
     """
     options, cancel = options or FitOptions(), cancel or Never()
+    _check_effects(model)
     records_of([*traces, *held_out], model.machine, "position")
     unknowns = chosen_unknowns(model, options)
     progress(0.0, "low-passing the records")
@@ -80,7 +108,7 @@ def fit_torques(
 
     search = Search(options.robust, options.tolerance, options.most_evaluations or 60, tell)
     found = solve(problem, [white(float(s)) for s in scale], begin, cancel, search)
-    report = _judged(problem, found.values)
+    parameters, report = _judged(problem, found.values, options)
     fitted = model.with_values({u.name: float(v) for u, v in zip(unknowns, found.values, strict=True)})
     names = tuple(t.record.trace_id for t in traces)
     errors = [_error(problem, found.values, t, model, cutoff, held=False) for t in traces]
@@ -89,7 +117,8 @@ def fit_torques(
     lineage = Lineage(parent=model.identity, traces=names, fit={"fitted": own, "known": list(report.known)})
     progress(1.0, "done")
     return TorqueFit(
-        model=fitted.with_lineage(lineage), identifiability=report, errors=tuple(e for e, _, _ in errors),
+        model=fitted.with_lineage(lineage), parameters=parameters, identifiability=report,
+        errors=tuple(e for e, _, _ in errors),
         in_sample=_share(errors[: len(traces)]), held_out=_share(errors[len(traces) :]) if held_out else None,
         cutoff=cutoff, evaluations=found.evaluations, converged=found.converged,
     )  # fmt: skip
@@ -100,14 +129,35 @@ def _left(problem: TorqueProblem, values: Floats) -> Floats:
     return np.asarray(np.sqrt((every**2).mean(axis=0)))
 
 
-def _judged(problem: TorqueProblem, values: Floats) -> IdentifiabilityReport:
+def _check_effects(model: Model) -> None:
+    for use in model.effects:
+        if use.name in NOT_IN_TORQUES:
+            raise SpecError(
+                f"effect {use.name}: cannot take part in a fit of torques: {NOT_IN_TORQUES[use.name]}; leave it out"
+            )
+
+
+def _judged(
+    problem: TorqueProblem, values: Floats, options: FitOptions
+) -> tuple[tuple[FittedParameter, ...], IdentifiabilityReport]:
+    """Values with intervals, and what the records cannot tell."""
     evaluations = problem.evaluate(values, derivatives=True)
     whiteners = [
         fitted_whitener([e.residual[:, j] for e in evaluations], LONGEST_MEMORY, 1e-9)
         for j in range(problem.model.joint_count)
     ]
     data = whitened(problem, evaluations, whiteners)
-    return judged(data.jacobian.reshape(data.residual.size, -1), values, problem.unknowns)
+    report = judged(data.jacobian.reshape(data.residual.size, -1), values, problem.unknowns)
+    natural = scales(problem.unknowns)
+    scaled = replace(data, jacobian=data.jacobian * natural)
+    cut = influence(data.residual) if options.robust else data.residual
+    prior = np.maximum(prior_precision(problem.unknowns) * natural**2, 1e-12)
+    deviations = natural * np.sqrt(np.diag(sandwich(scaled.information, scaled.scores(cut), prior)))
+    parameters = tuple(
+        fitted_parameter(u, float(v), float(d), report.verdict(u.name))
+        for u, v, d in zip(problem.unknowns, values, deviations, strict=True)
+    )
+    return parameters, report
 
 
 def _error(

@@ -27,7 +27,10 @@ EDGE = 0.1
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """Low-passed motion; acceleration and torque (k, n) go with it, and `kept` (k,) are the samples to use."""
+    """Low-passed motion; acceleration and torque (k, n) go with it, and `kept` (k,) are the samples to use.
+
+    torque: of the drive at standstill, N·m (N): n K_T/R times the volts, so back-EMF counts with what resists.
+    """
 
     motion: MeasuredMotion
     acceleration: Floats
@@ -62,9 +65,11 @@ def recorded_motion(model: Model, trace: Trace, cutoff: float = CUTOFF) -> Recor
 
     position = smooth(trace.position)
     speed = np.gradient(position, period, axis=0) if trace.velocity is None else smooth(trace.velocity)
-    torque = smooth(trace.drive)
+    drive = smooth(trace.drive)
+    joints = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
+    torque = drive * joints[:, at.GEAR] * joints[:, at.TORQUE_CONSTANT] / joints[:, at.RESISTANCE]
     edge = int(EDGE / period)
-    motion = MeasuredMotion(time, position, speed, _contact(model, position), torque, period, WIDTHS[0])
+    motion = MeasuredMotion(time, position, speed, _contact(model, position), drive, period, WIDTHS[0])
     return RecordedMotion(motion, np.gradient(speed, period, axis=0), torque, slice(edge, len(time) - edge))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -16,6 +18,8 @@ from model.design.information import imagined_trace, information_gain
 from model.design.search import DesignOptions, best_set, design
 from model.fitting.fit import fit
 from model.fitting.options import FitOptions
+from model.reports.design_report import PlannedExperiment, design_report
+from model.reports.page import write_report
 from tests.model.fitting.imagined import arm, machine, trace, traces
 
 NAMES = ("load.mass", "joint2.motor.back_emf_constant", "joint3.load_dependent_friction.arm")
@@ -77,6 +81,17 @@ def test_designed_experiments_stay_within_limits_and_beat_the_first_drawn() -> N
     assert found.refused < found.considered == 9
     again = design(arm(), plan, options, FEW)
     assert again == found
+
+
+def test_the_page_shows_every_experiment_and_what_becomes_known(tmp_path: Path) -> None:
+    specs = [multisine(0.2, name="wide"), multisine(0.05, name="narrow", gains={2: (3, 0, 0)})]
+    gain = information_gain(arm(), specs, plan, options=FEW)
+    shown = [PlannedExperiment(s, plan(s)) for s in specs]
+    page = write_report(design_report(arm(), shown, gain, "Given."), tmp_path / "design.html").read_text("utf-8")
+    for text in (*NAMES, "wide: multisine", "narrow: multisine", "gains joint 2: 3/0/0", "95 % width before"):
+        assert text in page
+    assert page.count("<svg") == 3
+    assert f"{gain.nats:.1f} nats" in page
 
 
 def test_nothing_within_the_limits_is_said_with_the_reason() -> None:

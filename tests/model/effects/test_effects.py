@@ -122,6 +122,17 @@ def test_compliance_tends_to_a_rigid_joint_as_it_vanishes(model: Model, inputs: 
     assert errors[2] < 4e-4  # what the stiffest contact gives
 
 
+def test_play_and_give_of_one_joint_have_one_damping(model: Model) -> None:
+    both = model.with_effect("backlash", (1, 2), {"gap": 0.01, "damping": 3.0}).with_effect("joint_compliance", (2, 3))
+    assert both.vector[at.slot(2, at.TRANSMISSION_DAMPING)] == 3.0
+    damping = [p.name for p in both.parameters if p.name.endswith(".damping")]
+    assert damping == ["joint1.backlash.damping", "joint2.backlash.damping", "joint3.joint_compliance.damping"]
+    alone = both.without_effect("backlash")
+    assert "joint2.joint_compliance.damping" in alone.by_name
+    slots = [slot for p in both.parameters for slot in p.slots]
+    assert len(slots) == len(set(slots))
+
+
 def test_inductance_tends_to_none_as_it_vanishes(model: Model, inputs: RunInputs) -> None:
     bare = run(model, inputs).position
     errors = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from model.fitting.covariance import sandwich
+from model.fitting.covariance import inverse, sandwich
 
 Floats = NDArray[np.float64]
 
@@ -47,3 +47,21 @@ def test_never_smaller_than_the_noise_alone_explains() -> None:
     J = np.ones((100, 1))
     lucky = [1e-6 * J]
     assert sandwich(J.T @ J, lucky, np.zeros(1))[0, 0] >= 0.01 * (1 - 1e-9)
+
+
+def test_what_the_data_say_nothing_of_is_wide_and_never_of_negative_variance() -> None:
+    """Two columns that are one but for rounding, and no prior to speak of; warnings are errors in this suite."""
+    rng = np.random.default_rng(3)
+    for scale in (1.0, 1e3, 1e6):
+        one = scale * rng.normal(size=(400, 1))
+        J = np.hstack([one, 3.0 * one, one + 1e-12 * scale * rng.normal(size=one.shape), rng.normal(size=one.shape)])
+        covariance = sandwich(J.T @ J, [J * rng.normal(size=one.shape)], np.full(4, 1e-12))
+        variances = np.diag(covariance)
+        assert (variances > 0).all()
+        assert variances[0] > 1e6 / (J.T @ J)[0, 0]
+        assert variances[3] < 0.1
+
+
+def test_the_inverse_is_the_inverse_where_there_is_one() -> None:
+    matrix = np.diag([1e12, 1.0, 1e-9]) + 1e-11
+    np.testing.assert_allclose(inverse(matrix) @ matrix, np.eye(3), atol=1e-9)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.special import ellipk
@@ -38,8 +40,8 @@ def test_without_drive_and_friction_energy_is_kept() -> None:
     )
     start = np.array([[3.0, 0.4], [0.8, -0.3], [0.1, 0.5]])
     trace = ramp_trace(machine, duration=1.0)
-    inputs = inputs_of(trace, machine)
-    run = simulate(model, inputs, Options(loop="open", initial=start))
+    trace = replace(trace, drive=np.zeros_like(trace.position))
+    run = simulate(model, inputs_of(trace, machine), Options(loop="open", initial=start))
     shared, joints = model.vector[: at.SHARED].copy(), model.vector[at.SHARED :].reshape(3, -1).copy()
     chain = chain_body(shared, joints, np.zeros(3, np.int64))
     energy = [
@@ -48,6 +50,26 @@ def test_without_drive_and_friction_energy_is_kept() -> None:
     ]
     assert np.ptp(run.position, axis=0).min() > 0.1
     assert np.ptp(energy) < 1e-8
+
+
+def test_a_record_of_drive_alone_is_repeated_in_open_loop_and_only_so() -> None:
+    machine = load_machine("ma2000")
+    model = base_model(machine)
+    closed = simulate(model, ramp_trace(machine), Options(quantise=False))
+    ramp = ramp_trace(machine)
+    driven = replace(ramp, drive=closed.drive)
+    alone = replace(driven, set_point=None)
+    opened = simulate(model, alone, Options(loop="open", quantise=False))
+    np.testing.assert_array_equal(
+        opened.position, simulate(model, driven, Options(loop="open", quantise=False)).position
+    )
+    np.testing.assert_allclose(opened.position, closed.position, atol=1e-5)  # the drive before the record differs
+    with pytest.raises(TraceError, match="has no set points; simulate it in open loop"):
+        simulate(model, alone)
+    with pytest.raises(TraceError, match="has no drive, which a simulation in open loop needs"):
+        simulate(model, ramp, Options(loop="open"))
+    with pytest.raises(TraceError, match="neither set points nor drive"):
+        simulate(model, replace(ramp, set_point=None))
 
 
 def test_a_carriage_obeys_newton_and_its_friction() -> None:

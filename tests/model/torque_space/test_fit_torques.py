@@ -12,9 +12,13 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import load_machine
 from daq.contracts.trace import Trace, TraceRecord
 from daq.traces.csv_table import import_csv
+from model.effects.library import library
 from model.fitting.options import FitOptions
 from model.machine_model.model import Model, base_model
-from model.torque_space.fit import fit_torques
+from model.reports.page import write_report
+from model.reports.torque_report import torque_report
+from model.torque_space.curves import torque_curves
+from model.torque_space.fit import NOT_IN_TORQUES, fit_torques
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 LENGTH, MASS, ROTOR, VISCOUS, COULOMB = 0.3, 0.93, 0.0043, 0.03, 0.05
@@ -56,6 +60,61 @@ def test_the_parameters_of_the_motion_are_found() -> None:
     assert found.held_out is not None
     assert found.held_out < 0.03
     assert "link1.mass" in found.identifiability.known
+
+
+def test_what_is_known_has_an_interval_and_the_report_shows_it(tmp_path: Path) -> None:
+    found = fit_torques(rod(), [swinging(1)], [swinging(5)], OPTIONS)
+    by_name = {p.name: p for p in found.parameters}
+    assert set(by_name) == {p.name for p in found.identifiability.parameters}
+    for name, p in by_name.items():
+        assert (p.value is None) == (p.verdict != "known"), name
+        if p.value is not None:
+            assert p.low is not None
+            assert p.high is not None
+            assert p.low <= p.value <= p.high
+            assert p.high - p.low < 0.2 * abs(p.value), name
+    curves = [torque_curves(found.model, t, found.cutoff) for t in (swinging(1), swinging(5))]
+    np.testing.assert_allclose(np.sqrt((curves[1].left ** 2).mean(axis=0)), found.errors[1].rms)
+    page = write_report(torque_report(found, curves), tmp_path / "torques.html").read_text("utf-8")
+    assert "link1.mass" in page
+    assert page.count("<svg") == 2
+    assert "swing5" in page
+
+
+def test_the_torque_of_the_drive_is_in_newton_metres() -> None:
+    """The rig's drive gives half a newton metre a volt."""
+    found = fit_torques(rod(), [swinging(1)], [], OPTIONS)
+    drive = swinging(1).drive
+    assert drive is not None
+    assert found.errors[0].torque[0] == pytest.approx(0.5 * float(np.sqrt((drive**2).mean())), rel=0.1)
+
+
+@pytest.mark.parametrize("name", sorted(NOT_IN_TORQUES))
+def test_effects_that_torques_cannot_show_are_refused_by_name(name: str) -> None:
+    with pytest.raises(SpecError, match=f"effect {name}: cannot take part in a fit of torques: .*; leave it out"):
+        fit_torques(rod().with_effect(name, (1,)), [swinging(1)], [], OPTIONS)
+
+
+OF_A_MOTOR = {"back_emf_error", "supply_limit"}
+"""The rod's drive is a plain gain: it has neither back-EMF nor a limit."""
+
+
+@pytest.mark.parametrize("name", sorted(set(library()) - set(NOT_IN_TORQUES) - OF_A_MOTOR))
+def test_every_other_effect_changes_the_torque_that_is_needed(name: str) -> None:
+    """At thrice its expected size, on the motion of the rod."""
+    model = rod()
+    if any(use.name == name for use in model.effects):
+        model = model.without_effect(name)
+    wider = model.with_effect(name, () if library()[name].whole_machine else (1,))
+    size = {
+        p.name: p.null - p.deviation if p.name.endswith("voltage") else p.null + 3 * p.deviation
+        for p in wider.parameters
+        if p.effect == name and p.null is not None and p.deviation is not None
+    }
+    changed = wider.with_values({n: float(np.clip(v, wider.parameter(n).low, wider.parameter(n).high))
+                                 for n, v in size.items()})  # fmt: skip
+    before, after = (torque_curves(m, swinging(1)).left for m in (wider, changed))
+    assert np.abs(after - before).max() > 1e-6
 
 
 def test_without_friction_in_the_model_friction_is_left() -> None:

@@ -1,0 +1,92 @@
+"""What a report of a fit says of its parameters: a table, a picture of the intervals, and what is not known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from model.fitting.result import FittedParameter
+from model.identifiability.report import IdentifiabilityReport
+from model.reports.figures import COLOURS, QUIET, drawn, panels
+from model.reports.page import Cell, Picture, Points, Table, Text, Tone, cells
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+VERDICTS = {"known": "known", "combination": "only\u00a0in\u00a0combination", "unknown": "not\u00a0determined"}
+
+
+def parameter_table(parameters: Sequence[FittedParameter]) -> Table:
+    """Values with intervals where the data give one, and what was expected."""
+    return Table(
+        ("parameter", "value", "95 % interval", "unit", "before", "expected", "verdict"),
+        tuple(_parameter_row(p) for p in parameters),
+        "A parameter that the traces do not determine gets no number; the model goes on with what was expected of it. "
+        "Intervals take the correlation of the residual into account.",
+    )
+
+
+def _parameter_row(p: FittedParameter) -> tuple[Cell, ...]:
+    expected = "–" if p.expected is None else f"{p.expected:.4g} ± {p.expected_deviation:.2g}"
+    verdict = VERDICTS[p.verdict] + ("" if p.at_bound is None else f", at its {p.at_bound} bound")
+    tone: Tone = "plain" if p.verdict == "known" else "warning"
+    value, interval = "–", "–"
+    if p.value is not None and p.low is not None and p.high is not None:
+        value, interval = f"{p.value:.4g}", f"{p.low:.4g} to {p.high:.4g}"
+    before, after = Cell(f"{p.before:.5g}", number=True), Cell(expected, number=True)
+    return (*cells(p.name, value, interval), Cell(p.unit), before, after, Cell(verdict, tone))
+
+
+def interval_picture(parameters: Sequence[FittedParameter]) -> tuple[Picture, ...]:
+    """Intervals in expected deviations from the expected value."""
+    shown = [p for p in parameters if p.value is not None and p.expected is not None and p.expected_deviation]
+    if not shown:
+        return ()
+
+    def draw(figure: Figure) -> None:
+        axes = panels(figure, 1, 1)[0][0]
+        axes.axvspan(-1, 1, color=QUIET, alpha=0.16, lw=0)
+        axes.axvline(0, color=QUIET, lw=0.8)
+        for row, p in enumerate(reversed(shown)):
+            assert p.expected is not None
+            assert p.expected_deviation is not None
+            low, value, high = (
+                ((0.0 if v is None else v) - p.expected) / p.expected_deviation for v in (p.low, p.value, p.high)
+            )
+            colour = COLOURS[(_joint(p.name) - 1) % len(COLOURS)]
+            axes.plot([low, high], [row, row], color=colour, lw=2.0, solid_capstyle="butt")
+            axes.plot([value], [row], "o", color=colour, ms=4)
+        axes.set_yticks(range(len(shown)), [p.name for p in reversed(shown)])
+        axes.set_ylim(-0.7, len(shown) - 0.3)
+        axes.set_xlabel("(value − expected) / expected deviation")
+        axes.grid(visible=False, axis="y")
+
+    caption = (
+        "Values with 95 % intervals, relative to what was expected before (band: one expected deviation). "
+        "Colours are those of the joints."
+    )
+    return (Picture(drawn(draw, 0.6 + 0.19 * len(shown)), caption),)
+
+
+def _joint(name: str) -> int:
+    """The first joint or link that a parameter's name has, 1 where it has none."""
+    digits = [c for c in name.split(".", maxsplit=1)[0] if c.isdigit()]
+    return int(digits[0]) if digits else 1
+
+
+def undetermined_blocks(report: IdentifiabilityReport) -> tuple[Text | Points, ...]:
+    """Combinations that the data leave open, and why parameters are not known."""
+    weak = [p for p in report.parameters if p.verdict != "known"]
+    if not weak and not report.undetermined:
+        return (Text("Every parameter is determined by the traces alone, without the help of what was expected."),)
+    blocks: list[Text | Points] = []
+    if report.undetermined:
+        blocks.append(Text("These changes leave the records as they are, within the noise:"))
+        blocks.append(Points(tuple(c.text for c in report.undetermined)))
+    if weak:
+        blocks.append(Text("By parameter:"))
+        blocks.append(Points(tuple(f"{p.name}: {p.reason}" for p in weak)))
+    if report.correlated:
+        blocks.append(Text("Estimates that move together (correlation above 0.95):"))
+        blocks.append(Points(tuple(", ".join(group) for group in report.correlated)))
+    return tuple(blocks)

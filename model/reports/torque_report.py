@@ -1,0 +1,85 @@
+"""The report of a fit of recorded torques."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from model.reports.figures import COLOURS, INK, baseline, drawn, panels, thinned
+from model.reports.page import Cell, Picture, Report, Section, Table, cells, listed, spoken
+from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
+from model.torque_space.curves import TorqueCurves
+from model.torque_space.fit import TorqueFit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def torque_report(found: TorqueFit, curves: Sequence[TorqueCurves]) -> Report:
+    """The page; `curves` are of the fitted model, on the traces that are to be drawn."""
+    machine = found.model.machine
+    sections = (
+        Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.parameters))),
+        Section("What the traces cannot tell", undetermined_blocks(found.identifiability)),
+        Section("What is left of the torque", (_error_table(found), *(_picture(c, found) for c in curves))),
+        Section("How it was done", (_how(found),)),
+    )
+    fitted, held = ([e.trace for e in found.errors if e.held_out is kind] for kind in (False, True))
+    facts = (
+        ("machine", machine.title),
+        ("model", f"{found.model.identity}, from {found.model.lineage.parent or 'none'}"),
+        ("effects", spoken([use.name for use in found.model.effects])),
+        ("fitted to", listed(fitted)),
+        ("held out", listed(held) if held else "none"),
+        ("search", f"{found.evaluations} evaluations; {'converged' if found.converged else 'did not converge'}"),
+    )
+    return Report(f"Fit of torques of {machine.title}", _answer(found), facts, sections)
+
+
+def _answer(found: TorqueFit) -> str:
+    known = sum(p.verdict == "known" for p in found.parameters)
+    held = "" if found.held_out is None else f", {100 * found.held_out:.1f} % on those held out"
+    return (
+        f"The traces determine {known} of {len(found.parameters)} parameters. Left of the torque: "
+        f"{100 * found.in_sample:.1f} % on the traces fitted to{held}."
+    )
+
+
+def _error_table(found: TorqueFit) -> Table:
+    rows = []
+    for one in found.errors:
+        for joint, left, torque in zip(found.model.machine.modelled_joints, one.rms, one.torque, strict=True):
+            kind = Cell("held out" if one.held_out else "in sample")
+            rows.append((Cell(one.trace), kind, *cells(str(joint), f"{left:.4g}", f"{torque:.4g}")))
+    return Table(
+        ("trace", "", "joint", "rms left", "rms of the torque"),
+        tuple(rows),
+        "In N·m (N on a prismatic joint): torque that the motion needs by the model less torque of the recorded drive.",
+    )
+
+
+def _picture(one: TorqueCurves, found: TorqueFit) -> Picture:
+    def draw(figure: Figure) -> None:
+        for axes, column, joint in zip(
+            panels(figure, 1, len(one.joints))[0], range(len(one.joints)), one.joints, strict=True
+        ):
+            time, recorded, left = thinned(one.time, one.recorded[:, column], one.left[:, column])
+            axes.plot(time, recorded, color=INK, lw=0.9, label="recorded")
+            axes.plot(time, left, color=COLOURS[(joint - 1) % len(COLOURS)], lw=0.9, label="left")
+            baseline(axes)
+            axes.set_title(f"joint {joint}")
+            axes.set_xlabel("time / s")
+            unit = "N·m" if found.model.machine.joint(joint).kind == "revolute" else "N"
+            axes.set_ylabel(f"torque / {unit}" if unit == "N·m" else "force / N")
+            axes.legend()
+
+    return Picture(drawn(draw, 2.4), f"{one.trace}: torque of the recorded drive, and what the model leaves of it.")
+
+
+def _how(found: TorqueFit) -> Table:
+    rows = (
+        ("low-pass", f"{found.cutoff:g} Hz, forwards and backwards, on positions and torques alike"),
+        ("residual", "torque that the motion needs by the model, less torque of the recorded drive"),
+        ("intervals", "whitened residual, and a covariance that holds where whitening was not enough"),
+    )
+    return Table(("setting", "value"), tuple((Cell(n), Cell(v)) for n, v in rows))
