@@ -149,7 +149,7 @@ def _of_joint(name: str, joint: int) -> bool:
 
 
 def _size(effect: str, parameters: Mapping[str, FoundValue], joint: int) -> str:
-    """“ of 0.93° (0.90 to 0.96)”, or nothing where the effect has no single size."""
+    """“, 0.93° (0.90 to 0.96)”, or nothing where the effect has no single size."""
     name = telling(effect).size
     own = [v for n, v in parameters.items() if n.rpartition(".")[2] == name and _of_joint(n, joint)]
     own = own or [v for n, v in parameters.items() if n.rpartition(".")[2] == name]
@@ -162,7 +162,7 @@ def _size(effect: str, parameters: Mapping[str, FoundValue], joint: int) -> str:
     interval = ""
     if value.low is not None and value.high is not None:
         interval = f" ({value.low * factor:.3g} to {value.high * factor:.3g})"
-    return f" of {value.value * factor:.3g}{unit}{interval}"
+    return f", {value.value * factor:.3g}{unit}{interval}"
 
 
 def _named(candidate: Candidate) -> str:

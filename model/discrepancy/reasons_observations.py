@@ -21,6 +21,8 @@ Mask = NDArray[np.bool_]
 
 NEAR = 0.1
 """s around a change of speed that count as the change."""
+SLICE = 0.1
+"""s over which a lag after a change of direction is averaged."""
 FULL = 0.6
 """Share of the largest drive from which it counts as high."""
 LOW = 0.15
@@ -37,8 +39,16 @@ class Spoken:
     torque_unit: str
 
     def size(self, value: float) -> str:
-        """A residual with its unit."""
-        return f"{abs(value) * self.factor:.2g}{'' if self.unit.startswith('°') else ' '}{self.unit}"
+        """How large a residual is, with its unit."""
+        return f"{abs(value) * self.factor:.2g}{self._gap}{self.unit}"
+
+    def place(self, value: float) -> str:
+        """A position with its unit."""
+        return f"{value * self.factor:.3g}{self._gap}{self.unit}"
+
+    @property
+    def _gap(self) -> str:
+        return "" if self.unit.startswith("°") else " "
 
 
 @dataclass(frozen=True)
@@ -98,10 +108,14 @@ def lags_after_turns(s: Samples, say: Spoken, _: dict[str, float]) -> Observatio
     before = _before_turns(s)
     if turns == 0 or after.sum() < s.rate / 10 or not before.any():
         return None
-    lag = _lag(s)
+    lag, begin = _lag(s), _worst_after_turn(s)
+    then = after & (s.since_turn >= begin) & (s.since_turn < begin + SLICE)
     count = f"each of {turns} reversals" if turns > 1 else "its reversal"
-    text = f"{_behind(_mean(lag, after), say)} after {count} and {_by(_mean(lag, before), say)} before"
-    return Observation(text, _share(s, s.direction * after))
+    text = (
+        f"{_behind(_mean(lag, then), say)} {begin + SLICE / 2:.2g} s after {count} and "
+        f"{_by(_mean(lag, before), say)} before"
+    )
+    return Observation(text, _share(s, s.direction * then))
 
 
 def lags_one_way(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | None:
@@ -186,8 +200,8 @@ def goes_with_position(s: Samples, say: Spoken, _: dict[str, float]) -> Observat
     if high - low < 1e-6:
         return None
     text = (
-        f"is off by {_signed(_mean(s.without, s.asked <= low), say)} below {low * say.factor:.3g} {say.unit} and by "
-        f"{_signed(_mean(s.without, s.asked >= high), say)} above {high * say.factor:.3g} {say.unit}, in all it does"
+        f"is off by {_signed(_mean(s.without, s.asked <= low), say)} below {say.place(low)} and by "
+        f"{_signed(_mean(s.without, s.asked >= high), say)} above {say.place(high)}, in all it does"
     )
     return Observation(text, _share(s, s.asked - s.asked.mean()))
 
@@ -201,7 +215,7 @@ def bends_with_position(s: Samples, say: Spoken, _: dict[str, float]) -> Observa
     basis = np.stack([np.cos(k * np.pi * place) for k in range(1, 5)], axis=1)
     curve = _fitted(s.without, basis)
     text = f"is off by a curve over its position that spans {say.size(float(np.ptp(curve)))}"
-    return Observation(f"{text} on {reach * say.factor:.3g} {say.unit} of travel", _share(s, *basis.T))
+    return Observation(f"{text} on {say.place(reach)} of travel", _share(s, *basis.T))
 
 
 def swings_with_position(s: Samples, say: Spoken, known: dict[str, float]) -> Observation | None:
@@ -245,7 +259,7 @@ def grows_with_time(s: Samples, say: Spoken, _: dict[str, float]) -> Observation
 def lags_under_load(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | None:
     """Further behind the more it carries."""
     load = np.abs(s.gravity)
-    if np.ptp(load[s.moving], initial=0.0) < 1e-6 if s.moving.any() else True:
+    if not s.moving.any() or np.ptp(load[s.moving]) < 1e-6:
         return None
     low, high = np.quantile(load[s.moving], [0.25, 0.75])
     lag = _lag(s)
@@ -364,6 +378,14 @@ def _begun(moving: Mask, reach: int) -> Mask:
     started = moving.copy()
     started[1:] &= ~moving[:-1]
     return _spread(started, reach)
+
+
+def _worst_after_turn(s: Samples) -> float:
+    """s after a change of direction from which, for `SLICE`, the joint is furthest behind or ahead on average."""
+    begins = np.arange(0.0, TURNING - SLICE / 2, SLICE / 2)
+    lag = _lag(s)
+    means = [abs(_mean(lag, s.moving & (s.since_turn >= b) & (s.since_turn < b + SLICE))) for b in begins]
+    return float(begins[int(np.argmax(means))])
 
 
 def _before_turns(s: Samples) -> Mask:

@@ -32,7 +32,7 @@ TELLING: dict[str, Telling] = {
     "back_emf_error": Telling("a back-EMF constant off its data sheet", "relative", (o.lags_with_speed,)),
     "resistance_drift": Telling("a winding that warms", "heating", (o.grows_with_time, o.lags_under_drive)),
     "motor_inductance": Telling("motor inductance", "inductance", (o.late_at_changes,)),
-    "dead_zone": Telling("a dead zone of the amplifier", "width", (o.stops_short, o.lags_alike, o.lags_when_slow)),
+    "dead_zone": Telling("a dead zone of the amplifier", "width", (o.lags_alike, o.stops_short, o.lags_when_slow)),
     "supply_limit": Telling("a supply limit below the nominal one", "voltage", (o.fails_at_high_drive,)),
     "torque_ripple": Telling("torque ripple", None, (o.swings_with_position,)),
     "gear_loss": Telling("a loss in the gear", "loss", (o.lags_under_drive, o.lags_alike)),

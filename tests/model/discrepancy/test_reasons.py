@@ -19,7 +19,7 @@ from tests.model.fitting import imagined
 SIZES: dict[str, dict[str, float]] = {
     "viscous_friction": {"coefficient": 4e-4},
     "coulomb_friction": {"torque": 4.0},
-    "load_dependent_friction": {"arm": 0.15},
+    "load_dependent_friction": {"arm": 0.6},
     "stribeck_friction": {"torque": 4.0, "speed": 0.05},
     "stiction": {"breakaway": 4.0},
     "direction_dependent_friction": {"difference": 4.0},
@@ -50,13 +50,13 @@ SIZES: dict[str, dict[str, float]] = {
 SAYS = {
     "viscous_friction": r"a lag that grows with speed",
     "coulomb_friction": r"lags by [\d.]+° in slow motion and by [\d.]+° in fast, always against the motion",
-    "backlash": r"lags by [\d.]+° after each of \d+ reversals and by −?[\d.e-]+° before",
+    "backlash": r"lags by [\d.]+° 0\.\d+ s after each of \d+ reversals and by −?[\d.e-]+° before",
     "direction_dependent_friction": r"by [\d.e-]+° moving forwards and by −[\d.e-]+° backwards",
     "supply_limit": r"where more than 4 V are asked for",
     "torque_ripple": r"30 times a turn",
     "periodic_disturbance": r"at 1\.5 Hz",
     "wrong_gain": r"gets 1\.2\d* times the V that its controller's gain gives for the same error",
-    "spring_torque": r"below -?[\d.]+ ° and by [+−]",
+    "spring_torque": r"below -?[\d.]+° and by [+−]",
     "input_delay": r"within 0\.1 s of changes of speed",
 }
 """What must be in the sentence, where an effect has one sign of its own."""
@@ -96,7 +96,6 @@ def test_a_reason_says_what_the_record_shows(arm: Model, name: str) -> None:
     strange, joints, parameters = put_in(arm, name, 2)
     records = records_of([trace_of(strange)], arm.machine, "position")
     text = reason(name, joints, parameters, 900.0, 300.0, model=strange, before=arm, records=records)
-    print(text)
     told = re.fullmatch(r"joint (\d) (.*): (.*), which takes its rms error from ([\d.]+) to ([\d.]+) ADC counts", text)
     assert told is not None, text
     assert float(told[4]) > float(told[5]), text
@@ -117,7 +116,7 @@ def test_a_reason_names_the_rival_and_the_other_joints(arm: Model) -> None:
         runner_up=rival,
     )  # fmt: skip
     assert "(and likewise joint " in text
-    assert "Coulomb friction of 4 N·m (3.8 to 4.2)" in text
+    assert "Coulomb friction, 4 N·m (3.8 to 4.2)" in text
     assert text.endswith("; stiction on joints 1 and 2 would explain 300 less of 900")
 
 
