@@ -25,7 +25,7 @@ def shown_commands(page: Path) -> list[list[str]]:
     return [command.split()[1:] for command in commands if command.startswith("daq ")]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "docs" / "own-effect.md"], ids=lambda page: page.name)
 def test_every_option_of_a_shown_command_exists(page: Path) -> None:
     commands = shown_commands(page)
     assert commands
