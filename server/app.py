@@ -12,7 +12,7 @@ from fastapi.routing import APIRoute
 
 from server import problems
 from server.access.gate import Gate
-from server.api import experiments, queue, robots, traces
+from server.api import controller, experiments, queue, robots, teaching, traces
 from server.services import Services
 
 API = "/api/v1"
@@ -45,7 +45,7 @@ def make_app(services: Services, gate: Gate) -> FastAPI:
     )
     problems.install(app)
     api = APIRouter(prefix=API)
-    for part in (robots, experiments, queue, traces):
+    for part in (robots, controller, teaching, experiments, queue, traces):
         api.include_router(part.router)
     app.include_router(api)
     app.add_middleware(gate.middleware)

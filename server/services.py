@@ -15,12 +15,13 @@ from daq.contracts.errors import DaqError
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock, SystemClock
 from server.owner.messages import Answer, ArmReport, Finish, Opened, Report
-from server.problems import ProblemError, not_found
+from server.problems import ProblemError, conflict, not_found
 from server.queue.desk import QueueDesk, QueueParts
 from server.robot.control import ControlDesk
 from server.robot.keeper import Keeper
 from server.robot.robot import Robot, RobotPlace
 from server.robot.stop import StopDesk
+from server.robot.teaching import TeachingDesk
 from server.store.engine import Store
 from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
@@ -43,11 +44,15 @@ class RobotServices:
     control: ControlDesk
     queue: QueueDesk
     catalogue: Catalogue
+    teaching: TeachingDesk
 
-    def finish_teaching(self) -> None:
-        """Whatever is taught by hand ends in good order; an experiment of the queue is left alone."""
-        if self.robot.experiment is None:
-            self.robot.tell(Finish())
+    def require_motion(self, lease: str | None) -> None:
+        """Raises a 409 unless this lease has the control now, and with it the operator's word for a real arm."""
+        held = self.control.require(lease)
+        identity = self.robot.identity
+        if identity is not None and not identity.simulated and not held.moves_real_arm:
+            line = f"{self.robot.place.url} is a real arm: it moves only with the operator's word"
+            raise conflict("consent-needed", line, "take the control again, with moves_real_arm")
 
 
 class Services:
@@ -136,7 +141,8 @@ class Services:
         robot.disconnected.append(lambda _why: queue.wake())
         # After the loss of a process that wrote a trace, its part file is finished and found.
         robot.disconnected.append(lambda _why: self._take_in(catalogue))
-        return RobotServices(robot, Keeper(robot), StopDesk(robot, self.clock), control, queue, catalogue)
+        teaching = TeachingDesk(robot, lambda line: self.tell_later(name, "teaching", line))
+        return RobotServices(robot, Keeper(robot), StopDesk(robot, self.clock), control, queue, catalogue, teaching)
 
     def tell(
         self, robot: str, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None
@@ -145,7 +151,7 @@ class Services:
         log.info("%s: %s: %s", robot, kind, text, extra={"actor": actor, "experiment": experiment})
         self.events.add(robot, kind, text, self.clock.utc(), actor, experiment)
 
-    def tell_later(self, robot: str, kind: str, text: str, *, actor: str) -> None:
+    def tell_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:
         """The same, for whoever must not wait for a disk."""
         self._later.submit(self.tell, robot, kind, text, actor=actor)
 

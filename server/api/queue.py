@@ -121,7 +121,7 @@ def renew_control(one: RobotPart, _: Operator, lease: LeaseHeader = None) -> Con
 def give_control_back(one: RobotPart, found: ServicesPart, who: Operator, lease: LeaseHeader = None) -> Response:
     """Gives the control back; what this client was moving holds."""
     one.control.give_back(lease or "")
-    one.finish_teaching()
+    one.teaching.finish()
     found.tell(one.robot.name, "control", f"{who.name} gave the control back", actor=who.name)
     one.queue.wake()
     return Response(status_code=204)

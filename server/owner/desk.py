@@ -15,6 +15,7 @@ from daq.contracts.machine import Machine
 from daq.contracts.service.robot import Activity
 from daq.driver import BoardSnapshot
 from daq.runner import ArmControl
+from daq.safety import State
 from daq.teaching.controller_arm import ControllerArm
 from server.owner.inbox import Inbox
 from server.owner.messages import ArmReport, Told
@@ -72,11 +73,13 @@ class Desk:
 
     def tell_arm(self) -> None:
         """The arm's state, when it has changed, or nobody has been told for a second."""
-        arm = self.control.arm
+        arm, ended = self.control.arm, self.ended()
+        # Also before the board has confirmed it:
+        stopping = ended is not None and arm.connected and arm.state is not State.FAULT
         counters = self.controller.counters.numbers() if self._due() else (self._told.counters if self._told else {})
         report = ArmReport(
-            arm=arm.state.value,
-            cause=arm.cause or "",
+            arm="stopped" if stopping else arm.state.value,
+            cause=arm.cause or ended or "",
             activity=self.activity,
             limp=tuple(limp_joints(self.gains)),
             link=self.controller.link.state.value,

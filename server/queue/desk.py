@@ -73,7 +73,8 @@ class QueueDesk:
 
     def __init__(self, parts: QueueParts) -> None:
         self._parts = parts
-        self._changed = threading.Condition(threading.RLock())
+        self._lock = threading.RLock()
+        self._changed = threading.Event()
         self._closing = False
         self._consent = False
         self._attended_until: float | None = None
@@ -104,7 +105,7 @@ class QueueDesk:
     def cancel(self, identity: str, by: str) -> Experiment:
         """Takes back what waits; stops the arm where it runs. Raises a 404, and a 409 for what has ended."""
         name = self._parts.robot.name
-        with self._changed:
+        with self._lock:
             running = self._running
             if running is not None and running.id == identity:
                 running.cancelled_by = by
@@ -117,7 +118,7 @@ class QueueDesk:
 
     def pause(self, reason: str, by: str | None = None) -> None:
         """Lets no other experiment begin; one that runs goes on."""
-        with self._changed:
+        with self._lock:
             if self._state.paused and by is None:
                 return
             self._set_state(QueueState(True, reason, self._parts.clock.utc()))
@@ -130,7 +131,7 @@ class QueueDesk:
         if arm is not None and arm.arm in ("stopped", "fault"):
             line = f"the arm is {arm.arm}: {arm.cause}"
             raise conflict("arm-stopped", line, "look at the arm, reset it, then resume the queue")
-        with self._changed:
+        with self._lock:
             self._consent = self._consent or moves_real_arm
             self._set_state(QueueState(False, f"resumed by {by}", self._parts.clock.utc()))
             self._attended_until = self._parts.clock.monotonic() + ATTENDANCE
@@ -139,14 +140,13 @@ class QueueDesk:
 
     def attend(self) -> None:
         """An operator says to be there, for a minute more."""
-        with self._changed:
+        with self._lock:
             self._attended_until = self._parts.clock.monotonic() + ATTENDANCE
         self.wake()
 
     def wake(self) -> None:
         """Something has changed that may let the next experiment begin."""
-        with self._changed:
-            self._changed.notify_all()
+        self._changed.set()  # and nothing else: whoever calls must not wait for a disk
 
     def progressed(self, fraction: float, text: str) -> None:
         """How far the experiment that runs is."""
@@ -163,7 +163,7 @@ class QueueDesk:
 
     def status(self) -> QueueStatus:
         """Now."""
-        with self._changed:
+        with self._lock:
             state, running, waiting_for = self._state, self._running, self._waiting_for
             left = None if self._attended_until is None else self._attended_until - self._parts.clock.monotonic()
         needs_attendance = left is not None and left > 0 and self._needs_attendance()
@@ -180,9 +180,9 @@ class QueueDesk:
 
     def close(self, patience: float) -> None:
         """Lets nothing begin any more, and waits for what the robot's owner says about what ran."""
-        with self._changed:
+        with self._lock:
             self._closing = True
-            self._changed.notify_all()
+        self._changed.set()
         if self._worker.is_alive():
             self._worker.join(patience)
 
@@ -214,9 +214,10 @@ class QueueDesk:
 
     def _work(self) -> None:
         while True:
-            with self._changed:
+            with self._lock:
                 if self._closing:
                     return
+            self._changed.clear()
             try:
                 self._submit_scheduled()
                 experiment = self._take()
@@ -227,9 +228,7 @@ class QueueDesk:
                 # A disk that is full, a database that is locked: the queue must not end with it, nor go on blindly.
                 log.exception("queue")
                 self._waiting_for = "the queue met a fault of this program: see the log"
-            with self._changed:
-                if not self._closing:
-                    self._changed.wait(LOOK_EVERY)
+            self._changed.wait(LOOK_EVERY)
 
     def _submit_scheduled(self) -> None:
         parts, now = self._parts, self._parts.clock.utc()
@@ -247,7 +246,7 @@ class QueueDesk:
     def _take(self) -> Experiment | None:
         """The next experiment, with the control of the robot; None when none may begin now."""
         parts = self._parts
-        with self._changed:
+        with self._lock:
             following = next_due(parts.experiments.waiting(parts.robot.name), parts.clock.utc())
             if following is None:
                 self._waiting_for = ""
@@ -289,7 +288,7 @@ class QueueDesk:
         finally:
             parts.robot.experiment = None
             parts.control.give_back_for_queue()
-        with self._changed:
+        with self._lock:
             running, self._running = self._running, None
             ending = self._as_wished(ending, running)
             parts.experiments.end(
@@ -302,7 +301,7 @@ class QueueDesk:
     def _run(self, experiment: Experiment) -> Ending:
         parts = self._parts
         try:
-            with self._changed:
+            with self._lock:
                 running = self._running
                 assert running is not None
                 if running.cancelled_by is not None:

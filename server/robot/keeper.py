@@ -9,6 +9,8 @@ from daq.contracts.errors import DaqError
 from daq.transport import ReconnectDelay
 from server.robot.robot import Robot
 
+PATIENCE = 20.0
+"""s for a process to freeze the arm, close its trace and end, on a busy computer."""
 DELAYS = ReconnectDelay(first_s=1.0, longest_s=30.0)
 log = logging.getLogger("server.robot")
 
@@ -41,7 +43,7 @@ class Keeper:
         with self._changed:
             self._wanted = False
             self._changed.notify_all()
-        return self._robot.disconnect()
+        return self._robot.disconnect(PATIENCE)
 
     def close(self, patience: float) -> None:
         """For good."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import AwareDatetime, Field
 
@@ -126,35 +126,6 @@ class GripperRequest(Wire):
     """The gripper."""
 
     closed: bool
-
-
-class JogRequest(Wire):
-    """Velocities (rad/s) of joints, kept up for 0.3 s at most: whoever holds the key repeats it. Empty: hold."""
-
-    velocities: dict[JointNumber, Annotated[float, Field(ge=-3, le=3)]]
-
-
-class JogStatus(Wire):
-    """What became of a jog command."""
-
-    taken: bool
-    refused: str = ""
-    """Why joints that should move do not."""
-
-
-class StepRequest(Wire):
-    """One off-line step to absolute angles (`to`), or by relative ones (`by`), in rad; `speed` of the fastest joint in
-    rad/s."""
-
-    to: dict[JointNumber, Annotated[float, Field(ge=-7, le=7)]] | None = None
-    by: dict[JointNumber, Annotated[float, Field(ge=-7, le=7)]] | None = None
-    speed: Annotated[float, Field(gt=0, le=0.35)] = 0.25
-
-
-class LeadRequest(Wire):
-    """Joints to be led by hand. They lose their drive and sink: hold the arm."""
-
-    joints: Annotated[tuple[JointNumber, ...], Field(min_length=1)] = (1, 2, 3)
 
 
 class Done(Wire):

@@ -1,0 +1,85 @@
+"""Moving the arm by hand and by program, as the original's teach pendant did."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AwareDatetime, Field
+
+from daq.contracts.experiment import JointNumber
+from daq.contracts.service.base import Wire
+from daq.contracts.service.robot import Activity
+
+Velocity = Annotated[float, Field(ge=-3, le=3)]
+Angle = Annotated[float, Field(ge=-7, le=7)]
+
+
+class JogRequest(Wire):
+    """Velocities (rad/s) of joints, kept up for 0.3 s at most: whoever holds the key repeats it. Empty: hold."""
+
+    velocities: dict[JointNumber, Velocity]
+
+
+class StepRequest(Wire):
+    """One off-line step to absolute angles (`to`), or by relative ones (`by`), in rad; `speed` of the fastest joint in
+    rad/s. Give one of the two."""
+
+    to: dict[JointNumber, Angle] | None = None
+    by: dict[JointNumber, Angle] | None = None
+    speed: Annotated[float, Field(gt=0, le=0.35)] = 0.25
+
+
+class LeadRequest(Wire):
+    """Joints to be led by hand. They lose their drive and sink: hold the arm."""
+
+    joints: Annotated[tuple[JointNumber, ...], Field(min_length=1)] = (1, 2, 3)
+
+
+class TaughtPath(Wire):
+    """Measured angles (rad), one row a control period, one column a joint; times (s) from the first row. As the `path`
+    of an experiment it is played back."""
+
+    joints: tuple[int, ...]
+    times: tuple[float, ...]
+    positions: tuple[tuple[float, ...], ...]
+
+
+class TeachingLine(Wire):
+    """A line for whoever teaches: a joint that is refused, an instruction that begins."""
+
+    number: int
+    at: AwareDatetime
+    text: str
+
+
+class TeachingStatus(Wire):
+    """What is being taught now, and how the last one ended."""
+
+    activity: Activity
+    lines: tuple[TeachingLine, ...] = ()
+    """The newest ones, the oldest first."""
+    result: str = ""
+    """How the last teaching ended; empty while one goes on, or before the first."""
+    problem: str = ""
+    """Why the last teaching ended early."""
+    path: TaughtPath | None = None
+    """What was led by hand last."""
+
+
+class CalibrationRequest(Wire):
+    """Joints whose actual proportional gain is to be found, by small steps at several postures (section 6.5)."""
+
+    joints: Annotated[tuple[JointNumber, ...], Field(min_length=1)] = (1, 2, 3)
+
+
+class MeasuredGain(Wire):
+    """The actual proportional gain of one joint, in DAC counts per ADC count of error, and in V/rad at the motor; or
+    the reason why the trace does not tell it. Gains between `lowest` and `highest` agree with every sample."""
+
+    joint: int
+    gain: float | None = None
+    standard_error: float | None = None
+    lowest: float | None = None
+    highest: float | None = None
+    volts_per_rad: float | None = None
+    reason: str = ""

@@ -1,0 +1,96 @@
+"""Jogging, steps, programs, leading by hand, and calibration. All of it needs the control of the robot."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+
+from daq.calibration import gain_experiment, gains_from_trace
+from daq.contracts.errors import SpecError
+from daq.contracts.service.experiments import Experiment, ExperimentRequest
+from daq.contracts.service.teaching import (
+    CalibrationRequest,
+    JogRequest,
+    LeadRequest,
+    MeasuredGain,
+    StepRequest,
+    TeachingStatus,
+)
+from daq.teaching import Program
+from daq.teaching.program import Absolute, Instruction, Relative
+from daq.traces.reader import read_trace
+from server.api.parts import Identity, LeaseHeader, Operator, RobotPart, Viewer
+from server.problems import PROBLEMS
+
+router = APIRouter(prefix="/robots/{robot}", tags=["teaching"], responses=PROBLEMS)
+
+
+@router.get("/teaching")
+def get_teaching(one: RobotPart, _: Viewer) -> TeachingStatus:
+    """What is being taught now, and how the last one ended."""
+    return one.teaching.status()
+
+
+@router.post("/teaching/jog")
+def jog_robot(request: JogRequest, one: RobotPart, _: Operator, lease: LeaseHeader = None) -> TeachingStatus:
+    """Drives joints for 0.3 s at most: whoever holds the key repeats this, ten times a second or so."""
+    one.require_motion(lease)
+    one.teaching.jog(dict(request.velocities))
+    return one.teaching.status()
+
+
+@router.post("/teaching/step", status_code=202)
+def step_robot(request: StepRequest, one: RobotPart, _: Operator, lease: LeaseHeader = None) -> TeachingStatus:
+    """Begins one step, all joints arriving together. Checked before it moves; GET …/teaching tells its end."""
+    one.require_motion(lease)
+    if (request.to is None) == (request.by is None):
+        raise SpecError("step: give either `to` or `by`")
+    kind: type[Absolute | Relative] = Relative if request.to is None else Absolute
+    angles = dict(request.to or request.by or {})
+    if not angles:
+        raise SpecError("step: names no joint")
+    instruction: Instruction = kind(angles=angles, speed=request.speed)
+    one.teaching.perform(Program(name="step", machine=one.robot.machine.name, instructions=(instruction,)), "step")
+    return one.teaching.status()
+
+
+@router.post("/teaching/program", status_code=202)
+def run_program(request: Program, one: RobotPart, _: Operator, lease: LeaseHeader = None) -> TeachingStatus:
+    """Begins a taught program: steps, paths, waits, process signals. Checked from end to end before it moves."""
+    one.require_motion(lease)
+    one.teaching.perform(request)
+    return one.teaching.status()
+
+
+@router.post("/teaching/lead", status_code=202)
+def lead_robot(request: LeadRequest, one: RobotPart, _: Operator, lease: LeaseHeader = None) -> TeachingStatus:
+    """Begins to record a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive and sink."""
+    one.require_motion(lease)
+    one.teaching.lead(tuple(sorted(set(request.joints))))
+    return one.teaching.status()
+
+
+@router.post("/teaching/finish")
+def finish_teaching(one: RobotPart, _: Operator, lease: LeaseHeader = None) -> TeachingStatus:
+    """Ends jogging, or leading: its path is in the answer."""
+    one.control.require(lease)
+    one.teaching.finish()
+    return one.teaching.status()
+
+
+@router.post("/calibrations/gain", status_code=201)
+def calibrate_gain(request: CalibrationRequest, one: RobotPart, who: Operator) -> Experiment:
+    """Queues the experiment that shows the actual proportional gain; GET …/traces/{trace}/gain tells it afterwards."""
+    spec = gain_experiment(tuple(sorted(set(request.joints))))
+    experiment, _ = one.queue.submit(ExperimentRequest(spec=spec), who.name, None)
+    return experiment
+
+
+@router.get("/traces/{trace}/gain")
+def get_measured_gain(trace: Identity, one: RobotPart, _: Viewer) -> tuple[MeasuredGain, ...]:
+    """The actual proportional gains that a trace shows."""
+    read = read_trace(one.catalogue.path_of(trace))
+    fields = MeasuredGain.model_fields
+    return tuple(
+        MeasuredGain.model_validate({name: value for name, value in found.as_data().items() if name in fields})
+        for found in gains_from_trace(read, one.robot.machine)
+    )

@@ -1,0 +1,125 @@
+"""Teaching of one robot: jogging that begins with its first command, steps, programs, leading by hand."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+from daq.contracts.errors import ReachError, SpecError
+from daq.contracts.service.robot import Activity
+from daq.contracts.service.teaching import TaughtPath, TeachingLine, TeachingStatus
+from daq.teaching import Program
+from daq.teaching.jog import top_speed
+from server.owner.messages import Answer, Finish, JogBegin, JogDrive, LeadBegin, Report, RunProgram, Told
+from server.problems import conflict
+from server.robot.robot import ANSWER_WITHIN, Robot
+
+LINES = 50
+"""Lines for whoever teaches that are kept."""
+
+
+class TeachingDesk:
+    """What a client with the control may have the arm do by hand. Safe to use from any thread.
+
+    told: called with one line when a teaching has ended
+    """
+
+    def __init__(self, robot: Robot, told: Callable[[str], None]) -> None:
+        self._robot = robot
+        self._told = told
+        self._changed = threading.Condition(threading.RLock())
+        self._numbers = itertools.count(1)
+        self._lines: deque[TeachingLine] = deque(maxlen=LINES)
+        self._under_way: tuple[Activity, Future[Answer]] | None = None
+        self._result = ""
+        self._problem = ""
+        self._path: TaughtPath | None = None
+        robot.listeners.append(self._heard)
+
+    def jog(self, velocities: dict[int, float]) -> None:
+        """The newest command of whoever holds the key. Raises a 409 when the arm will not, SpecError for a joint that
+        is not there or too fast."""
+        self._require_possible(velocities)
+        said = self._robot.clock.monotonic()
+        with self._changed:
+            if self._under_way is None or self._under_way[0] != "jog":
+                self._begin("jog", JogBegin)
+            self._robot.tell(JogDrive(velocities=velocities, said=said))
+
+    def perform(self, program: Program, activity: Activity = "program") -> None:
+        """Begins a taught program. Raises a 409 while something else is taught."""
+        with self._changed:
+            self._begin(activity, RunProgram, program=program)
+
+    def lead(self, joints: tuple[int, ...]) -> None:
+        """Begins leading by hand. Raises a 409 while something else is taught."""
+        with self._changed:
+            self._begin("lead", LeadBegin, joints=joints)
+
+    def finish(self) -> None:
+        """Ends jogging or leading in good order, and waits for the end. A program goes on to its own."""
+        with self._changed:
+            under_way = self._under_way
+            if under_way is None or under_way[0] not in ("jog", "lead"):
+                return
+            self._robot.tell(Finish())
+            if not self._changed.wait_for(lambda: self._under_way is not under_way, ANSWER_WITHIN):
+                raise ReachError(f"{under_way[0]} did not end within {ANSWER_WITHIN:g} s: stop the robot")
+
+    def status(self) -> TeachingStatus:
+        """Now."""
+        with self._changed:
+            return TeachingStatus(
+                activity="none" if self._under_way is None else self._under_way[0],
+                lines=tuple(self._lines),
+                result=self._result,
+                problem=self._problem,
+                path=self._path,
+            )
+
+    def _begin(self, activity: Activity, order: Callable[..., Any], **fields: object) -> None:
+        if self._under_way is not None and self._under_way[0] == "jog":
+            self.finish()
+        if self._under_way is not None:
+            line = f"the arm is busy: {self._under_way[0]}"
+            raise conflict("arm-busy", line, "wait for its end, or stop it")
+        arm = self._robot.arm
+        if arm is not None and arm.arm in ("stopped", "fault"):
+            raise conflict("arm-stopped", f"the arm is {arm.arm}: {arm.cause}", "reset the robot when it is safe")
+        asked = self._robot.ask(order, **fields)
+        self._result = self._problem = ""
+        self._under_way = (activity, asked)
+        asked.add_done_callback(lambda future: self._ended(activity, future))
+
+    def _ended(self, activity: Activity, future: Future[Answer]) -> None:
+        error = future.exception()
+        answer = None if error is not None else future.result()
+        with self._changed:
+            self._under_way = None
+            self._changed.notify_all()
+            self._problem = str(error) if answer is None else answer.problem
+            self._result = "" if self._problem or answer is None else str(answer.data.get("text", f"{activity}: done"))
+            if answer is not None and "path" in answer.data:
+                self._path = TaughtPath.model_validate(answer.data["path"])
+            line = self._problem or self._result
+        self._told(f"{activity}: {line}")
+
+    def _heard(self, report: Report) -> None:
+        if isinstance(report, Told):
+            with self._changed:
+                self._lines.append(
+                    TeachingLine(number=next(self._numbers), at=self._robot.clock.utc(), text=report.text)
+                )
+
+    def _require_possible(self, velocities: dict[int, float]) -> None:
+        machine = self._robot.machine
+        for joint, velocity in velocities.items():
+            if joint > len(machine.joints):
+                raise SpecError(f"velocities.{joint}: {machine.name} has joints 1 to {len(machine.joints)}")
+            top = top_speed(machine.limits, joint)
+            if not abs(velocity) <= top:
+                raise SpecError(f"velocities.{joint} = {velocity} rad/s: allowed are up to ±{top:g} rad/s")

@@ -1,0 +1,117 @@
+"""Moving the arm by hand through the service: only with the control, and never past a stop."""
+
+from __future__ import annotations
+
+import httpx
+
+from tests.server.service import Service
+
+
+def _lease(service: Service) -> dict[str, str]:
+    answer = service.robot.post("/control", json={})
+    assert answer.status_code == 201, answer.text
+    return {"Control-Lease": answer.json()["lease"]}
+
+
+def _until_taught(service: Service) -> dict[str, object]:
+    while True:
+        found: dict[str, object] = service.robot.get("/teaching").json()
+        if found["activity"] == "none":
+            return found
+
+
+def test_motion_needs_the_control(service: Service) -> None:
+    for path, body in (
+        ("/teaching/jog", {"velocities": {"1": 0.1}}),
+        ("/teaching/step", {"by": {"1": 0.1}}),
+        ("/teaching/lead", {}),
+    ):
+        answer = service.robot.post(path, json=body)
+        assert (answer.status_code, answer.json()["type"]) == (409, "docs/service.md#control-needed"), answer.text
+    assert service.robot.put("/gripper", json={"closed": True}).status_code == 409
+
+
+def test_one_client_has_the_control_at_a_time_and_gives_it_back(service: Service) -> None:
+    mine = _lease(service)
+    other = service.robot.post("/control", json={})
+    assert (other.status_code, other.json()["type"]) == (409, "docs/service.md#control-held")
+    assert service.robot.get("/control").json()["holder"] == "client"
+    assert service.robot.put("/control", headers=mine).status_code == 200
+    assert service.robot.delete("/control", headers=mine).status_code == 204
+    assert service.robot.get("/control").json()["holder"] == "nobody"
+    assert service.robot.put("/control", headers=mine).json()["type"] == "docs/service.md#control-lost"
+
+
+def test_a_step_moves_the_arm_by_what_was_asked(service: Service) -> None:
+    mine = _lease(service)
+    before = service.status()["sample"]["set_point"][0]
+    answer = service.robot.post("/teaching/step", json={"by": {"1": 0.05}}, headers=mine)
+    assert answer.status_code == 202, answer.text
+    assert _until_taught(service)["result"] == "done: 1 instructions"
+    after = service.status()["sample"]["set_point"][0]
+    assert abs(after - before - 0.05) < 0.006
+    service.robot.delete("/control", headers=mine)
+
+
+def test_a_jog_ends_when_the_control_is_given_back(service: Service) -> None:
+    mine = _lease(service)
+    answer = service.robot.post("/teaching/jog", json={"velocities": {"2": -0.1}}, headers=mine)
+    assert answer.json()["activity"] == "jog", answer.text
+    service.robot.delete("/control", headers=mine)
+    assert service.robot.get("/teaching").json()["result"] == "jog: done"
+
+
+def test_a_stop_ends_a_jog_and_no_other_begins_before_a_reset(service: Service) -> None:
+    mine = _lease(service)
+    service.robot.post("/teaching/jog", json={"velocities": {"2": 0.1}}, headers=mine)
+    stopped = service.robot.post("/stop").json()
+    assert stopped["confirmed"], stopped
+    ended = _until_taught(service)
+    assert "the arm has been stopped" in str(ended["problem"])
+    again = service.robot.post("/teaching/jog", json={"velocities": {"2": 0.1}}, headers=mine)
+    assert again.status_code == 409
+    assert service.status()["arm"] == "stopped"
+    service.robot.delete("/control", headers=mine)
+
+
+def test_jogging_too_fast_or_a_joint_that_is_not_there_is_refused(service: Service) -> None:
+    mine = _lease(service)
+    for velocities in ({"1": 2.0}, {"9": 0.1}, {"1": 1e9}):
+        answer = service.robot.post("/teaching/jog", json={"velocities": velocities}, headers=mine)
+        assert answer.status_code == 422, answer.text
+    service.robot.delete("/control", headers=mine)
+
+
+def test_process_signals_gains_and_gripper(service: Service) -> None:
+    mine = _lease(service)
+    try:
+        assert service.robot.put("/process/outputs/3", json={"on": True}, headers=mine).json()["outputs"][3] is True
+        assert service.robot.put("/gripper", json={"closed": True}, headers=mine).json()["gripper"] == "closed"
+        assert service.robot.get("/process").json()["gripper"] == "closed"
+        gains = service.robot.put("/gains", json={"gains": {"6": [3, 0, 0]}}, headers=mine)
+        assert gains.json()["gains"]["6"] == [3, 0, 0], gains.text
+        assert service.robot.get("/gains").json() == gains.json()
+        assert service.robot.put("/gains", json={"gains": {"6": [2, 0, 0]}}, headers=mine).status_code == 200
+        assert service.robot.put("/process/outputs/8", json={"on": True}, headers=mine).status_code == 422
+    finally:
+        service.robot.delete("/control", headers=mine)
+
+
+def test_an_experiment_waits_while_a_client_has_the_control(service: Service) -> None:
+    mine = _lease(service)
+    spec = {"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1], "settle": 0, "hold": 0}
+    made = service.robot.post("/experiments", json={"spec": spec}).json()
+    while not (waiting_for := service.robot.get("/queue").json()["waiting_for"]):
+        pass
+    assert waiting_for == "a client has the control of the robot"
+    service.robot.delete("/control", headers=mine)
+    assert service.end_of(made["id"])["state"] == "done"
+
+
+def test_disconnected_the_robot_says_so_and_the_port_is_free_for_others(service: Service) -> None:
+    assert service.robot.post("/disconnect").status_code == 200
+    status = service.status()
+    assert (status["connection"], status["arm"], status["sample"]) == ("disconnected", "disconnected", None)
+    answer: httpx.Response = service.robot.get("/gains")
+    assert answer.status_code == 503
+    assert service.until_connected()["connection"] == "connected"

@@ -1,0 +1,178 @@
+"""The pure rules of the queue: states, order, schedule, what is missing."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+
+from daq.contracts.service.robot import RobotIdentity
+from server.owner.messages import ArmReport
+from server.queue.order import Waiting, next_due, next_moment
+from server.queue.readiness import Circumstances, what_is_missing
+from server.queue.schedule import Plan, following, is_due
+from server.queue.states import ENDS, Event, IllegalEventError, advance, after_restart
+
+START = datetime(2026, 1, 1, tzinfo=UTC)
+moments = st.datetimes(datetime(2026, 1, 1), datetime(2027, 1, 1)).map(lambda moment: moment.replace(tzinfo=UTC))
+
+
+class ExperimentLife(RuleBasedStateMachine):
+    """Whatever happens, in whatever order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.state = "queued"
+        self.runs = 0
+        self.past = ["queued"]
+
+    @rule(event=st.sampled_from(Event))
+    def happens(self, event: Event) -> None:
+        try:
+            after = advance(self.state, event)  # type: ignore[arg-type]
+        except IllegalEventError:
+            return
+        self.runs += event is Event.TAKEN
+        self.state = after
+        self.past.append(after)
+
+    @rule()
+    def the_service_begins_again(self) -> None:
+        self.state = after_restart(self.state)  # type: ignore[arg-type]
+        self.past.append(self.state)
+
+    @invariant()
+    def it_runs_once_at_most_and_an_end_is_an_end(self) -> None:
+        assert self.runs <= 1
+        ended = [index for index, state in enumerate(self.past) if state in ENDS]
+        assert not ended or set(self.past[ended[0] :]) == {self.past[ended[0]]}
+
+    @invariant()
+    def after_a_restart_nothing_is_running(self) -> None:
+        assert after_restart(self.state) != "running"  # type: ignore[arg-type]
+
+
+TestExperimentLife = ExperimentLife.TestCase
+
+
+@pytest.mark.parametrize("event", sorted(set(Event) - {Event.TAKEN, Event.CANCELLED}))
+def test_what_waits_can_only_be_taken_or_cancelled(event: Event) -> None:
+    with pytest.raises(IllegalEventError, match=f"an experiment that is queued cannot be {event}"):
+        advance("queued", event)
+
+
+waiting = st.lists(
+    st.builds(
+        Waiting,
+        id=st.uuids().map(str),
+        sequence=st.integers(0, 10**6),
+        priority=st.integers(-100, 100),
+        at=st.none() | moments,
+    ),
+    unique_by=lambda one: one.sequence,
+)
+
+
+@given(waiting, moments)
+def test_the_next_is_due_and_nothing_due_goes_before_it(all_of_them: list[Waiting], now: datetime) -> None:
+    chosen = next_due(all_of_them, now)
+    due = [one for one in all_of_them if one.at is None or one.at <= now]
+    if chosen is None:
+        assert not due
+        return
+    assert chosen in due
+    for other in due:
+        assert (chosen.priority, -chosen.sequence) >= (other.priority, -other.sequence)
+
+
+@given(waiting, moments, st.timedeltas(timedelta(0), timedelta(days=100)))
+def test_a_clock_that_is_set_back_reorders_nothing(all_of_them: list[Waiting], now: datetime, back: timedelta) -> None:
+    at_once = [one for one in all_of_them if one.at is None]
+    assert next_due(at_once, now) == next_due(at_once, now - back)
+
+
+@given(waiting)
+def test_the_next_moment_is_the_first_of_those_that_wait_for_one(all_of_them: list[Waiting]) -> None:
+    moment = next_moment(all_of_them)
+    times = [one.at for one in all_of_them if one.at is not None]
+    assert moment == (min(times) if times else None)
+
+
+intervals = st.floats(10, 10**6)
+
+
+@given(moments, intervals, moments, moments, st.integers(0, 50))
+def test_the_following_run_is_later_and_on_the_grid(
+    starts: datetime, every: float, last: datetime, now: datetime, made: int
+) -> None:
+    plan = Plan(starts, every, None)
+    found = following(plan, made, last, now)
+    assert found is not None
+    assert found > last
+    assert found >= starts
+    steps = (found - starts).total_seconds() / every
+    assert abs(steps - round(steps)) * every < 1e-3
+
+
+@given(moments, intervals, st.integers(1, 20))
+def test_a_schedule_with_a_count_makes_that_many_runs(starts: datetime, every: float, count: int) -> None:
+    plan, moment, made = Plan(starts, every, count), starts, 0
+    while is_due(moment, moment):
+        made += 1
+        found = following(plan, made, moment, moment)
+        if found is None:
+            break
+        assert found > moment
+        moment = found
+    assert made == count
+
+
+def test_runs_that_were_missed_are_left_out_not_made_up_for() -> None:
+    plan = Plan(START, 60, None)
+    found = following(plan, 3, START + timedelta(seconds=120), START + timedelta(seconds=1000))
+    assert found == START + timedelta(seconds=1020)
+
+
+def test_a_clock_that_is_set_back_makes_no_run_due_again() -> None:
+    last = START + timedelta(seconds=120)
+    found = following(Plan(START, 60, None), 3, last, START - timedelta(days=1))
+    assert found == last + timedelta(seconds=60)
+
+
+def _arm(**changes: object) -> ArmReport:
+    calm = {"arm": "idle", "cause": "", "activity": "none", "limp": (), "link": "connected", "counters": {}}
+    return ArmReport.model_validate(calm | changes)
+
+
+REAL = RobotIdentity(simulated=False, protocol=1, period=0.02, boots=1)
+MOCK = REAL.model_copy(update={"simulated": True})
+
+
+@pytest.mark.parametrize(
+    ("now", "line", "pauses"),
+    [
+        (Circumstances(None, None, "no such port", True, True), "the robot is not connected. no such port", False),
+        (Circumstances(MOCK, _arm(link="lost"), "", True, True), "the link to the robot is lost", False),
+        (Circumstances(MOCK, _arm(arm="stopped", cause="x"), "", True, True), "the arm is stopped", True),
+        (Circumstances(MOCK, _arm(arm="fault"), "", True, True), "the arm is fault", True),
+        (Circumstances(MOCK, _arm(activity="jog"), "", True, True), "the arm is busy: jog", False),
+        (Circumstances(REAL, _arm(), "", True, False), "an operator who is there", True),
+    ],
+)
+def test_what_is_missing_is_said_and_pauses_the_queue_where_a_person_must_look(
+    now: Circumstances, line: str, pauses: bool
+) -> None:
+    missing = what_is_missing(now)
+    assert missing is not None
+    assert (missing.line, bool(missing.pause)) == (line, pauses)
+
+
+def test_a_real_arm_needs_an_operators_word_and_a_mock_does_not() -> None:
+    assert what_is_missing(Circumstances(MOCK, _arm(), "", False, True)) is None
+    missing = what_is_missing(Circumstances(REAL, _arm(), "", False, True))
+    assert missing is not None
+    assert "moves_real_arm" in missing.line
+    assert what_is_missing(Circumstances(REAL, _arm(), "", True, True)) is None
