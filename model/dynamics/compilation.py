@@ -10,12 +10,14 @@ edit of a report does not. What is compiled must take functions and constants by
 from __future__ import annotations
 
 import ast
+import fcntl
 import hashlib
 import importlib
 import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from importlib.util import resolve_name
 from pathlib import Path
@@ -77,6 +79,14 @@ def cache_folder(module: str) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         _remove_old(_PARENT, time.time() - CACHE_DAYS * 86_400)
     return folder
+
+
+@contextmanager
+def one_process_at_a_time(module: str) -> Iterator[None]:
+    """While one process compiles a module's functions, others wait: they then find them on disk."""
+    with (cache_folder(module) / "lock").open("w", encoding="utf-8") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # given back when the file is closed, however that comes about
+        yield
 
 
 def _source(module: str, root: Path) -> Path | None:

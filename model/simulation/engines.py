@@ -16,6 +16,7 @@ from numba.core.event import Listener, install_listener
 from numpy.typing import NDArray
 
 from daq.contracts.machine import Cylinder, Machine, Rod
+from model.dynamics.compilation import one_process_at_a_time
 from model.machine_model import layout as at
 from model.machine_model.model import Model
 
@@ -55,15 +56,30 @@ class Engine:
         )  # fmt: skip
         cores = available_cores() if cores is None else cores
         alone = len(which) == 1 or cores == 1
-        with install_listener("numba:compile", _Announcement(self.batch)):
-            self.batch(0, len(which) if alone else 0, *arguments)  # compiled or loaded once, not in every thread
+        self._make_ready(arguments, vectors.dtype)
         if alone:
+            self.batch(0, len(which), *arguments)
             return
         edges = np.unique(np.linspace(0, len(which), min(len(which), cores * CHUNKS_A_CORE) + 1).astype(np.int64))
         with ThreadPoolExecutor(cores) as pool:
             pieces = [pool.submit(self.batch, int(a), int(b), *arguments) for a, b in pairwise(edges)]
         for piece in pieces:
             piece.result()
+
+    def _make_ready(self, arguments: tuple[Any, ...], numbers: np.dtype[Any]) -> None:
+        """Compiles the run for numbers of this kind, or loads it from disk: once, not in every thread and process."""
+        name = (self.batch.__name__, numbers)
+        if name not in _ready:
+            with (
+                one_process_at_a_time(self.batch.__module__),
+                install_listener("numba:compile", _Announcement(self.batch)),
+            ):
+                self.batch(0, 0, *arguments)  # no run
+            _ready.add(name)
+
+
+_ready: set[tuple[str, np.dtype[Any]]] = set()
+"""Runs that this process has compiled or loaded."""
 
 
 class _Announcement(Listener):

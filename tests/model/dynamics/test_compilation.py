@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import fcntl
 import os
 from pathlib import Path
 
@@ -10,7 +11,14 @@ import pytest
 
 import model
 from model.dynamics import compilation, recursive
-from model.dynamics.compilation import CACHE_DAYS, _remove_old, cache_folder, dependencies, source_hash
+from model.dynamics.compilation import (
+    CACHE_DAYS,
+    _remove_old,
+    cache_folder,
+    dependencies,
+    one_process_at_a_time,
+    source_hash,
+)
 from model.simulation import kernel
 
 SOURCES = {
@@ -107,6 +115,13 @@ def test_numba_caches_into_the_folder_of_these_sources() -> None:
     assert cache_folder(kernel.__name__).name == source_hash(kernel.__name__)
     assert cache_folder(kernel.__name__) != cache_folder(recursive.__name__)
     assert cache_folder(kernel.__name__).parent == compilation._PARENT
+
+
+def test_one_process_compiles_while_others_wait() -> None:
+    with (cache_folder(recursive.__name__) / "lock").open("a") as another:
+        with one_process_at_a_time(recursive.__name__), pytest.raises(BlockingIOError):
+            fcntl.flock(another, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(another, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def test_only_old_caches_are_removed(tmp_path: Path) -> None:
