@@ -37,6 +37,7 @@ from mock_controller.hidden.tolerances import (
     harmonic_deviation,
     tolerances,
 )
+from mock_controller.modifications.controller import InputDelay
 from mock_controller.modifications.interface import ChangesTransmission, Modification, of_kind
 from mock_controller.plant import STEP_US, PlantParameters
 
@@ -56,6 +57,10 @@ MOST_REFITS = 8
 """Times that the refit looks where it has got to; each takes a run of the experiment."""
 _FIRST_DAMPING, _LESS_DAMPING, _MORE_DAMPING = 1000.0, 10.0, 4.0
 """The refit's damping at first (in units of the priors' weight), and how it changes with success and failure."""
+_NEAR_DAMPING = 1.0
+"""The refit's damping at first where it begins from a place that the tangents have led to."""
+_CLEAR = 15.0
+"""d′ far above what counts as detectable: its value is then wanted to a tenth only, and the tangents give that."""
 _SMALL_MOVE = 0.5
 """Standard deviations within which the tangents are trusted without looking."""
 _SETTLED = 0.95
@@ -64,6 +69,8 @@ _AS_FORETOLD = 0.03
 """A run that leaves what the tangents have foretold, d′ to this share, shows that they hold there: it is the last."""
 _LEAST_FRACTION, _MOST_FRACTION = -0.9, 5.0
 """Constants are moved by no more than these fractions of their values."""
+_WHOLE_S = 5e-5
+"""A computing delay this near to whole steps is moved by them, and the rest along its tangent."""
 _EARLIEST_S = 5e-3
 """The computing delay is moved by no more than this: something is left of it."""
 
@@ -161,9 +168,9 @@ def separation(
 
     `present`: what `seen` has given for these parts, where that is known.
 
-    The refit goes along the tangents, then looks where that has led. Where less is left than the tangents have
-    foretold, or more, it goes on, up to `refits` times: a strong effect that tolerances can imitate is far from where
-    the tangents were taken. Where some can imitate it exactly, the refit also starts from those.
+    The refit goes along the tangents, then looks where that has led. Unless what is left is what the tangents have
+    foretold, or d′ is clearly large, it goes on, up to `refits` times: a strong effect that tolerances can imitate is
+    far from where the tangents were taken. Where some can imitate it exactly, the refit starts from those.
     """
     one = reading_deviation(parts.board)
     step_us = _step_length(parts)
@@ -181,33 +188,28 @@ def separation(
     found = project(apart, known)
     if refits == 0 or max(map(abs, found.moved.values()), default=0.0) < _SMALL_MOVE:
         return found
+    there = known.within_reach(np.array(list(found.moved.values())))
+    left_there = left_at(there)
+    looked = _told(found.before_refit, left_there, there, known)
     hidden = [effect for effect in parts.modifications if effect not in without]
     imitating = imitation(parts.plant, hidden)
-    looked = _looked(found, left_at, known)
-    if not imitating and abs(looked.d_prime - found.d_prime) <= _AS_FORETOLD * found.d_prime:
-        return replace(looked, before_refit=found.before_refit)
-    refitted = _refitted(apart, nowhere, left_at, known, refits)
-    if looked.d_prime < refitted.d_prime:
-        refitted = looked
+    as_foretold = abs(looked.d_prime - found.d_prime) <= _AS_FORETOLD * found.d_prime
+    if not imitating and (as_foretold or min(looked.d_prime, found.d_prime) > _CLEAR):
+        return min(looked, found, key=lambda each: each.d_prime)
     if imitating:
-        there = known.within_reach(np.array([imitating.get(name, 0.0) for name in known.names]) / known.deviations)
-        again = _refitted(left_at(there), there, left_at, known, refits)
-        refitted = min(refitted, again, key=lambda each: each.d_prime)
-    return replace(refitted, before_refit=found.before_refit)
+        start = known.within_reach(np.array([imitating.get(name, 0.0) for name in known.names]) / known.deviations)
+        refitted = _refitted(left_at(start), start, left_at, known, refits)
+    elif looked.d_prime < found.before_refit:
+        refitted = _refitted(left_there, there, left_at, known, refits, _NEAR_DAMPING)
+    else:
+        refitted = _refitted(apart, nowhere, left_at, known, refits)
+    return replace(min(looked, refitted, key=lambda each: each.d_prime), before_refit=found.before_refit)
 
 
 def project(difference: NDArray[np.float64], known: Tangents) -> Separation:
     """d′ of a difference of readings (in their standard deviations, periods·3) after one refit along the tangents."""
     moved = _step(difference, np.zeros(len(known.names)), known.matrix)
     return _told(float(np.linalg.norm(difference)), difference - known.matrix @ moved, moved, known)
-
-
-def _looked(
-    found: Separation, left_at: Callable[[NDArray[np.float64]], NDArray[np.float64]], known: Tangents
-) -> Separation:
-    """d′ by a run of the arm to which a refit along the tangents has led."""
-    there = known.within_reach(np.array(list(found.moved.values())))
-    return _told(0.0, left_at(there), there, known)
 
 
 def seen(parts: LoopParts, experiment: Experiment) -> NDArray[np.float64]:
@@ -227,6 +229,7 @@ def _refitted(
     left_at: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     known: Tangents,
     refits: int,
+    damping: float = _FIRST_DAMPING,
 ) -> Separation:
     """Levenberg–Marquardt from `moved`, where `left` is what is left.
 
@@ -235,7 +238,6 @@ def _refitted(
     """
     matrix = known.matrix
     cost = float(left @ left + moved @ moved)
-    damping = _FIRST_DAMPING
     for _ in range(refits):
         trial = known.within_reach(moved + _step(left, moved, matrix, damping))
         step = trial - moved
@@ -271,7 +273,7 @@ def _moved(
 ) -> tuple[LoopParts, NDArray[np.float64]]:
     """The arm with its tolerance parameters moved by so many of their standard deviations.
 
-    Also what is left of the moves: the computing delay is moved by whole steps of the plant.
+    Also what is left of the moves, to go along the tangents.
     """
     rest = np.zeros(len(known.names))
     deviations = dict(zip(known.names, (moved * known.deviations).tolist(), strict=True))
@@ -279,11 +281,15 @@ def _moved(
         return parts, rest
     late = deviations["computing_delay"]
     whole = round(late * 1e6 / step_us) * step_us * 1e-6
-    deviations["computing_delay"] = whole
-    delay = known.names.index("computing_delay")
-    rest[delay] = (late - whole) / known.deviations[delay]
-    plant, board = deviating_plant(parts.plant, deviations), deviating_board(parts.board, deviations)
     effects: list[Modification] = []
+    if abs(late - whole) < _WHOLE_S:
+        delay = known.names.index("computing_delay")
+        rest[delay] = (late - whole) / known.deviations[delay]
+    else:
+        whole = math.floor(late * 1e6 / step_us) * step_us * 1e-6
+        effects += [InputDelay(joint, late - whole) for joint in range(1, MODELLED + 1)]
+    deviations["computing_delay"] = whole
+    plant, board = deviating_plant(parts.plant, deviations), deviating_board(parts.board, deviations)
     for joint in range(1, MODELLED + 1):
         for harmonic in HARMONICS:
             sine, cosine = (deviations[_harmonic_name(joint, share, harmonic)] for share in ("sine", "cosine"))
