@@ -12,7 +12,7 @@ from fastapi.routing import APIRoute
 
 from server import problems
 from server.access.gate import Gate
-from server.api import controller, experiments, queue, robots, teaching, traces
+from server.api import controller, experiments, live, queue, robots, teaching, traces
 from server.services import Services
 
 API = "/api/v1"
@@ -28,9 +28,13 @@ def make_app(services: Services, gate: Gate) -> FastAPI:
     @asynccontextmanager
     async def life(app: FastAPI) -> AsyncIterator[None]:
         app.state.services = services
+        for one in services.robots():
+            one.hub.open(lambda robot=one.robot: robot.experiment)  # type: ignore[misc]
         await run_in_threadpool(services.start)
         yield
         await run_in_threadpool(services.close)
+        for one in services.robots():
+            await one.hub.close()
 
     app = FastAPI(
         title="MA2000 DAQ",
@@ -45,7 +49,7 @@ def make_app(services: Services, gate: Gate) -> FastAPI:
     )
     problems.install(app)
     api = APIRouter(prefix=API)
-    for part in (robots, controller, teaching, experiments, queue, traces):
+    for part in (robots, controller, teaching, experiments, queue, traces, live):
         api.include_router(part.router)
     app.include_router(api)
     app.add_middleware(gate.middleware)

@@ -12,14 +12,20 @@ from daq.acquisition.messages import EventHappened, Progress
 from daq.config import Settings
 from daq.config.robot_files import load_memory_map
 from daq.contracts.errors import DaqError
+from daq.contracts.service.live import EventMessage
+from daq.trajectories import control_period
+from server.access.tickets import Tickets
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock, SystemClock
+from server.live.history import History
+from server.live.hub import Hub
 from server.owner.messages import Answer, ArmReport, Finish, Opened, Report
 from server.problems import ProblemError, conflict, not_found
 from server.queue.desk import QueueDesk, QueueParts
 from server.robot.control import ControlDesk
 from server.robot.keeper import Keeper
 from server.robot.robot import Robot, RobotPlace
+from server.robot.status import status_of
 from server.robot.stop import StopDesk
 from server.robot.teaching import TeachingDesk
 from server.store.engine import Store
@@ -45,6 +51,7 @@ class RobotServices:
     queue: QueueDesk
     catalogue: Catalogue
     teaching: TeachingDesk
+    hub: Hub
 
     def require_motion(self, lease: str | None) -> None:
         """Raises a 409 unless this lease has the control now, and with it the operator's word for a real arm."""
@@ -68,6 +75,8 @@ class Services:
         self.traces = TraceStore(self.store)
         self.events = EventStore(self.store)
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
+        self.tickets = Tickets(self.clock)
+        self._robots: dict[str, RobotServices] = {}
         self._robots = {settings.robot.name: self._make_robot(settings)}
 
     def robots(self) -> list[RobotServices]:
@@ -142,14 +151,23 @@ class Services:
         # After the loss of a process that wrote a trace, its part file is finished and found.
         robot.disconnected.append(lambda _why: self._take_in(catalogue))
         teaching = TeachingDesk(robot, lambda line: self.tell_later(name, "teaching", line))
-        return RobotServices(robot, Keeper(robot), StopDesk(robot, self.clock), control, queue, catalogue, teaching)
+        history = History(len(robot.machine.joints), control_period(robot.machine), settings.server.history)
+        hub = Hub(self.clock, history, lambda: status_of(self._robots[name]))
+        robot.listeners.append(hub.hear)
+        robot.disconnected.append(lambda _why: hub.look())
+        stop = StopDesk(robot, self.clock)
+        return RobotServices(robot, Keeper(robot), stop, control, queue, catalogue, teaching, hub)
 
     def tell(
         self, robot: str, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None
     ) -> None:
         """Something that happened: into the log, the database, and to whoever listens."""
         log.info("%s: %s: %s", robot, kind, text, extra={"actor": actor, "experiment": experiment})
-        self.events.add(robot, kind, text, self.clock.utc(), actor, experiment)
+        event = self.events.add(robot, kind, text, self.clock.utc(), actor, experiment)
+        one = self._robots.get(robot)
+        if one is not None:
+            one.hub.publish("events", EventMessage(event=event))
+            one.hub.look()
 
     def tell_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:
         """The same, for whoever must not wait for a disk."""

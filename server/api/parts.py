@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import Depends, Header, Path, Query, Request
+from fastapi import Depends, Header, Path, Query
+from starlette.requests import HTTPConnection
 
 from daq.contracts.service.base import PageLimit
 from server.access.caller import Caller, require_operator, require_viewer
 from server.services import RobotServices, Services
 
 
-def services(request: Request) -> Services:
+def services(connection: HTTPConnection) -> Services:
     """All of them."""
-    found: Services = request.app.state.services
+    found: Services = connection.app.state.services
     return found
 
 

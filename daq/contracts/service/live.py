@@ -1,0 +1,186 @@
+"""What the live WebSocket sends, and what it takes. Angles in rad, joints from 1.
+
+Every frame says `now`, the monotonic clock of the service's computer (s), and `utc`, its wall clock (s since 1970). A
+value's age is `now − host_time` when the frame was sent, and grows from then on.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from daq.contracts.experiment import JointNumber
+from daq.contracts.service.base import Wire
+from daq.contracts.service.events import ServiceEvent
+from daq.contracts.service.jobs import Job
+from daq.contracts.service.queue import Control, QueueStatus
+from daq.contracts.service.robot import Activity, ArmState, ConnectionState, RobotIdentity
+from daq.contracts.service.teaching import Velocity
+from daq.contracts.trace import EventKind
+
+Topic = Literal["samples", "robot", "link", "queue", "jobs", "events", "teaching"]
+SampleRate = Literal[50, 25, 10, 5, 1]
+
+
+class SampleMessage(Wire):
+    """One control period."""
+
+    topic: Literal["sample"] = "sample"
+    tick: int
+    host_time: float
+    joints: tuple[int, ...]
+    set_point: tuple[float, ...]
+    position: tuple[float, ...]
+    error: tuple[float, ...]
+    drive: tuple[float, ...]
+    frozen: bool
+    lateness: float
+    """s by which it came later than the quickest samples after their ticks: the link's jitter."""
+
+
+class HistoryMessage(Wire):
+    """The last minutes, thinned so that no peak is lost. A signal has one row a joint; None where there is none."""
+
+    topic: Literal["history"] = "history"
+    joints: tuple[int, ...]
+    tick: tuple[int, ...]
+    host_time: tuple[float, ...]
+    set_point: tuple[tuple[float | None, ...], ...]
+    position: tuple[tuple[float | None, ...], ...]
+    error: tuple[tuple[float | None, ...], ...]
+    drive: tuple[tuple[float | None, ...], ...]
+    events: tuple[RecordEventMessage, ...] = ()
+
+
+class RecordEventMessage(Wire):
+    """Something in the record of the experiment that runs: a ramp that begins, a limit, a retry."""
+
+    topic: Literal["record_event"] = "record_event"
+    kind: EventKind
+    message: str
+    tick: int | None
+    joint: int | None
+    host_time: float
+
+
+class RobotMessage(Wire):
+    """How the robot is, and who may move it; sent when it changes."""
+
+    topic: Literal["robot"] = "robot"
+    connection: ConnectionState
+    connection_problem: str
+    identity: RobotIdentity | None
+    arm: ArmState
+    cause: str
+    activity: Activity
+    experiment: str | None
+    limp: tuple[int, ...]
+    control: Control
+
+
+class LinkMessage(Wire):
+    """The link and its counters, once a second."""
+
+    topic: Literal["link"] = "link"
+    state: Literal["connected", "degraded", "lost", "none"]
+    counters: dict[str, float]
+    host_time: float
+
+
+class QueueMessage(Wire):
+    """The queue; sent when it changes."""
+
+    topic: Literal["queue"] = "queue"
+    status: QueueStatus
+
+
+class ProgressMessage(Wire):
+    """How far the experiment is that runs."""
+
+    topic: Literal["progress"] = "progress"
+    experiment: str
+    fraction: float
+    text: str
+
+
+class JobMessage(Wire):
+    """A job that has changed, or gone on."""
+
+    topic: Literal["job"] = "job"
+    job: Job
+
+
+class EventMessage(Wire):
+    """Something that happened to the robot or its queue."""
+
+    topic: Literal["event"] = "event"
+    event: ServiceEvent
+
+
+class TeachingMessage(Wire):
+    """A line for whoever teaches."""
+
+    topic: Literal["teaching"] = "teaching"
+    text: str
+
+
+class ThinnedMessage(Wire):
+    """This client reads too slowly: so many samples were left out for it. It is dropped if that goes on."""
+
+    topic: Literal["thinned"] = "thinned"
+    left_out: int
+
+
+class RefusedMessage(Wire):
+    """What the client sent cannot be carried out."""
+
+    topic: Literal["refused"] = "refused"
+    detail: str
+    advice: str = ""
+
+
+LiveMessage = Annotated[
+    SampleMessage | HistoryMessage | RecordEventMessage | RobotMessage | LinkMessage | QueueMessage | ProgressMessage
+    | JobMessage | EventMessage | TeachingMessage | ThinnedMessage | RefusedMessage,
+    Field(discriminator="topic"),
+]  # fmt: skip
+
+
+class LiveFrame(Wire):
+    """One frame of the WebSocket: messages in the order in which they happened."""
+
+    now: float
+    utc: float
+    messages: tuple[LiveMessage, ...]
+
+
+class JogCommand(Wire):
+    """Drives joints for 0.3 s at most (rad/s); whoever holds the key repeats it."""
+
+    lease: Annotated[str, Field(max_length=200)]
+    velocities: dict[JointNumber, Velocity]
+
+
+class LiveRequest(Wire):
+    """What a client sends over the WebSocket; every field alone, or together.
+
+    `history` s of samples come at once, in about `points` points; `rate` is samples a second.
+    """
+
+    subscribe: tuple[Topic, ...] = ()
+    unsubscribe: tuple[Topic, ...] = ()
+    rate: SampleRate | None = None
+    history: Annotated[float, Field(ge=0, le=3600)] | None = None
+    points: Annotated[int, Field(ge=10, le=5000)] = 1000
+    jog: JogCommand | None = None
+
+
+class Ticket(Wire):
+    """Good for one WebSocket, once, for `seconds`: browsers cannot send a token with it."""
+
+    ticket: str
+    seconds: float
+
+
+HistoryMessage.model_rebuild()

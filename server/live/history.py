@@ -1,0 +1,84 @@
+"""The last minutes of samples, for a client that joins: a ring of columns."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+
+import numpy as np
+
+from daq.contracts.service.live import HistoryMessage, RecordEventMessage
+from daq.contracts.trace import Floats
+from server.owner.messages import LiveSample
+
+SIGNALS = ("set_point", "position", "error", "drive")
+DIGITS = 5
+"""Of values sent: 1e-5 rad is a hundredth of what the sensors resolve."""
+EVENTS = 500
+
+
+class History:
+    """Samples of `joints` joints, as many as fit into `seconds` s of `period` s each. Safe to use from any thread."""
+
+    def __init__(self, joints: int, period: float, seconds: float) -> None:
+        self._joints = joints
+        self._room = max(2, round(seconds / period))
+        self._lock = threading.Lock()
+        self._count = 0
+        self._tick = np.zeros(self._room, np.int64)
+        self._time = np.zeros(self._room)
+        self._values = np.full((len(SIGNALS), self._room, joints), np.nan)
+        self._events: deque[RecordEventMessage] = deque(maxlen=EVENTS)
+
+    def add(self, sample: LiveSample) -> None:
+        """One more; the oldest goes when there is no room."""
+        place = self._count % self._room
+        columns = [joint - 1 for joint in sample.joints]
+        with self._lock:
+            self._tick[place] = sample.tick
+            self._time[place] = sample.host_time
+            self._values[:, place] = np.nan
+            for number, name in enumerate(SIGNALS):
+                self._values[number, place, columns] = getattr(sample, name)
+            self._count += 1
+
+    def add_event(self, event: RecordEventMessage) -> None:
+        """Something in the record, to be marked in the plot."""
+        with self._lock:
+            self._events.append(event)
+
+    def since(self, begin: float, points: int) -> HistoryMessage:
+        """Samples after `begin` (s, monotonic), thinned to about `points`; the extremes of every stretch stay."""
+        with self._lock:
+            order = np.arange(max(0, self._count - self._room), self._count) % self._room
+            order = order[self._time[order] >= begin]
+            tick, time, values = self._tick[order], self._time[order], self._values[:, order]
+            events = tuple(event for event in self._events if event.host_time >= begin)
+        if len(time) > points:
+            tick, time, values = _thinned(tick, time, values, points)
+        columns = {name: _rows(values[number]) for number, name in enumerate(SIGNALS)}
+        return HistoryMessage(
+            joints=tuple(range(1, self._joints + 1)),
+            tick=tuple(tick.tolist()),
+            host_time=tuple(np.round(time, 3).tolist()),
+            events=events,
+            **columns,
+        )
+
+
+def _rows(values: Floats) -> tuple[tuple[float | None, ...], ...]:
+    """(n, j) as j rows; NaN as None."""
+    rounded = np.round(values.T, DIGITS)
+    return tuple(tuple(None if value != value else value for value in row) for row in rounded.tolist())  # noqa: PLR0124
+
+
+def _thinned(
+    tick: np.ndarray[tuple[int], np.dtype[np.int64]], time: Floats, values: Floats, points: int
+) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], Floats, Floats]:
+    first = np.linspace(0, len(time), points // 2 + 1).astype(int)[:-1]
+    last = np.append(first[1:], len(time)) - 1
+    low, high = np.fmin.reduceat(values, first, axis=1), np.fmax.reduceat(values, first, axis=1)
+    falling = values[:, first] > values[:, last]
+    pairs = np.stack([np.where(falling, high, low), np.where(falling, low, high)], axis=2)
+    both = np.stack([first, last], axis=1).ravel()
+    return tick[both], time[both], pairs.reshape(len(SIGNALS), len(both), -1)

@@ -1,0 +1,221 @@
+"""The hub of one robot: what happens goes in from any thread, and out to every client on the event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from pydantic import BaseModel
+
+from daq.acquisition.messages import EventHappened, Progress
+from daq.contracts.service.live import (
+    LinkMessage,
+    ProgressMessage,
+    QueueMessage,
+    RecordEventMessage,
+    RobotMessage,
+    TeachingMessage,
+    Topic,
+)
+from daq.contracts.service.robot import RobotStatus
+from firmware_protocol.commands import StatusFlag
+from server.clock import Clock
+from server.live.history import DIGITS, History
+from server.live.outbox import Outbox
+from server.owner.messages import ArmReport, LiveSample, Opened, Report, Told
+
+LOOK_EVERY = 1.0
+"""s between two looks at the status when nothing says that it has changed."""
+MOST_OFTEN = 0.05
+"""s between two looks at most."""
+PROGRESS_EVERY = 0.2
+"""s between two messages about progress."""
+log = logging.getLogger("server.live")
+
+
+@dataclass(eq=False)
+class Client:
+    """One WebSocket."""
+
+    outbox: Outbox
+    name: str
+    topics: set[Topic] = field(default_factory=set)
+    every: int = 1
+    """Every how manieth sample it gets."""
+    something: asyncio.Event = field(default_factory=asyncio.Event)
+
+
+class Hub:
+    """Clients of one robot. `hear` and `publish` from any thread; everything else on the event loop.
+
+    status: the robot's status now; called on a thread, it may wait for the database
+    """
+
+    def __init__(self, clock: Clock, history: History, status: Callable[[], RobotStatus]) -> None:
+        self.history = history
+        self.dropped = 0
+        self._clock = clock
+        self._status = status
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._clients: set[Client] = set()
+        self._dirty = asyncio.Event()
+        self._shown: dict[str, str] = {}
+        self._watching: asyncio.Task[None] | None = None
+        self._experiment: Callable[[], str | None] = lambda: None
+        self._progressed = 0.0
+
+    def open(self, experiment: Callable[[], str | None]) -> None:
+        """On the event loop, before the first client. `experiment`: the one that runs now."""
+        self._loop = asyncio.get_running_loop()
+        self._experiment = experiment
+        self._watching = self._loop.create_task(self._watch())
+
+    async def close(self) -> None:
+        """No more messages."""
+        self._loop = None
+        if self._watching is not None:
+            self._watching.cancel()
+            await asyncio.gather(self._watching, return_exceptions=True)
+
+    @property
+    def clients(self) -> int:
+        """How many watch."""
+        return len(self._clients)
+
+    def join(self, client: Client) -> None:
+        """From now on it hears what it has asked for."""
+        self._clients.add(client)
+
+    def leave(self, client: Client) -> None:
+        """It has gone."""
+        self._clients.discard(client)
+
+    def shown(self, topics: set[Topic]) -> list[str]:
+        """What clients of these topics see now, encoded."""
+        return [message for topic, message in self._shown.items() if topic in topics]
+
+    def hear(self, report: Report) -> None:
+        """A report of the robot's owner. Must not wait."""
+        now = self._clock.monotonic()
+        match report:
+            case LiveSample():
+                self.history.add(report)
+                self._deliver("samples", encoded_sample(report), report.tick)
+            case EventHappened():
+                event = report.event
+                message = RecordEventMessage(
+                    kind=event.kind, message=event.message, tick=event.tick, joint=event.joint, host_time=now
+                )
+                self.history.add_event(message)
+                self.publish("events", message)
+            case Progress():
+                self._progress(report, now)
+            case Told():
+                self.publish("teaching", TeachingMessage(text=report.text))
+            case ArmReport() | Opened() | _:
+                self.look()
+
+    def publish(self, topic: Topic, message: BaseModel) -> None:
+        """A message to all clients of a topic. Must not wait."""
+        self._deliver(topic, message.model_dump_json(), None)
+
+    def look(self) -> None:
+        """The status may have changed."""
+        self._soon(self._dirty.set)
+
+    def _progress(self, report: Progress, now: float) -> None:
+        experiment = self._experiment()
+        if experiment is not None and (now - self._progressed >= PROGRESS_EVERY or report.fraction >= 1):
+            self._progressed = now
+            text = report.text
+            self.publish("queue", ProgressMessage(experiment=experiment, fraction=report.fraction, text=text))
+
+    def _deliver(self, topic: Topic, message: str, tick: int | None) -> None:
+        self._soon(lambda: self._put(topic, message, tick))
+
+    def _soon(self, call: Callable[[], None]) -> None:
+        loop = self._loop
+        if loop is not None:
+            try:
+                loop.call_soon_threadsafe(call)
+            except RuntimeError:  # closed in this moment: nobody watches any more
+                self._loop = None
+
+    def _put(self, topic: Topic, message: str, tick: int | None) -> None:
+        now = self._clock.monotonic()
+        for client in self._clients:
+            if topic in client.topics and (tick is None or tick % client.every == 0):
+                client.outbox.put(message, now, sample=tick is not None)
+                client.something.set()
+
+    async def _watch(self) -> None:
+        """Publishes what has changed of the status, and the link's counters once a second."""
+        while True:
+            try:
+                async with asyncio.timeout(LOOK_EVERY):
+                    await self._dirty.wait()
+            except TimeoutError:
+                pass
+            self._dirty.clear()
+            try:
+                status = await asyncio.to_thread(self._status)
+            except Exception:
+                log.exception("status")
+                await asyncio.sleep(LOOK_EVERY)
+                continue
+            for topic, message in _parts(status, self._clock.monotonic()):
+                encoded = message.model_dump_json()
+                if _comparable(encoded, message) != self._shown.get(f"{topic}=", ""):
+                    self._shown[f"{topic}="] = _comparable(encoded, message)
+                    self._shown[topic] = encoded
+                    self._put(topic, encoded, None)
+            await asyncio.sleep(MOST_OFTEN)
+
+
+def _parts(status: RobotStatus, now: float) -> list[tuple[Topic, BaseModel]]:
+    robot = RobotMessage(
+        connection=status.connection,
+        connection_problem=status.connection_problem,
+        identity=status.identity,
+        arm=status.arm,
+        cause=status.cause,
+        activity=status.activity,
+        experiment=status.experiment,
+        limp=status.limp,
+        control=status.control,
+    )
+    age = status.link.age or 0.0
+    link = LinkMessage(state=status.link.state, counters=status.link.counters, host_time=now - age)
+    return [("robot", robot), ("link", link), ("queue", QueueMessage(status=status.queue))]
+
+
+def _comparable(encoded: str, message: BaseModel) -> str:
+    """Without what changes all the time: a lease's remaining seconds, a link's time."""
+    if isinstance(message, RobotMessage):
+        control = message.control.model_copy(update={"expires": None, "remaining": None})
+        return message.model_copy(update={"control": control}).model_dump_json()
+    if isinstance(message, LinkMessage):
+        return message.model_copy(update={"host_time": 0.0}).model_dump_json()
+    return encoded
+
+
+def encoded_sample(sample: LiveSample) -> str:
+    """As SampleMessage; by hand, since it is done fifty times a second."""
+    return json.dumps(
+        {
+            "topic": "sample",
+            "tick": sample.tick,
+            "host_time": round(sample.host_time, 4),
+            "joints": sample.joints,
+            "set_point": [round(value, DIGITS) for value in sample.set_point],
+            "position": [round(value, DIGITS) for value in sample.position],
+            "error": [round(value, DIGITS) for value in sample.error],
+            "drive": [round(value, DIGITS) for value in sample.drive],
+            "frozen": bool(sample.status & StatusFlag.FROZEN.value),
+            "lateness": round(sample.lateness, 4),
+        },
+        separators=(",", ":"),
+    )

@@ -1,0 +1,121 @@
+"""One WebSocket from its first message to its last."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+from fastapi import WebSocket, WebSocketDisconnect
+from fastapi.concurrency import run_in_threadpool
+from pydantic import ValidationError
+
+from daq.contracts.errors import DaqError
+from daq.contracts.service.live import JogCommand, LiveRequest, RefusedMessage, ThinnedMessage
+from server.access.caller import Caller
+from server.live.hub import Client
+from server.live.outbox import Outbox
+from server.problems import ProblemError
+from server.services import RobotServices
+
+BASE_RATE = 50
+TOO_SLOW = 1013
+"""Close code: try again later."""
+GOING_AWAY = 1001
+LOOK_EVERY = 1.0
+"""s between two looks at whether a client that takes nothing is to be dropped."""
+log = logging.getLogger("server.live")
+
+
+async def stream(socket: WebSocket, one: RobotServices, who: Caller) -> None:
+    """Serves one client until it goes, or is dropped."""
+    await socket.accept()
+    client = Client(Outbox(one.robot.clock.monotonic()), who.name)
+    one.hub.join(client)
+    tasks = [
+        asyncio.create_task(_send(socket, one, client)),
+        asyncio.create_task(_receive(socket, one, client, who)),
+        asyncio.create_task(_drop_if_hopeless(one, client)),
+    ]
+    try:
+        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            error = task.exception()
+            if error is not None and not isinstance(error, WebSocketDisconnect):
+                raise error
+    finally:
+        one.hub.leave(client)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+    if tasks[2] in done:
+        one.hub.dropped += 1
+        log.warning("live client %s took nothing for too long and was dropped", client.name)
+        # Whoever reads nothing would not take the close either: the server's own time limit ends the connection.
+        async with asyncio.timeout(LOOK_EVERY):
+            await socket.close(TOO_SLOW, "this client read too slowly")
+
+
+async def _send(socket: WebSocket, one: RobotServices, client: Client) -> None:
+    clock = one.robot.clock
+    while True:
+        await client.something.wait()
+        client.something.clear()
+        messages = client.outbox.take(clock.monotonic())
+        if not messages:
+            continue
+        if client.outbox.left_out:
+            messages.append(ThinnedMessage(left_out=client.outbox.left_out).model_dump_json())
+            client.outbox.left_out = 0
+        head = f'{{"now":{clock.monotonic():.4f},"utc":{clock.utc().timestamp():.4f},"messages":['
+        await socket.send_text(head + ",".join(messages) + "]}")
+
+
+async def _receive(socket: WebSocket, one: RobotServices, client: Client, who: Caller) -> None:
+    while True:
+        text = await socket.receive_text()
+        try:
+            await _take(LiveRequest.model_validate_json(text), one, client, who)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(str(part) for part in first["loc"]) or "message"
+            _refuse(one, client, f"{where}: {first['msg']}", "docs/service.md tells what this socket takes")
+        except ProblemError as error:
+            _refuse(one, client, error.detail, error.advice)
+        except DaqError as error:
+            _refuse(one, client, str(error), "")
+
+
+async def _take(request: LiveRequest, one: RobotServices, client: Client, who: Caller) -> None:
+    now = one.robot.clock.monotonic()
+    if request.rate is not None:
+        client.every = BASE_RATE // request.rate
+    fresh = set(request.subscribe) - client.topics
+    client.topics = (client.topics | set(request.subscribe)) - set(request.unsubscribe)
+    for message in one.hub.shown(fresh & client.topics):
+        client.outbox.put(message, now)
+    if request.history is not None:
+        past = await run_in_threadpool(one.hub.history.since, now - request.history, request.points)
+        client.outbox.put(past.model_dump_json(), now)
+    if client.outbox:
+        client.something.set()
+    if request.jog is not None:
+        await run_in_threadpool(_jog, request.jog, one, who)
+
+
+def _jog(command: JogCommand, one: RobotServices, who: Caller) -> None:
+    if not who.may_operate:
+        raise ProblemError(403, "operator-needed", f"{who.name} may look only", "ask for the role operator")
+    one.require_motion(command.lease)
+    one.teaching.jog(dict(command.velocities))
+
+
+def _refuse(one: RobotServices, client: Client, detail: str, advice: str) -> None:
+    message = RefusedMessage(detail=detail, advice=advice)
+    client.outbox.put(message.model_dump_json(), one.robot.clock.monotonic())
+    client.something.set()
+
+
+async def _drop_if_hopeless(one: RobotServices, client: Client) -> None:
+    """Returns when the client is to be dropped."""
+    while not client.outbox.is_hopeless(one.robot.clock.monotonic()):
+        await asyncio.sleep(LOOK_EVERY)
