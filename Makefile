@@ -8,6 +8,10 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 FOR_USE := .venv/installed-for-use
 FOR_DEVELOPMENT := .venv/installed-for-development
 
+# make test WORKERS="-n 2 --dist loadfile": each file of tests to one of two workers. Tests against the clock then meet
+# the load of others and may fail for it.
+WORKERS ?=
+
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test test-all lint format requirements bench clean distclean
@@ -20,11 +24,11 @@ demo: $(FOR_USE) ## record a ramp-step on joints 1-3 of the mock controller, and
 
 test: lint ## lint, types, import contracts, then the tests
 	@echo "== tests"
-	@$(BIN)/python -m pytest -q -m "not slow"
+	@$(BIN)/python -m pytest -q $(WORKERS) -m "not slow"
 
 test-all: lint ## the same, with the slow tests
 	@echo "== tests, the slow ones too"
-	@$(BIN)/python -m pytest -q
+	@$(BIN)/python -m pytest -q $(WORKERS)
 
 lint: $(FOR_DEVELOPMENT) ## lint, format, types and import contracts, without the tests
 	@echo "== lint"
