@@ -19,6 +19,8 @@ class JointScale:
     Args:
         torque: largest torque (N·m, or N) of the drive at standstill.
         volts: largest voltage at the motor.
+        strongest, highest: bounds of torque (N·m, N) and drive: those two for a motor; infinite for a plain gain, of
+            which a machine file does not say how far it is driven.
         speed: speed without load at that voltage, rad/s (m/s); 1 where the drive has no back-EMF.
         resolution: one count of its sensor, rad (m); a 4096th of a turn where it has none.
         range: of its sensor, rad (m); one turn where it has none.
@@ -29,6 +31,8 @@ class JointScale:
 
     torque: float
     volts: float
+    strongest: float
+    highest: float
     speed: float
     resolution: float
     range: float

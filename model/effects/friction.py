@@ -26,7 +26,7 @@ FRICTION = (
         source="Coulomb 1785; contact as an elastic, perfectly plastic element (Prandtl 1928)",
         parameters=(
             EffectParameter(
-                "torque", at.COULOMB, "N·m", low=0.0, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque
+                "torque", at.COULOMB, "N·m", low=0.0, high=lambda s: s.strongest, deviation=lambda s: 0.02 * s.torque
             ),
         ),
     ),
@@ -42,7 +42,7 @@ FRICTION = (
         source="(7.31)",
         parameters=(
             EffectParameter(
-                "torque", at.STRIBECK, "N·m", low=0.0, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque
+                "torque", at.STRIBECK, "N·m", low=0.0, high=lambda s: s.strongest, deviation=lambda s: 0.02 * s.torque
             ),
             EffectParameter(
                 "speed",
@@ -62,7 +62,12 @@ FRICTION = (
         source="Karnopp 1985 (stick as a state of its own)",
         parameters=(
             EffectParameter(
-                "breakaway", at.BREAKAWAY, "N·m", low=0.0, high=lambda s: s.torque, deviation=lambda s: 0.02 * s.torque
+                "breakaway",
+                at.BREAKAWAY,
+                "N·m",
+                low=0.0,
+                high=lambda s: s.strongest,
+                deviation=lambda s: 0.02 * s.torque,
             ),
         ),
         flag=at.HAS_STICTION,
@@ -76,8 +81,8 @@ FRICTION = (
                 "difference",
                 at.DIRECTION,
                 "N·m",
-                low=lambda s: -s.torque,
-                high=lambda s: s.torque,
+                low=lambda s: -s.strongest,
+                high=lambda s: s.strongest,
                 deviation=lambda s: 0.02 * s.torque,
             ),
         ),

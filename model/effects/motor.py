@@ -38,7 +38,7 @@ MOTOR = (
         source="input dead zone of a linear amplifier; volts at the motor",
         parameters=(
             EffectParameter(
-                "width", at.DEAD_ZONE, "V", low=0.0, high=lambda s: s.volts, deviation=lambda s: 0.03 * s.volts
+                "width", at.DEAD_ZONE, "V", low=0.0, high=lambda s: s.highest, deviation=lambda s: 0.03 * s.volts
             ),
         ),
     ),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from model.effects.effect import Effect, EffectParameter, JointScale
 from model.machine_model import layout as at
 
@@ -30,16 +32,16 @@ TRANSMISSION = (
                 "sine",
                 at.RIPPLE_SINE,
                 "N·m",
-                low=lambda s: -s.torque,
-                high=lambda s: s.torque,
+                low=lambda s: -s.strongest,
+                high=lambda s: s.strongest,
                 deviation=lambda s: 0.02 * s.torque,
             ),
             EffectParameter(
                 "cosine",
                 at.RIPPLE_COSINE,
                 "N·m",
-                low=lambda s: -s.torque,
-                high=lambda s: s.torque,
+                low=lambda s: -s.strongest,
+                high=lambda s: s.strongest,
                 deviation=lambda s: 0.02 * s.torque,
             ),
             EffectParameter(
@@ -84,7 +86,7 @@ TRANSMISSION = (
                 at.COMPLIANCE,
                 "rad/(N·m)",
                 low=0.0,
-                high=lambda s: 0.1 * s.range / (s.torque / 20),
+                high=lambda s: 0.1 * s.range / (s.torque / 20) if s.torque == s.strongest else math.inf,
                 deviation=lambda s: 6 * s.resolution / (0.05 * s.torque),
             ),
             EffectParameter(

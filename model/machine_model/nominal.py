@@ -148,10 +148,12 @@ def joint_scale(machine: Machine, number: int) -> JointScale:
         gear = drive.gear_ratio.value
     else:
         supply, volts, torque, gear = NO_LIMIT, 10.0, abs(drive.gain.value) * 10.0, 1.0
+    bounded = isinstance(drive, DcMotor)
     friction = joint.friction.viscous_motor_side or joint.friction.viscous
     controller = machine.controller
     return JointScale(
-        torque=torque, volts=volts, speed=speed or 1.0, resolution=range_ / counts, range=range_,
+        torque=torque, volts=volts, strongest=torque if bounded else math.inf, highest=volts if bounded else math.inf,
+        speed=speed or 1.0, resolution=range_ / counts, range=range_,
         viscous=0.0 if friction is None else friction.value,
         inertia=_transmission_inertia(machine, number),
         period=0.02 if isinstance(controller, NoController) else controller.period.value,

@@ -115,9 +115,9 @@ class TorqueBalance:
     ) -> Floats:
         """Torque asked of the motors less torque that they were driven with (k, n)."""
         flags, speed = self.model.flags, motion.speed
-        motor, beside, contact = np.empty_like(needed), np.empty_like(needed), np.empty_like(needed)
-        given = (volts, time, joints, flags, level, load, self._own, motor, beside, contact)
-        supplied.supplied_torque(motion.position, speed, speed, *given)
+        motor, beside = np.empty_like(needed), np.empty_like(needed)
+        given = (volts, time, joints, flags, level, load, self._own, motor, beside)
+        supplied.supplied_torque(motion.position, speed, motion.contact, speed, *given)
         asked = needed - beside
         if gives := [j for j in range(len(flags)) if flags[j] & at.HAS_FLEXIBILITY]:
             rotor_speed = speed.copy()
@@ -127,11 +127,11 @@ class TorqueBalance:
                 inertia = joints[j, at.ROTOR_INERTIA] * joints[j, at.GEAR] ** 2
                 needed = needed.copy()
                 needed[:, j] += inertia * (motion.acceleration[:, j] + np.gradient(extra, time))
-            supplied.supplied_torque(motion.position, speed, rotor_speed, *given)
+            supplied.supplied_torque(motion.position, speed, motion.contact, rotor_speed, *given)
             asked = needed - beside
         loss = joints[:, at.GEAR_LOSS]
         if loss.any():
-            asked = asked / (1 - loss * contact * np.sign(asked))
+            asked = asked / (1 - loss * motion.contact * np.sign(asked))
         return asked - motor + _lost_in_dead_zone(asked, speed, joints)
 
 
@@ -153,18 +153,19 @@ def _lost_in_dead_zone(asked: Floats, speed: Floats, joints: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Motion:
-    """The links' own motion (k, n), sensor errors taken out."""
+    """The links' own motion (k, n), sensor errors taken out. contact: its direction as friction has it, in [−1, 1]."""
 
     position: Floats
     speed: Floats
     acceleration: Floats
+    contact: Floats
 
 
 def sensed(record: TorqueRecord, joints: Floats, model: Model) -> Motion:
     """The motion of which sensors with these errors would have given the readings."""
     wrong = joints[:, list(SENSOR_COLUMNS)]
     if not wrong.any():
-        return Motion(record.position, record.speed, record.acceleration)
+        return Motion(record.position, record.speed, record.acceleration, record.contact)
     position, slope = record.position.copy(), np.ones_like(record.position)
     for j in range(model.joint_count):
         gain, offset, *bends = wrong[j]
@@ -178,7 +179,7 @@ def sensed(record: TorqueRecord, joints: Floats, model: Model) -> Motion:
         position[:, j] -= error
         slope[:, j] -= rate
     speed = record.speed * slope
-    return Motion(position, speed, np.gradient(speed, record.period, axis=0))
+    return Motion(position, speed, np.gradient(speed, record.period, axis=0), record.contact)
 
 
 def levels_along(model: Model, record: TorqueRecord) -> Floats:

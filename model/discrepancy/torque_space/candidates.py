@@ -25,6 +25,7 @@ Start = dict[str, float]
 NOT_IN_TORQUE_SPACE = {
     "wrong_gain": "acts before the drive that is recorded",
     "lost_set_points": "acts before the drive that is recorded",
+    "stiction": "shows in the moment of breaking away, which low-passed torques do not resolve",
 }
 """Effects that recorded torques cannot show, and why."""
 UNSEEN = ".damping"
@@ -43,6 +44,10 @@ UNLIMITED = 0.7
 LIMIT_SHARES = (0.95, 0.85, 0.7, 0.5)
 DELAYS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08)
 """s: delays, and time constants of windings."""
+WINDING_SHARES = (0.01, 0.1)
+"""Of a joint's torque: what a rotor on a spring may take beside its link's motion."""
+PLAY_SHARES = (0.0005, 0.003, 0.02)
+"""Of a joint's travel: free play."""
 LONGEST_SCAN = 400
 """Frequencies that are tried, at most."""
 
@@ -225,7 +230,7 @@ def _ripple(model: Model, column: int, records: Sequence[TorqueRecord], left: Se
     highest = 2 * np.pi * records[0].cutoff / max(fastest, 1e-9)
     lowest = 2 * np.pi / float(np.ptp(every))
     prismatic = model.machine.joint(column + 1).kind == "prismatic"
-    grid = _scanned(max(lowest, 0.5), min(highest, 1000.0), np.pi / float(np.ptp(every)))
+    grid = _scanned(max(lowest, 0.5), min(highest, 1000.0), 0.7 * np.pi / float(np.ptp(every)))
     if not prismatic and float(np.ptp(every)) > np.pi:
         whole = np.arange(1, min(int(highest), 200) + 1, dtype=np.float64)
         grid = np.unique(np.concatenate([grid, whole]))
@@ -249,6 +254,24 @@ def _spring(model: Model, column: int, records: Sequence[TorqueRecord], _left: S
     middle, span = float(np.mean(position)), float(np.ptp(position))
     for rest in (middle, middle - 2 * span, middle + 2 * span):
         yield {"stiffness": stiffness, "rest": rest}
+
+
+def _winding(model: Model, column: int, records: Sequence[TorqueRecord], _left: Sequence[Floats]) -> Iterator[Start]:
+    """Compliances with which turning the rotor apart from the link takes a share of the torque."""
+    joint = model.vector[at.slot(column + 1, 0) : at.slot(column + 2, 0)]
+    gain = joint[at.GEAR] * joint[at.TORQUE_CONSTANT] / joint[at.RESISTANCE]
+    torque = np.concatenate([gain * r.drive[:, column] for r in records])
+    change = np.concatenate([np.gradient(np.gradient(gain * r.drive[:, column], r.time), r.time) for r in records])
+    inertia = joint[at.ROTOR_INERTIA] * joint[at.GEAR] ** 2
+    whole = float(np.std(torque) / max(inertia * np.std(change), 1e-300))
+    for share in WINDING_SHARES:
+        yield {"compliance": share * whole}
+
+
+def _play(_m: Model, column: int, records: Sequence[TorqueRecord], _left: Sequence[Floats]) -> Iterator[Start]:
+    travel = max(float(np.ptp(r.position[:, column])) for r in records)
+    for share in PLAY_SHARES:
+        yield {"gap": share * travel}
 
 
 def _tilt(_m: Model, _c: int, _r: Sequence[TorqueRecord], _left: Sequence[Floats]) -> Iterator[Start]:
@@ -301,5 +324,7 @@ _SPECIAL: dict[str, Callable[[Model, int, Sequence[TorqueRecord], Sequence[Float
     "periodic_disturbance": _disturbance,
     "spring_torque": _spring,
     "base_tilt": _tilt,
+    "joint_compliance": _winding,
+    "backlash": _play,
 }
 """Effects whose place has to be looked for in the record."""

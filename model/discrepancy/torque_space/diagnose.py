@@ -236,10 +236,10 @@ def _summary(adopted: Sequence[Step], more: bool) -> str:
 
 
 def _assumptions(cutoff: float) -> tuple[str, ...]:
-    unseen = ", ".join(n.replace("_", " ") for n in NOT_IN_TORQUE_SPACE)
+    unseen = "; ".join(f"{n.replace('_', ' ')} {why}" for n, why in NOT_IN_TORQUE_SPACE.items())
     return (
         f"compared as torques below {cutoff:g} Hz; faster effects are not seen",
         "samples at which a joint rests are left out: friction holds it with whatever torque it takes",
-        f"not looked for, since they act before the recorded drive: {unseen}",
+        f"not looked for: {unseen}",
         "positions are taken to be those of the links, behind the transmission",
     )

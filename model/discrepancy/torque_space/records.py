@@ -29,6 +29,8 @@ EDGE = 1.0
 """Periods of the cutoff at both ends that are left out: the low-pass knows nothing beyond them."""
 SHORTEST = 1.0
 """s that a record must last."""
+TURNING_NOISE = 2.0
+"""Standard deviations of the speed's noise over which friction turns."""
 REST_NOISE = 4.0
 """Standard deviations of the speed's noise below which a joint may be at rest, but at least"""
 REST_SHARE = 0.02
@@ -41,7 +43,8 @@ LEAST_REST = 0.15
 class TorqueRecord:
     """A record of k samples on an even grid of which m are compared.
 
-    position, speed, acceleration, drive: (k, n) in SI. moving: (m, n) False where a joint rests: friction then takes
+    position, speed, acceleration, drive: (k, n) in SI. contact: (k, n) direction of motion as friction has it, in [−1, 1];
+    it turns within a few standard deviations of the speed's noise, or a sample. moving: (m, n) False where a joint rests: friction then takes
     whatever value holds it, so that the torque says nothing.
     """
 
@@ -51,6 +54,7 @@ class TorqueRecord:
     speed: Floats
     acceleration: Floats
     drive: Floats
+    contact: Floats
     period: float
     cutoff: float
     every: int
@@ -109,10 +113,15 @@ def _record(trace: Trace, machine: Machine, cutoff: float) -> TorqueRecord:
     time, period = raw.time[::thin], raw.period * thin
     every = max(1, int(1 / (KEPT * cutoff * period)))
     edge = max(1, int(EDGE / cutoff / period))
-    moving = _moving(speed, raw.speed_noise(wide), period)[edge : len(time) - edge : every]
+    noise = raw.speed_noise(wide)
+    turning = np.maximum(TURNING_NOISE * noise, 0.5 * period * np.median(np.abs(acceleration), axis=0)) + 1e-12
+    contact = np.clip(speed / turning, -1.0, 1.0)
+    moving = _moving(speed, noise, period)[edge : len(time) - edge : every]
     if not moving.any():
         raise TraceError(f"trace {raw.name}: no joint moves beyond the noise of its readings")
-    return TorqueRecord(raw.name, time, position, speed, acceleration, drive, period, cutoff, every, edge, moving)
+    return TorqueRecord(
+        raw.name, time, position, speed, acceleration, drive, contact, period, cutoff, every, edge, moving
+    )
 
 
 def _motion(raw: RawSignal, wide: float) -> tuple[Floats, Floats]:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.drives.amplifier import motor_volts, warmed
-from model.drives.piecewise import clamped
 from model.dynamics import recursive
 from model.dynamics.compilation import compiled, internal
 from model.kinematics.chain import ChainArrays
@@ -16,15 +15,12 @@ from model.machine_model import layout as at
 from model.simulation.dynamics_of_run import chain_levels
 from model.simulation.joint_torques import (
     CURRENT,
-    DEFLECTION,
     RISE,
     STATE,
-    STUCK,
     current_after,
     extra_torque,
     mean_current,
     steady_current,
-    still_stuck,
 )
 from model.simulation.own_torque import own_torque
 from model.simulation.period import extra_flags
@@ -69,15 +65,15 @@ def amplified(drive: NDArray[Any], joints: NDArray[Any], out: NDArray[Any]) -> N
 
 @compiled
 def supplied_torque(
-    position: NDArray[Any], speed: NDArray[Any], rotor_speed: NDArray[Any], volts: NDArray[Any], time: NDArray[Any],
+    position: NDArray[Any], speed: NDArray[Any], contact: NDArray[Any], rotor_speed: NDArray[Any], volts: NDArray[Any], time: NDArray[Any],
     joints: NDArray[Any], flags: NDArray[Any], level: NDArray[Any], load: NDArray[Any], own: NDArray[Any],
-    motor: NDArray[Any], beside: NDArray[Any], contact: NDArray[Any],
+    motor: NDArray[Any], beside: NDArray[Any],
 ) -> None:  # fmt: skip
     """Torques (k, n) on the joints: `motor` of the motors, before any loss; `beside` of friction and all other effects.
 
     position, speed: of the links; rotor_speed: of the motors, seen at the joint; volts: after the amplifier, as they
-    act at `time`; level, load: friction levels and gravity torques along the motion. `contact` is the deflection of
-    the friction contact, in [−1, 1].
+    act at `time`; level, load: friction levels and gravity torques along the motion; contact: direction of motion as
+    friction has it, in [−1, 1].
     """
     n = position.shape[1]
     modes = extra_flags(joints, flags)
@@ -85,18 +81,11 @@ def supplied_torque(
     for k in range(position.shape[0]):
         h = time[k] - time[k - 1] if k > 0 else time[1] - time[0]
         for j in range(n):
-            joint, q, v, w = joints[j], position[k, j], speed[k, j], rotor_speed[k, j]
-            moved = q - position[k - 1, j] if k > 0 else 0.0 * q
-            z = clamped(state[j, DEFLECTION] + moved / joint[at.PRESLIDING], 1.0)
-            state[j, DEFLECTION] = z
-            if modes[j] & at.HAS_STICTION:
-                still_stuck(joint, level[k, j], v, state[j, DEFLECTION : DEFLECTION + 1], state[j, STUCK : STUCK + 1])
-                z = state[j, DEFLECTION]
-            contact[k, j] = z
+            joint, q, v, w, z = joints[j], position[k, j], speed[k, j], rotor_speed[k, j], contact[k, j]
             motor[k, j] = _motor_torque(joint, modes[j], state[j], volts[k, j], w, h)
             torque = -joint[at.GEAR] * joint[at.GEAR] * joint[at.VISCOUS] * w - z * level[k, j]
             if modes[j] != 0:
-                torque += extra_torque(joint, modes[j], time[k], q, v, z, state[j, STUCK], 0.0)
+                torque += extra_torque(joint, modes[j], time[k], q, v, z, 0.0, 0.0)
             if modes[j] & at.HAS_USER_EFFECT:
                 torque += own_torque(own[j], joint, q, v, volts[k, j], load[k, j], time[k])
             beside[k, j] = torque
