@@ -12,7 +12,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from model.fitting.options import HELD_BY_DEFAULT, FitOptions, Prior
 from model.fitting.records import Record, Signal, resolution, sensor_deviation
-from model.fitting.simulated import initial_name, presliding_name
+from model.fitting.simulated import initial_name, presliding_name, presliding_shape_name
 from model.fitting.unknowns import Unknown, torque_power
 from model.machine_model import layout as at
 from model.machine_model.model import Model
@@ -28,10 +28,8 @@ SLIDING_FRICTION = (
 )  # fmt: skip
 PRESLIDING_SHARE = 0.5
 """Standard deviation of the presliding distance as a share of what the model assumes: an assumption."""
-CREEPING_SPEED = 0.05
-"""rad/s over which the part of friction that belongs to creeping dies out: an assumption."""
-CREEPING_SHARE = 0.1
-"""Standard deviation of that part as a share of Coulomb friction: an assumption."""
+SHAPE, SHAPE_DEVIATION = 0.5, 0.5
+"""Of the rise of friction where motion turns: 0 is Prandtl's law, 1 is Dahl's; which it is, is not known."""
 
 
 def chosen_unknowns(model: Model, options: FitOptions) -> tuple[Unknown, ...]:
@@ -91,46 +89,26 @@ def start_postures(machine: Machine, records: Sequence[Record], bends: bool) -> 
     return tuple(found)
 
 
-def friction_forms(model: Model) -> tuple[Model, tuple[Unknown, ...]]:
-    """The model with room for a law of friction other than its own near zero speed, and that room as nuisances.
+def friction_forms(model: Model) -> tuple[Unknown, ...]:
+    """Room for a law of friction other than the model's own near zero speed, as nuisances.
 
     Two unknowns a joint with sliding friction: the distance over which friction builds up when motion starts or turns,
-    and a part of it that is there at creeping speed only, of either sign. Neither is in any machine file, the sensor
-    cannot show them, and laws of friction differ in them; both decide a little of every reversal.
+    and the shape of that rise, between Prandtl's corner and Dahl's exponential. Neither is in any machine file, the
+    sensor hardly shows them, and laws of friction differ in them; both decide a little of every reversal.
     """
     joints = tuple(
         j
         for j in model.machine.modelled_joints
         if any(use.name in SLIDING_FRICTION and j in use.joints for use in model.effects)
     )
-    taken = {j for use in model.effects if use.name == "stribeck_friction" for j in use.joints}
-    creeping = tuple(j for j in joints if j not in taken)
     found = []
     for joint in joints:
         start = float(model.vector[at.slot(joint, at.PRESLIDING)])
-        found.append(
-            Unknown(
-                presliding_name(joint), "rad", start, 0.05 * start, 10 * start, start, PRESLIDING_SHARE * start,
-                nuisance=True,
-            )
-        )  # fmt: skip
-    if not creeping:
-        return model, tuple(found)
-    wider = model.with_effect("stribeck_friction", creeping, {"speed": CREEPING_SPEED})
-    for joint in creeping:
-        name, level = f"joint{joint}.stribeck_friction.torque", friction_level(model, joint)
-        if level > 0:
-            found.append(Unknown(name, "N·m", 0.0, -level, level, 0.0, CREEPING_SHARE * level, nuisance=True, torque=1))
-    return wider, tuple(found)
-
-
-def friction_level(model: Model, joint: int) -> float:
-    """Largest Coulomb friction of a joint, N·m: the constant part, and the arm under all the weight beyond the
-    joint."""
-    column = {c: float(model.vector[at.slot(joint, c)]) for c in (at.COULOMB, at.COULOMB_ARM)}
-    beyond = sum(float(model.vector[at.slot(j, at.MASS)]) for j in model.machine.modelled_joints if j >= max(joint, 2))
-    weight = 9.81 * (beyond + float(model.vector[at.LOAD]))
-    return column[at.COULOMB] + column[at.COULOMB_ARM] * weight
+        deviation = PRESLIDING_SHARE * start
+        name, shape = presliding_name(joint), presliding_shape_name(joint)
+        found.append(Unknown(name, "rad", start, 0.05 * start, 10 * start, start, deviation, nuisance=True))
+        found.append(Unknown(shape, "1", SHAPE, 0.0, 1.0, SHAPE, SHAPE_DEVIATION, nuisance=True))
+    return tuple(found)
 
 
 def _linearity(machine: Machine, joint: int) -> float | None:

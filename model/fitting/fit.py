@@ -61,7 +61,7 @@ def fit(
     options, cancel, begun = options or FitOptions(), cancel or Never(), time.perf_counter()
     problem = fit_problem(model, traces, options)
     before = problem.evaluate(_starts(problem), derivatives=False)
-    solution = _widened(problem, _first_search(_without_creeping(problem), options, progress, cancel))
+    solution = _first_search(problem, options, progress, cancel)
     evaluations = solution.evaluations
     whiteners: list[Whitener] = [white(d) for d in problem.floor]
     for number in range(options.rounds):
@@ -100,7 +100,7 @@ def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> S
     postures: tuple[Unknown, ...] = ()
     if options.start_posture and signal == "position" and not simple:
         postures = start_postures(model.machine, records, bool(bends))
-    wider, forms = friction_forms(wider) if options.friction_form and not simple else (wider, ())
+    forms = friction_forms(wider) if options.friction_form and not simple else ()
     loop = options.loop or ("open" if isinstance(model.machine.controller, NoController) else "closed")
     return SimulatedProblem(
         wider, records, (*unknowns, *bends, *forms, *postures), noise_floor(records, model.machine, signal), signal,
@@ -146,21 +146,6 @@ def _first_search(problem: SimulatedProblem, options: FitOptions, progress: Prog
     if not found:
         raise failure or SpecError("no search could begin")
     return min(found, key=lambda s: s.cost)
-
-
-def _without_creeping(problem: SimulatedProblem) -> SimulatedProblem:
-    """Without the friction that belongs to creeping: it costs a simulation most of its speed and moves little."""
-    kept = tuple(u for u in problem.unknowns if not (u.nuisance and u.name.endswith(".stribeck_friction.torque")))
-    return replace(problem, unknowns=kept, memory={})
-
-
-def _widened(problem: SimulatedProblem, solution: Solution) -> Solution:
-    """A solution of some of the unknowns as one of all of them, the others where they start."""
-    if len(solution.values) == len(problem.unknowns):
-        return solution
-    kept = [u.name for u in _without_creeping(problem).unknowns]
-    found = dict(zip(kept, solution.values, strict=True))
-    return replace(solution, values=np.array([found.get(u.name, u.start) for u in problem.unknowns]), information=None)
 
 
 def _beginnings(problem: SimulatedProblem, options: FitOptions) -> list[Floats]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, CancelledError
@@ -20,6 +19,13 @@ Floats = NDArray[np.float64]
 
 DIVERGED = 1e3
 """Whitened residual of every sample where the model has no finite answer: a wall that the search turns away from."""
+
+
+FIRST_DAMPING, LEAST_DAMPING, TINY = 1e-3, 1e-9, 1e-12
+"""Shares of the information's diagonal, and what keeps it positive where nothing is known at all."""
+LEAST_GAIN, FAIR_GAIN, GOOD_GAIN = 1e-3, 0.25, 0.6
+"""Of what a step promised: below the first it is not taken, below the second the next is shorter, above the third the
+Jacobian is good for another."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +107,10 @@ def solve(
 ) -> Solution:
     """The values that minimise Σ ρ(whitened residual²) + Σ ((value − expected)/deviation)², within the bounds.
 
-    Trust-region reflective (Branch, Coleman and Li 1999); a step on which the simulation diverges is turned away.
+    Levenberg and Marquardt's damping with Huber's weights; values that a step would take over a bound are held there
+    and the others solved for again. A Jacobian costs some thirty simulations and a step one, so a Jacobian serves as
+    long as its steps gain what they promise; the search ends by a new one only. A step on which the simulation diverges
+    is turned away.
 
     Args:
         begin: (p,) values to begin from, moved inside the bounds where they lie on one.
@@ -114,16 +123,63 @@ def solve(
     low = np.array([(u.low - u.start) / u.scale for u in problem.unknowns])
     high = np.array([(u.high - u.start) / u.scale for u in problem.unknowns])
     x = _inside((begin - objective.origin) / objective.scale, low, high)
-    samples = objective.samples
-    found = least_squares(
-        objective.residual, x, jac=objective.jacobian, bounds=(low, high), method="trf", x_scale=1.0,
-        loss=(lambda z: huber(z, samples)) if search.robust else "linear",  # type: ignore[arg-type] # stubs: rows of 3
-        ftol=search.tolerance, xtol=search.tolerance, gtol=search.tolerance, max_nfev=search.most_evaluations,
-    )  # fmt: skip
-    J = np.asarray(found.jac) / objective.scale
+    residual = objective.residual(x)
+    cost, weights = _cost_and_weights(residual, objective.samples, search.robust)
+    damping, fresh, message = FIRST_DAMPING, False, ""
+    jacobian = information = np.zeros((0, 0))
+    while objective.evaluations < search.most_evaluations and not message:
+        if jacobian.size == 0:
+            jacobian, fresh = objective.jacobian(x), True
+            information = (jacobian * weights[:, None]).T @ jacobian
+        gradient = jacobian.T @ (weights * residual)
+        step = _step(information, gradient, damping, low - x, high - x)
+        promised = -float(gradient @ step + 0.5 * step @ information @ step)
+        if promised <= search.tolerance * cost:
+            if fresh:
+                message = "no step promises anything any more"
+            jacobian = np.zeros((0, 0))
+            continue
+        tried = objective.residual(x + step)
+        tried_cost, tried_weights = _cost_and_weights(tried, objective.samples, search.robust)
+        gain = (cost - tried_cost) / promised
+        damping = max(damping / 10, LEAST_DAMPING) if gain > GOOD_GAIN else damping * (1 if gain > FAIR_GAIN else 8)
+        if gain > LEAST_GAIN:
+            x, residual, cost, weights = x + step, tried, tried_cost, tried_weights
+        if gain <= GOOD_GAIN and not (fresh and gain <= LEAST_GAIN):
+            jacobian = np.zeros((0, 0))
+        fresh = fresh and gain <= LEAST_GAIN
+    if jacobian.size == 0:
+        jacobian = objective.jacobian(x)
+        information = (jacobian * weights[:, None]).T @ jacobian
     return Solution(
-        objective.values(found.x), float(found.cost), objective.evaluations, found.status > 0, found.message, J.T @ J
-    )
+        objective.values(x), cost, objective.evaluations, bool(message), message or "as many evaluations as allowed",
+        information / np.outer(objective.scale, objective.scale),
+    )  # fmt: skip
+
+
+def _cost_and_weights(residual: Floats, samples: int, robust: bool) -> tuple[float, Floats]:
+    """Half the sum of ρ, and ρ′ of every residual."""
+    if not robust:
+        return 0.5 * float(residual @ residual), np.ones_like(residual)
+    loss = huber(residual**2, samples)
+    return 0.5 * float(loss[0].sum()), loss[1]
+
+
+def _step(information: Floats, gradient: Floats, damping: float, low: Floats, high: Floats) -> Floats:
+    """The damped step within what is left to the bounds (low ≤ 0 ≤ high)."""
+    step = np.zeros_like(gradient)
+    held = np.zeros(len(gradient), dtype=bool)
+    damped = information + damping * np.diag(np.diag(information)) + TINY * np.eye(len(gradient))
+    while not held.all():
+        free = ~held
+        pull = gradient[free] + damped[np.ix_(free, held)] @ step[held]
+        step[free] = -np.linalg.solve(damped[np.ix_(free, free)], pull)
+        outside = free & ((step < low) | (step > high))
+        if not outside.any():
+            break
+        step[outside] = np.clip(step, low, high)[outside]
+        held |= outside
+    return step
 
 
 def _inside(x: Floats, low: Floats, high: Floats) -> Floats:

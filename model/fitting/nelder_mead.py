@@ -42,8 +42,8 @@ def climb(
             evaluations = problem.evaluate(values, derivatives=False)
         except SpecError:
             return 1e9
-        squares = sum(float((e.residual**2).sum()) for e in evaluations)
-        mean = squares / sum(len(e.residual) for e in evaluations)
+        compared = [e.residual[run] for e, runs in zip(evaluations, problem.runs, strict=True) for run in runs]
+        mean = sum(float((r**2).sum()) for r in compared) / sum(map(len, compared))
         if mean < best[0]:
             best = (mean, values)
         if tell is not None:

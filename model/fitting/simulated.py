@@ -23,7 +23,7 @@ from model.simulation.simulate import LONGEST_STEP, Options, Prepared, at_rows, 
 
 Floats = NDArray[np.float64]
 INITIAL = "initial"
-PRESLIDING = "presliding"
+PRESLIDING, PRESLIDING_SHAPE = "presliding", "presliding_shape"
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class SimulatedProblem:
     @cached_property
     def _places(self) -> list[tuple[NDArray[np.int64], tuple[int, int] | None]]:
         """Per unknown, its slots in the flat vector, or its place (joint index, 0 or 1) in the initial state."""
-        return [_place(self.model, u.name) for u in self.unknowns]
+        return [unknown_place(self.model, u.name) for u in self.unknowns]
 
     def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
         """Residuals of every record. Raises SpecError when a simulation does not stay finite."""
@@ -195,11 +195,17 @@ def presliding_name(joint: int) -> str:
     return f"{PRESLIDING}.joint{joint}"
 
 
-def _place(model: Model, name: str) -> tuple[NDArray[np.int64], tuple[int, int] | None]:
+def presliding_shape_name(joint: int) -> str:
+    """Name of the unknown that is the shape of a joint's presliding, 0 (Prandtl) to 1 (Dahl)."""
+    return f"{PRESLIDING_SHAPE}.joint{joint}"
+
+
+def unknown_place(model: Model, name: str) -> tuple[NDArray[np.int64], tuple[int, int] | None]:
     """Where an unknown acts: its slots in the flat vector, or its place (joint index, column) in the initial state."""
-    if name.startswith(PRESLIDING + "."):
-        joint = int(name.rpartition("joint")[2])
-        return np.array([at.slot(joint, at.PRESLIDING)]), None
+    for kind, column in ((PRESLIDING, at.PRESLIDING), (PRESLIDING_SHAPE, at.PRESLIDING_SHAPE)):
+        if name.startswith(kind + "."):
+            joint = int(name.rpartition("joint")[2])
+            return np.array([at.slot(joint, column)]), None
     if name.startswith(INITIAL + "."):
         joint = int(name.split(".")[2].removeprefix("joint"))
         return np.zeros(0, dtype=np.int64), (joint - 1, 0)

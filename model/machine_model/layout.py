@@ -54,6 +54,7 @@ SHARED = 10
     COULOMB,  # N·m at the joint
     COULOMB_ARM,  # m
     PRESLIDING,  # rad
+    PRESLIDING_SHAPE,  # 0 Prandtl, 1 Dahl
     STRIBECK,  # N·m
     STRIBECK_SPEED,  # rad/s
     BREAKAWAY,  # N·m above Coulomb friction
@@ -86,7 +87,7 @@ SHARED = 10
     SHAPE,  # of the link: CYLINDER, ROD or BODY
     PRISMATIC,  # 1, or 0 for a revolute joint
     USER,  # the first of USER_COLUMNS for effects from files of the user's own
-) = range(65)
+) = range(66)
 USER_COLUMNS = 8
 PER_JOINT = USER + USER_COLUMNS
 

@@ -69,6 +69,11 @@ def advance(  # noqa: PLR0915 (a step in registers: three joints written out, no
         1.0 / joints[1, at.PRESLIDING],
         1.0 / joints[2, at.PRESLIDING],
     )
+    form_1, form_2, form_3 = (
+        joints[0, at.PRESLIDING_SHAPE],
+        joints[1, at.PRESLIDING_SHAPE],
+        joints[2, at.PRESLIDING_SHAPE],
+    )
     arms = (joints[0, at.COULOMB_ARM], joints[1, at.COULOMB_ARM], joints[2, at.COULOMB_ARM])
     plain = (joints[0, at.COULOMB], joints[1, at.COULOMB], joints[2, at.COULOMB])
     offset_1, offset_2, offset_3 = joints[0, at.THETA], joints[1, at.THETA], joints[2, at.THETA]
@@ -91,7 +96,9 @@ def advance(  # noqa: PLR0915 (a step in registers: three joints written out, no
             if stage > 0:
                 dq1, dq2, dq3 = reach * u1, reach * u2, reach * u3
                 u1, u2, u3 = v1 + reach * a1, v2 + reach * a2, v3 + reach * a3
-            y1, y2, y3 = deflection(z1, dq1, soft_1), deflection(z2, dq2, soft_2), deflection(z3, dq3, soft_3)
+            y1 = deflection(z1, dq1, soft_1, form_1)
+            y2 = deflection(z2, dq2, soft_2, form_2)
+            y3 = deflection(z3, dq3, soft_3, form_3)
             p2, p3 = q2 + dq2, q3 + dq3
             l1, l2, l3 = friction_levels(p2 + offset_2, p3 + offset_3, arms, plain, weight_2, weight_3)
             t1 = drive_1 - damping_1 * u1 - y1 * l1
@@ -115,7 +122,9 @@ def advance(  # noqa: PLR0915 (a step in registers: three joints written out, no
         dq1, dq2, dq3 = sixth * qs1, sixth * qs2, sixth * qs3
         q1, q2, q3 = q1 + dq1, q2 + dq2, q3 + dq3
         v1, v2, v3 = v1 + sixth * vs1, v2 + sixth * vs2, v3 + sixth * vs3
-        z1, z2, z3 = deflection(z1, dq1, soft_1), deflection(z2, dq2, soft_2), deflection(z3, dq3, soft_3)
+        z1 = deflection(z1, dq1, soft_1, form_1)
+        z2 = deflection(z2, dq2, soft_2, form_2)
+        z3 = deflection(z3, dq3, soft_3, form_3)
         if special:
             state[0, DEFLECTION], state[1, DEFLECTION], state[2, DEFLECTION] = z1, z2, z3
             state[0, SPEED] = v1

@@ -58,7 +58,7 @@ def advance(
                 work[LOAD] = gravity_of(kind, work[Q], joints, body)
             for j in range(n):
                 joint, moved = joints[j], work[Q, j] - state[j, POSITION]
-                z = deflection(state[j, DEFLECTION], moved, 1.0 / joint[at.PRESLIDING])
+                z = deflection(state[j, DEFLECTION], moved, 1.0 / joint[at.PRESLIDING], joint[at.PRESLIDING_SHAPE])
                 gives = flags[j] & at.HAS_FLEXIBILITY != 0
                 turning = work[W, j] if gives else work[V, j]
                 motor = motor_gain(joint, state[j, RISE]) * volts[j] - motor_damping(joint, state[j, RISE]) * turning
@@ -119,7 +119,8 @@ def _end(state: NDArray[Any], work: NDArray[Any], sixth: complex, joints: NDArra
     """The state after the step."""
     for j in range(state.shape[0]):
         moved = sixth * work[SUM_V, j]
-        state[j, DEFLECTION] = deflection(state[j, DEFLECTION], moved, 1.0 / joints[j, at.PRESLIDING])
+        softness, shape = 1.0 / joints[j, at.PRESLIDING], joints[j, at.PRESLIDING_SHAPE]
+        state[j, DEFLECTION] = deflection(state[j, DEFLECTION], moved, softness, shape)
         state[j, POSITION] += moved
         state[j, SPEED] += sixth * work[SUM_A, j]
         state[j, ROTOR_POSITION] += sixth * work[SUM_W, j]

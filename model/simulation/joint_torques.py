@@ -1,9 +1,9 @@
 """Torques on one joint beside the rigid-body ones: motor, friction, and what the effects add. Compiled.
 
 Friction that opposes motion is carried by z in [−1, 1], the deflection of an elastic, perfectly plastic contact: it
-follows the joint's displacement over the presliding distance and is clamped (Prandtl). The torque is z times the level
-of friction, so a joint at rest holds a load without creeping, no step is stiff near zero speed, and the derivative
-exists on both sides of every corner.
+follows the joint's displacement over the presliding distance and is clamped (Prandtl), or comes to its end the slower
+the nearer it is (Dahl), or anything between. The torque is z times the level of friction, so a joint at rest holds a
+load without creeping, no step is stiff near zero speed, and the derivative exists on both sides of every corner.
 """
 
 from __future__ import annotations
@@ -29,9 +29,20 @@ STATE = 8
 
 
 @inlined
-def deflection(z: Any, displacement: Any, softness: Any) -> Any:
-    """z after a displacement; `softness` is one over the presliding distance."""
-    return clamped(z + displacement * softness, 1.0 + 0.0 * z)
+def deflection(z: Any, displacement: Any, softness: Any, shape: Any) -> Any:
+    """z after a displacement x of one sign s: dz/dx = (1 − shape s z) · softness, clamped.
+
+    `softness` is one over the presliding distance; `shape` is 0 for Prandtl's law and 1 for Dahl's. The exponential of
+    the solution is one over its series to the third power: never negative, and a law of friction as good as another.
+    """
+    if shape == 0.0:
+        return clamped(z + displacement * softness, 1.0 + 0.0 * z)
+    x = magnitude(displacement) * softness
+    y = shape * x
+    rise = 1.0 + y * (0.5 + y * (1.0 / 6.0))
+    kept = 1.0 / (1.0 + y * rise)
+    gain = x * rise * kept
+    return clamped(z * kept + (gain if displacement.real >= 0.0 else -gain), 1.0 + 0.0 * z)
 
 
 @inlined

@@ -1,0 +1,119 @@
+"""The search itself, on problems whose answer is known without it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import least_squares, lsq_linear
+
+from daq.contracts.progress import Never
+from model.fitting.least_squares import Search, solve
+from model.fitting.problem import Evaluation
+from model.fitting.unknowns import Unknown
+from model.fitting.whitening import white
+
+Floats = NDArray[np.float64]
+
+
+@dataclass
+class Curve:
+    """y = a exp(−b t) + c, one signal of one record; counts its Jacobians."""
+
+    measured: Floats
+    bounds: tuple[tuple[float, float], ...] = ((-10.0, 10.0),) * 3
+    jacobians: int = 0
+    time: Floats = field(default_factory=lambda: np.linspace(0.0, 3.0, 200))
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        starts = (1.0, 0.5, 0.0)
+        return tuple(
+            Unknown(n, "1", s, low, high) for n, s, (low, high) in zip("abc", starts, self.bounds, strict=True)
+        )
+
+    @property
+    def runs(self) -> Sequence[Sequence[slice]]:
+        return [[slice(0, 200)]]
+
+    @property
+    def floor(self) -> Floats:
+        return np.array([0.01])
+
+    def model(self, v: Floats) -> Floats:
+        return np.asarray(v[0] * np.exp(-v[1] * self.time) + v[2])
+
+    def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
+        a, b, _ = values
+        fall = np.exp(-b * self.time)
+        self.jacobians += derivatives
+        jacobian = np.stack([fall, -a * self.time * fall, np.ones_like(fall)])[:, :, None] if derivatives else None
+        return [Evaluation((self.model(values) - self.measured)[:, None], jacobian)]
+
+
+def curve(**fields: object) -> Curve:
+    noise = 0.01 * np.random.default_rng(3).standard_normal(200)
+    time = np.linspace(0.0, 3.0, 200)
+    return Curve(2.0 * np.exp(-1.3 * time) + 0.4 + noise, **fields)  # type: ignore[arg-type]
+
+
+def found_elsewhere(problem: Curve, robust: bool = False) -> Floats:
+    """scipy's answer to the same."""
+    low, high = np.array(problem.bounds).T
+    loss, scale = ("huber", 4.0) if robust else ("linear", 1.0)
+    return np.asarray(
+        least_squares(
+            lambda v: (problem.model(v) - problem.measured) / 0.01, [1.0, 0.5, 0.0], bounds=(low, high), loss=loss,
+            f_scale=scale, xtol=1e-12, ftol=1e-12, gtol=1e-12,
+        ).x
+    )  # fmt: skip
+
+
+def test_finds_the_least_squares_with_few_jacobians() -> None:
+    problem = curve()
+    solution = solve(problem, [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(False, 1e-9))
+    np.testing.assert_allclose(solution.values, found_elsewhere(problem), rtol=1e-5)
+    assert solution.converged
+    assert problem.jacobians < solution.evaluations
+
+
+def test_outliers_weigh_as_huber_says() -> None:
+    problem = curve()
+    problem.measured[50:60] += 5.0
+    solution = solve(problem, [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(True, 1e-10, 200))
+    np.testing.assert_allclose(solution.values, found_elsewhere(problem, robust=True), rtol=1e-3)
+
+
+@pytest.mark.parametrize("bounds", [((-10.0, 1.5), (-10.0, 10.0), (-10.0, 10.0)), ((-10, 10), (0.1, 0.9), (-1, 0.2))])
+def test_bounds_hold_and_the_others_are_best_under_them(bounds: tuple[tuple[float, float], ...]) -> None:
+    problem = curve(bounds=bounds)
+    solution = solve(problem, [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(False, 1e-10, 200))
+    low, high = np.array(bounds).T
+    assert (solution.values >= low).all()
+    assert (solution.values <= high).all()
+    np.testing.assert_allclose(solution.values, found_elsewhere(problem), rtol=2e-3)
+
+
+def test_a_straight_problem_takes_one_step() -> None:
+    @dataclass
+    class Line(Curve):
+        def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
+            J = np.stack([np.ones(200), self.time, self.time**2])
+            self.jacobians += derivatives
+            return [Evaluation((values @ J - self.measured)[:, None], J[:, :, None] if derivatives else None)]
+
+    time = np.linspace(0.0, 3.0, 200)
+    problem = Line(1.0 - time + 0.3 * time**2 + 0.01 * np.random.default_rng(4).standard_normal(200))
+    solution = solve(problem, [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(False, 1e-9))
+    J = np.stack([np.ones(200), time, time**2], axis=1)
+    np.testing.assert_allclose(solution.values, lsq_linear(J, problem.measured).x, atol=1e-4)
+    assert solution.evaluations <= 5
+
+
+def test_says_when_it_was_not_given_enough_evaluations() -> None:
+    solution = solve(curve(), [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(False, 1e-9, 2))
+    assert not solution.converged
+    assert solution.evaluations == 2
