@@ -26,6 +26,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "validate": ("daq.cli.validate", "What must move for a model to explain traces."),
     "simulate": ("daq.cli.simulate", "What a model does where a trace was recorded."),
     "compare": ("daq.cli.compare", "Several models beside the same traces."),
+    "diagnose": ("daq.cli.diagnose", "Name the effect that a model lacks, add it, show the gap shrink."),
     "design": ("daq.cli.design", "Experiments that make parameters best known."),
     "thesis": ("daq.cli.thesis", "The 1991 source reproduced, ours beside the published."),
     "blind": ("daq.cli.blind", "Effects hidden in the mock, diagnosed blindly, scored."),

@@ -1,0 +1,148 @@
+"""`daq diagnose`: where traces and a model disagree, what is missing, what adding it does, and what to run next."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from daq.cli.context import Invocation, JsonOption, console, invocation, print_json
+from daq.cli.model_input import (
+    MODEL_HELP,
+    EffectFileOption,
+    ReportOption,
+    TraceFolderOption,
+    TracesArgument,
+    load_effects,
+    machine_of,
+    read_model,
+    read_traces,
+)  # fmt: skip
+from daq.contracts.errors import SpecError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from daq.contracts.trace import Trace
+    from model.discrepancy.answer import Diagnosis
+    from model.discrepancy.options import DiagnosisOptions
+    from model.machine_model.model import Model
+
+app = typer.Typer(add_completion=False)
+
+REPORT_SHARE = 0.05
+"""Of the progress, for simulating what the report draws."""
+
+
+def _model_file(path: Path | None) -> Path | None:
+    """Refuses another kind of file before anything is computed."""
+    if path is not None and path.suffix != ".json":
+        raise SpecError(f"--out {path}: a model is written as .json")
+    return path
+
+
+@app.command()
+def diagnose(
+    context: typer.Context,
+    traces: TracesArgument,
+    model: Annotated[
+        str | None, typer.Option(help=f"The model to doubt (default: the traces' machine). {MODEL_HELP}")
+    ] = None,
+    holdout: Annotated[
+        list[str] | None, typer.Option(help="A trace to judge by, not fitted to. May be repeated.")
+    ] = None,
+    effects: Annotated[
+        str | None, typer.Option(help="Candidates: backlash,coulomb and so on (default: every effect known).")
+    ] = None,
+    joints: Annotated[str | None, typer.Option(help="Look on these joints only: 1-3, 2 (default: all).")] = None,
+    load: Annotated[float | None, typer.Option(min=0.0, help="The load that the arm carried, kg.")] = None,
+    most: Annotated[int, typer.Option(min=1, max=10, help="Effects to add at most, one after the other.")] = 3,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", callback=_model_file, help="Where the new model goes, a .json file.")
+    ] = None,
+    report: ReportOption = None,
+    folder: TraceFolderOption = None,
+    effect_file: EffectFileOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Find where a model and traces disagree, name the effect that is missing, add it, and show the gap shrink."""
+    from daq.cli.diagnosis_text import answer_text
+    from daq.cli.model_progress import shown_progress
+    from model.discrepancy.workflow import diagnose as run_diagnosis
+
+    call = invocation(context)
+    load_effects(effect_file)
+    options = _options(effects, joints, most)
+    fitted_to = read_traces(call, folder, traces)
+    held = read_traces(call, folder, holdout) if holdout else []
+    begin = _beginning(call, fitted_to, model, load)
+    with shown_progress("diagnosing") as tell:
+        share = 1.0 if report is None else 1.0 - REPORT_SHARE
+        found = run_diagnosis(begin, fitted_to, held, options, lambda f, text: tell(share * f, text))
+        page = None if report is None else _written(found, fitted_to, held, report)
+    if out is not None:
+        from model.machine_model.model_file import save_model
+
+        save_model(found.model_after, out)
+    if json:
+        print_json(found.model_dump(mode="json"))
+    else:
+        print(answer_text(found))
+    if out is not None:
+        console().print(f"model {found.model_after.identity}: {out}")
+    if page is not None:
+        console().print(f"report: {page}")
+
+
+def _options(effects: str | None, joints: str | None, most: int) -> DiagnosisOptions:
+    from daq.cli.effect_choice import effect_name
+    from daq.contracts.experiment import parse_joints
+    from model.discrepancy.options import DiagnosisOptions
+
+    names = None if effects is None else tuple(effect_name(part) for part in effects.split(","))
+    return DiagnosisOptions(
+        effects=names, joints=None if joints is None else tuple(parse_joints(joints)), most_steps=most
+    )
+
+
+def _beginning(call: Invocation, traces: Sequence[Trace], model: str | None, load: float | None) -> Model:
+    """The model that is doubted, with the load that was carried."""
+    from model.machine_model.model import base_model
+
+    begin = base_model(machine_of(traces, call)) if model is None else read_model(model)
+    return begin if load is None else with_load(begin, load)
+
+
+def with_load(model: Model, kilograms: float) -> Model:
+    """The model of the same machine with another load at its end, known as well as the old one relative to its size.
+
+    Raises SpecError for a machine that has no load.
+    """
+    from model.machine_model.model import Model
+
+    load = model.machine.load
+    if load is None:
+        raise SpecError(f"--load: {model.machine.title} has no load in its machine file; give it one there")
+    scale = kilograms / load.value if load.value > 0 else 1.0
+    deviation = None if load.deviation is None else max(load.deviation * scale, 1e-3)
+    changed = load.model_copy(update={"value": kilograms, "deviation": deviation, "source": "given with --load"})
+    machine = model.machine.model_copy(update={"load": changed})
+    values = {name: value for name, value in model.values.items() if name != "load.mass"}
+    fields = {name: getattr(model, name) for name in type(model).model_fields}
+    return Model(**{**fields, "machine": machine, "values": values})
+
+
+def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], path: Path) -> Path:
+    """The page, with what the models before and after make of every trace where a simulation can follow it."""
+    from daq.contracts.machine import NoController
+    from model.comparison.compare import compare
+    from model.reports.diagnosis_report import LABELS, diagnosis_report
+    from model.reports.page import write_report
+
+    simulated = not isinstance(found.model_before.machine.controller, NoController)
+    comparison = None
+    if simulated and all(t.set_point is not None for t in (*traces, *held)):
+        models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
+        comparison = compare(models, [*traces, *held], [t.record.trace_id for t in held])
+    return write_report(diagnosis_report(found, comparison), path)

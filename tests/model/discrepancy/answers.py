@@ -1,0 +1,84 @@
+"""An answer with real signals behind it: an arm that lacks an effect, located, reasoned about and compared."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from daq.contracts.experiment import ExperimentSpec, SlowRamp
+from daq.contracts.trace import Trace
+from model.comparison.compare import Comparison, compare
+from model.discrepancy.answer import Candidate, Diagnosis, FoundValue, NextExperiment, SignalError, Step
+from model.discrepancy.reasons import reason
+from model.discrepancy.remaining import shapes
+from model.discrepancy.where import located
+from model.fitting.records import noise_floor, records_of
+from model.machine_model.model import Model
+from model.simulation.simulate import Options, simulate
+from tests.model.discrepancy.motions import trace_of
+from tests.model.fitting import imagined
+
+EFFECT = "coulomb_friction"
+TORQUE = 8.0
+NAME = "joint2.coulomb_friction.torque"
+
+
+def an_answer(seconds: float = 20.0) -> tuple[Diagnosis, Comparison]:
+    """Coulomb friction of 8 N·m on joint 2, found on one trace and judged on another.
+
+    The evidence of the candidates is imagined; residuals, places, reason and errors are computed.
+    """
+    before = imagined.arm()
+    after = before.with_effect(EFFECT, (2,), {"torque": TORQUE})
+    fit = trace_of(after, seconds)
+    held = trace_of(after, seconds, seed=4)
+    records = records_of([fit], before.machine, "position")
+    deviations = noise_floor(records, before.machine, "position")
+    left = residual(before, fit)
+    value = FoundValue(value=TORQUE, low=7.8, high=8.2, unit="N·m")
+    candidates = (
+        Candidate(effect=EFFECT, joints=(2,), evidence=2410.0, misfit=1.02, refitted=True, parameters={NAME: value}),
+        Candidate(effect="stiction", joints=(2,), evidence=1890.0, misfit=1.31, refitted=True),
+        Candidate(effect="stribeck_friction", joints=(2,), evidence=1710.0, misfit=1.4, refitted=True),
+        Candidate(effect="dead_zone", joints=(2,), evidence=1520.0),
+        Candidate(effect="backlash", joints=(2,), evidence=420.0),
+        Candidate(effect="base_tilt", joints=(), evidence=-6.0),
+        Candidate(effect="viscous_friction", joints=(1,), evidence=-11.0),
+    )
+    told = reason(
+        EFFECT, (2,), {NAME: value}, 2410.0, 520.0, model=after, before=before, records=records,
+        runner_up=candidates[1],
+    )  # fmt: skip
+    comparison = compare([("before", before), ("after", after)], [fit, held], [held.record.trace_id])
+    step = Step(
+        effect=EFFECT, joints=(2,), parameters={NAME: value}, evidence=2410.0, margin=520.0, candidates=candidates,
+        rmse_fit=_errors(comparison, "in_sample"), rmse_holdout=_errors(comparison, "held_out"),
+        excess_removed_holdout=0.982, sum_lambda2_before=0.31, sum_lambda2_after=1.42,
+        where=located(before, records, [left], deviations), reason=told, adopted=True,
+    )  # fmt: skip
+    asked = NextExperiment(
+        name="slow reversals on joint 2", spec=ExperimentSpec(trajectory=SlowRamp(), joints=(2,)), duration=12.0,
+        separates=("stiction", "stribeck_friction"), predicted_separation=6.4,
+        reason="at 2 °/s stiction jerks and Stribeck friction does not",
+    )  # fmt: skip
+    answer = Diagnosis(
+        verdict="named", summary="Coulomb friction on joint 2 is missing.", steps=(step,),
+        remaining=shapes(before, records, [left], deviations), next_experiment=asked, model_before=before,
+        model_after=after, traces=(fit.record.trace_id,), holdout=(held.record.trace_id,), seconds=4.2,
+        robot_seconds=2 * seconds, notes=("The recorded drive was used.",),
+    )  # fmt: skip
+    return answer, comparison
+
+
+def residual(model: Model, trace: Trace) -> np.ndarray:
+    """Measured − simulated (m, n)."""
+    record = records_of([trace], model.machine, "position")[0]
+    run = simulate(model, record.inputs, Options(quantise=False))
+    return np.asarray(record.measured - run.at_samples(run.reading))
+
+
+def _errors(comparison: Comparison, kind: str) -> tuple[SignalError, ...]:
+    before, after = (getattr(m, kind) for m in comparison.models)
+    return tuple(
+        SignalError(joint=b.joint, unit=b.unit, before=b.rmse, after=a.rmse, floor=b.floor)
+        for b, a in zip(before, after, strict=True)
+    )
