@@ -1,0 +1,46 @@
+"""What one turn's ranking allows to be said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from model.discrepancy.ranking import Ranking
+from model.discrepancy.refitting import Refitted
+from model.discrepancy.thresholds import Thresholds
+
+Kind = Literal["nothing", "named", "group"]
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The answer of one turn: `group` holds candidates that the data cannot tell apart, the best first; `margin` is
+    the evidence of the best over the best that would be another answer."""
+
+    kind: Kind
+    best: Refitted | None
+    margin: float
+    group: tuple[Refitted, ...]
+
+
+def decide(ranking: Ranking, thresholds: Thresholds) -> Decision:
+    """Nothing significant, one name, or a group."""
+    fits = ranking.fitted
+    if not fits or fits[0].evidence < thresholds.significant:
+        return Decision("nothing", fits[0] if fits else None, 0.0, ())
+    best = fits[0]
+    rivals = [f for f in fits[1:] if not same_answer(f, best)]
+    margin = best.evidence - max([0.0, *(r.evidence for r in rivals)])
+    group = (best, *(r for r in rivals if best.evidence - r.evidence < thresholds.margin))
+    return Decision("group" if len(group) > 1 else "named", best, margin, group if len(group) > 1 else ())
+
+
+def same_answer(one: Refitted, other: Refitted) -> bool:
+    """Whether two candidates say the same of the machine."""
+    return one.candidate.name == other.candidate.name and one.candidate.joints == other.candidate.joints
+
+
+def explained_share(before: float, after: float, floor: float = 1.0) -> float:
+    """Share of the misfit above what noise leaves that is gone."""
+    excess = before - floor
+    return 1.0 if excess <= 0 else (before - after) / excess

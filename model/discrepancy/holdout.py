@@ -1,0 +1,78 @@
+"""What a step brings on traces it was not fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from daq.contracts.trace import Trace
+from model.discrepancy.answer import SignalError
+from model.discrepancy.observation import Observation, Signals, observed
+from model.discrepancy.search import Point, point_at, searched
+from model.fitting.simulated import INITIAL
+from model.fitting.unknowns import Unknown
+from model.machine_model.model import Model
+
+START_STEPS = 2
+"""Of the search for where a held-out trace begins."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Traces that no parameter is fitted to; `starts`: unknowns that are the postures they begin at."""
+
+    observation: Observation
+    starts: tuple[Unknown, ...]
+
+    def residuals(self, point: Point) -> Signals:
+        """Measured − simulated (m, n) rad of every held-out trace, with the point's values.
+
+        Where each arm starts, within a count or so, is estimated from the trace itself: friction holds the arm there,
+        and nothing that was fitted elsewhere can know it.
+        """
+        kept = [k for k, u in enumerate(point.unknowns) if not u.name.startswith(INITIAL + ".")]
+        held = [replace(point.unknowns[k], deviation=None) for k in kept]  # no prior and no derivative: they stay
+        unknowns = (*held, *self.starts)
+        values = np.concatenate([point.values[kept], [u.start for u in self.starts]])
+        observation = self.observation
+        none = np.zeros((len(unknowns), observation.samples))
+        begun = point_at(observation, point.model, unknowns, values, observation.quiet, none)
+        if not np.isfinite(begun.weighted).all():
+            return begun.residuals
+        return searched(observation, begun, START_STEPS, range(len(held), len(unknowns))).residuals
+
+    def sum_of_squares(self, point: Point) -> float:
+        """Sum of the weighted squares; infinite where the simulation does not stay finite."""
+        weighted = self.observation.weighted(self.residuals(point))
+        return float(weighted @ weighted) if np.isfinite(weighted).all() else float("inf")
+
+
+def held_out(model: Model, traces: Sequence[Trace]) -> HeldOut | None:
+    """The held-out traces, ready; None without any. Raises TraceError and SpecError as for the fitted ones."""
+    if not traces:
+        return None
+    observation, _, unknowns = observed(model, traces)
+    return HeldOut(observation, tuple(u for u in unknowns if u.name.startswith(INITIAL + ".")))
+
+
+def errors(observation: Observation, model: Model, before: Signals, after: Signals) -> tuple[SignalError, ...]:
+    """Root mean square of every joint before and after, beside the floor."""
+    found = []
+    for column, joint in enumerate(model.machine.modelled_joints):
+        sizes = []
+        for signals in (before, after):
+            parts = [s[run, column] for s, r in zip(signals, observation.records, strict=True) for run in r.runs]
+            sizes.append(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
+        unit = "rad" if model.machine.joint(joint).kind == "revolute" else "m"
+        floor = float(observation.deviations[column])
+        found.append(SignalError(joint=joint, unit=unit, before=sizes[0], after=sizes[1], floor=floor))
+    return tuple(found)
+
+
+def excess_removed(found: Sequence[SignalError]) -> float | None:
+    """Share of the variance above the floor, all joints weighted by their floors, that is gone; None without excess."""
+    before = sum((e.before**2 - e.floor**2) / e.floor**2 for e in found)
+    after = sum((e.after**2 - e.floor**2) / e.floor**2 for e in found)
+    return None if before <= 0 else 1.0 - after / before

@@ -1,0 +1,125 @@
+"""Finite trials of every candidate: what each could take off the residual once the tolerance parameters have moved too.
+
+A candidate is simulated at a few sizes, not differentiated where it is absent: backlash, a dead zone or a limit has no
+useful derivative there. The difference it makes is compared with the residual after what the tolerance parameters could
+explain has been taken out of both, at the price of their priors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.discrepancy.candidates import Candidate
+from model.discrepancy.observation import Observation
+from model.discrepancy.search import Point
+
+Floats = NDArray[np.float64]
+
+LARGEST_STRETCH = 2.0
+"""A trial may be scaled so far; beyond, the response is no longer in proportion."""
+LEAST_STRETCH = 0.3
+LEAST_RESPONSE = 0.1
+"""Deviations of a reading, over the whole record: a candidate that does less cannot be seen."""
+
+
+@dataclass(frozen=True)
+class Probed:
+    """A candidate at its best trial: the fall of the cost that it promises, and parameters to start a fit from."""
+
+    candidate: Candidate
+    gain: float
+    start: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Takes out of signals what the tolerance parameters explain at the price of their priors."""
+
+    tangents: Floats
+    inverse: Floats
+    residual: Floats
+    pull: Floats
+
+    def gains(self, responses: Floats, columns: slice | NDArray[np.int64] = slice(None)) -> tuple[Floats, Floats]:
+        """For responses (k, N′), nonzero at `columns` only: the inner product with the residual and the square, both
+        after projection, (k,) each."""
+        shared = self.tangents[:, columns] @ responses.T
+        explained = self.inverse @ shared
+        squares = np.einsum("kn,kn->k", responses, responses) - np.einsum("pk,pk->k", shared, explained)
+        return responses @ self.residual[columns] - explained.T @ self.pull, np.maximum(squares, 0.0)
+
+    def cross(self, one: Floats, other: Floats, columns: slice | NDArray[np.int64]) -> Floats:
+        """Inner products, pair by pair, of responses (k, N′) after projection, (k,)."""
+        tangents = self.tangents[:, columns]
+        explained = self.inverse @ (tangents @ other.T)
+        return np.asarray(np.einsum("kn,kn->k", one, other) - np.einsum("pk,pk->k", tangents @ one.T, explained))
+
+
+def projection(point: Point) -> Projection:
+    """The projection at a point."""
+    pull = point.tangents @ point.weighted - point.precision * (point.values - point.expected)
+    information = point.information
+    information[np.diag_indices_from(information)] *= 1 + 1e-9
+    return Projection(point.tangents, np.asarray(np.linalg.inv(information), dtype=np.float64), point.weighted, pull)
+
+
+def probed(observation: Observation, point: Point, candidates: Sequence[Candidate]) -> list[Probed]:
+    """Every candidate at its best trial, the most promising first; those that do nothing are left out."""
+    clear = projection(point)
+    reference = [r.measured - e for r, e in zip(observation.records, point.residuals, strict=True)]
+    found = []
+    for candidate in candidates:
+        best = _best_trial(observation, point, clear, reference, candidate)
+        if best is not None:
+            found.append(best)
+    return sorted(found, key=lambda p: -p.gain)
+
+
+def _best_trial(
+    observation: Observation, point: Point, clear: Projection, reference: Sequence[Floats], candidate: Candidate
+) -> Probed | None:
+    if not candidate.trials:
+        return None
+    vector, initials = observation.state(candidate.model, point.unknowns, point.values)
+    vectors = np.tile(vector, (len(candidate.trials), 1))
+    for row, trial in zip(vectors, candidate.trials, strict=True):
+        for name, value in trial.items():
+            row[list(candidate.model.parameter(name).slots)] = value
+    starts = [np.tile(i, (len(vectors), 1, 1)) for i in initials]
+    shown = observation.readings(candidate.model, vectors, starts, point.noise)
+    responses = observation.weighted([y - y0 for y, y0 in zip(shown, reference, strict=True)])
+    sound = np.asarray(np.isfinite(responses).all(axis=1))
+    responses[~sound] = 0.0
+    products, squares = clear.gains(responses)
+    best: Probed | None = None
+    for k, trial in enumerate(candidate.trials):
+        if not sound[k] or squares[k] < LEAST_RESPONSE**2:
+            continue
+        stretch = products[k] / squares[k]
+        if not candidate.proportional:
+            stretch = float(np.clip(stretch, LEAST_STRETCH, LARGEST_STRETCH))
+        start, stretch = _stretched(point, candidate, trial, stretch)
+        gain = float(2 * stretch * products[k] - stretch**2 * squares[k])
+        if best is None or gain > best.gain:
+            best = Probed(candidate, gain, start)
+    return best
+
+
+def _stretched(
+    point: Point, candidate: Candidate, trial: dict[str, float], stretch: float
+) -> tuple[dict[str, float], float]:
+    """Parameters for a trial of `stretch` times its size, kept within bounds, and the stretch that is left."""
+    start = dict(trial)
+    held = {u.name: float(v) for u, v in zip(point.unknowns, point.values, strict=True)}
+    for p in candidate.main:
+        if p.name in trial:
+            absent = held.get(p.name, p.value if p.effect != "motor_inductance" or p.null is None else p.null)
+            size = trial[p.name] - absent
+            value = float(np.clip(absent + stretch * size, p.low, p.high))
+            stretch = (value - absent) / size if size else stretch
+            start[p.name] = value
+    return start, stretch

@@ -1,0 +1,88 @@
+"""One turn: every candidate probed, the promising ones fitted, all ranked by evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from daq.contracts.progress import Cancel, CancelledError, Progress
+from model.discrepancy.candidates import FLEXIBLE, TONES, candidates
+from model.discrepancy.observation import Observation
+from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.probing import Probed, probed
+from model.discrepancy.refitting import Judged, Refitted, polished, refitted
+from model.discrepancy.thresholds import Thresholds
+from model.discrepancy.tones import proposed_tones
+
+FLAGGED_SHARE = 0.1
+"""A joint is flagged where the best probe promises this share of the best of all."""
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Candidates of one turn: fitted ones by evidence, the best first; the others by what their probe promised."""
+
+    fitted: tuple[Refitted, ...]
+    probed: tuple[Probed, ...]
+
+
+def ranked(
+    observation: Observation, current: Judged, options: DiagnosisOptions, excluded: Sequence[str],
+    thresholds: Thresholds, progress: Progress, cancel: Cancel,
+) -> Ranking:  # fmt: skip
+    """All candidates against the current point. `excluded`: effects that need not be tried."""
+    point = current.point
+    every = [c for c in candidates(point.model, options.effects, options.joints) if c.name not in excluded]
+    progress(0.0, "probing the known effects")
+    probes = probed(observation, point, [c for c in every if c.name not in FLEXIBLE])
+    _stop_if(cancel)
+    joints = options.joints or point.model.machine.modelled_joints
+    if options.effects is None or set(TONES) & set(options.effects):
+        tones = proposed_tones(observation, point, joints)
+        probes += [t for t in tones if options.effects is None or t.candidate.name in options.effects]
+    flagged = _flagged(probes, joints, thresholds)
+    probes += probed(observation, point, [c for c in every if c.name in FLEXIBLE and c.joints[0] in flagged])
+    probes.sort(key=lambda p: -p.gain)
+    chosen = [p for p in probes if p.gain >= thresholds.interesting][: options.fitted]
+    fits: list[Refitted] = []
+    for number, one in enumerate(chosen):
+        _stop_if(cancel)
+        progress(0.4 + 0.5 * number / len(chosen), f"fitting {describe(one.candidate.name, one.candidate.joints)}")
+        found = refitted(observation, current, one)
+        if found is not None:
+            fits.append(found)
+    fits.sort(key=lambda r: -r.evidence)
+    _stop_if(cancel)
+    head = [polished(observation, current, r) for r in fits[: options.polished] if r.evidence > 0]
+    fits = sorted([*head, *fits[len(head) :]], key=lambda r: -r.evidence)
+    return Ranking(_one_a_name(fits), tuple(probes))
+
+
+def describe(name: str, joints: Sequence[int]) -> str:
+    """An effect and its place in words."""
+    where = "" if not joints else f" on joint{'s' if len(joints) > 1 else ''} {', '.join(str(j) for j in joints)}"
+    return name.replace("_", " ") + where
+
+
+def _one_a_name(fits: Sequence[Refitted]) -> tuple[Refitted, ...]:
+    """Of an effect that was tried with two laws at one place, the better."""
+    seen: set[tuple[str, tuple[int, ...]]] = set()
+    kept = []
+    for fit in fits:
+        key = fit.candidate.name, fit.candidate.joints
+        if key not in seen:
+            seen.add(key)
+            kept.append(fit)
+    return tuple(kept)
+
+
+def _flagged(probes: Sequence[Probed], joints: Sequence[int], thresholds: Thresholds) -> set[int]:
+    """Joints where probes promise something."""
+    best = {j: max((p.gain for p in probes if j in p.candidate.joints), default=0.0) for j in joints}
+    most = max(best.values(), default=0.0)
+    return {j for j, gain in best.items() if gain >= thresholds.interesting and gain >= FLAGGED_SHARE * most}
+
+
+def _stop_if(cancel: Cancel) -> None:
+    if cancel.is_set():
+        raise CancelledError("the diagnosis was cancelled")

@@ -1,0 +1,138 @@
+"""A candidate fitted together with all tolerance parameters, and its evidence.
+
+Evidence is the fall of −2 ln posterior, each model with a noise model of its own, less what the candidate's freedom
+costs: ln n for every free parameter (BIC), and for a tone 2 ln of the number of frequencies that were tried.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError
+from model.discrepancy.candidates import TONES, Candidate
+from model.discrepancy.noise_model import NoiseModel, noise_model
+from model.discrepancy.observation import Observation
+from model.discrepancy.probing import Probed
+from model.discrepancy.search import Point, point_at, searched
+from model.discrepancy.tones import MOST_TONES
+from model.fitting.unknowns import Unknown
+
+Floats = NDArray[np.float64]
+
+STEPS = 5
+POLISHING = 3
+SHAPE_PRIOR = 3.0
+"""Expected deviations within which a parameter that only shapes an effect is looked for: keeps it from running away
+where the effect is too small to show its shape."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A point with its noise model."""
+
+    point: Point
+    noise: NoiseModel
+
+    @property
+    def description(self) -> float:
+        """−2 ln posterior, up to a constant."""
+        return self.noise.description + self.point.prior
+
+
+@dataclass(frozen=True)
+class Refitted:
+    """A candidate, fitted: evidence, the point that it leads to, and what the probe had promised."""
+
+    candidate: Candidate
+    judged: Judged
+    evidence: float
+    promised: float
+
+    @property
+    def misfit(self) -> float:
+        """Mean square of the weighted residual."""
+        return self.judged.point.misfit
+
+
+def judge(observation: Observation, point: Point) -> Judged:
+    """A point with the noise model of its own residual."""
+    return Judged(point, noise_model(observation.by_joint(point.weighted)))
+
+
+def refitted(observation: Observation, before: Judged, probed: Probed) -> Refitted | None:
+    """A candidate fitted from where its probe points to; None where the simulation does not stay finite."""
+    candidate = probed.candidate
+    start = _started(before.point, probed)
+    changing = _indices(start.unknowns, [p.name for p in candidate.free])
+    try:
+        point = point_at(observation, start.model, start.unknowns, start.values, start.noise, start.tangents)
+        if not np.isfinite(point.weighted).all():
+            return None
+        point = searched(observation, point, STEPS, changing)
+    except SpecError:
+        return None
+    return _with_evidence(observation, before, candidate, point, probed.gain)
+
+
+def polished(observation: Observation, before: Judged, found: Refitted) -> Refitted:
+    """The same with derivatives taken anew by everything on the candidate's joints: effects that are strong change
+    what the tolerance parameters do there."""
+    point = found.judged.point
+    joints = found.candidate.joints or point.model.machine.modelled_joints
+    near = [k for k, u in enumerate(point.unknowns) if _belongs(u.name, joints)]
+    free = _indices(point.unknowns, [p.name for p in found.candidate.free])
+    try:
+        tangents = point.tangents.copy()
+        tangents[near] = observation.tangents(point.model, point.unknowns, point.values, point.noise, near)
+        point = searched(observation, replace(point, tangents=tangents), POLISHING, free)
+    except SpecError:
+        return found
+    better = _with_evidence(observation, before, found.candidate, point, found.promised)
+    return better if better.judged.point.cost < found.judged.point.cost else found
+
+
+def _started(point: Point, probed: Probed) -> Point:
+    """The point with the candidate's parameters among the unknowns, at the values of its best trial."""
+    candidate = probed.candidate
+    names = {p.name for p in candidate.free}
+    kept = [k for k, u in enumerate(point.unknowns) if u.name not in names]
+    unknowns, values = [point.unknowns[k] for k in kept], [float(point.values[k]) for k in kept]
+    for p in candidate.free:
+        low, high = candidate.bounds.get(p.name, (p.low, p.high))
+        low, high = max(low, p.low), min(high, p.high)
+        start = float(np.clip(probed.start.get(p.name, p.value), low, high))
+        shape = p.null is None
+        deviation = SHAPE_PRIOR * p.deviation if shape and p.deviation else None
+        unknowns.append(Unknown(p.name, p.unit, start, low, high, start if shape else 0.0, deviation))
+        values.append(start)
+    tangents = np.concatenate([point.tangents[kept], np.zeros((len(candidate.free), point.tangents.shape[1]))])
+    return replace(
+        point, model=candidate.model, unknowns=tuple(unknowns), values=np.array(values), tangents=tangents
+    )  # fmt: skip
+
+
+def _with_evidence(
+    observation: Observation, before: Judged, candidate: Candidate, point: Point, promised: float
+) -> Refitted:
+    after = judge(observation, point)
+    price = len(candidate.free) * math.log(observation.samples)
+    if candidate.name in TONES:
+        price += 2 * math.log(MOST_TONES)
+    return Refitted(candidate, after, before.description - after.description - price, promised)
+
+
+def _indices(unknowns: Sequence[Unknown], names: Sequence[str]) -> list[int]:
+    return [k for k, u in enumerate(unknowns) if u.name in names]
+
+
+def _belongs(name: str, joints: Sequence[int]) -> bool:
+    """Whether an unknown is one of these joints or of the arm as a whole."""
+    marks = [f"{kind}{j}" for j in joints for kind in ("joint", "link")]
+    first, _, rest = name.partition(".")
+    own = any(mark == first or mark in rest.split(".") for mark in marks)
+    return own or first in ("load", "base", "controller")

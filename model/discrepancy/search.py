@@ -1,0 +1,147 @@
+"""Least squares with derivatives that are kept: what fits the tolerance parameters, alone and with a candidate.
+
+Most of the time goes into derivatives, and those by the tolerance parameters change little when an effect is added. So
+they are computed once, kept, and only the residual is exact at every step (a chord method); a step that does not
+descend is shortened, and in the end given up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.discrepancy.observation import Observation, Signals
+from model.fitting.unknowns import Unknown
+from model.machine_model.model import Model
+
+Floats = NDArray[np.float64]
+
+SHORTER = (1.0, 0.4, 0.12)
+"""Shares of a step that are tried."""
+SETTLED = 1.0
+"""A step that lowers the cost by less ends the search: one unit is one standard deviation of one parameter."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """Values of the unknowns, and what they leave.
+
+    values (p,); noise: what the controller's readings had beside the angle; residuals: measured − simulated (m, n) rad
+    a record; weighted (N,); cost: |weighted|² + prior; tangents (p, N): derivatives of the weighted readings, at this
+    point or one near it.
+    """
+
+    model: Model
+    unknowns: tuple[Unknown, ...]
+    values: Floats
+    noise: Signals
+    residuals: Signals
+    weighted: Floats
+    tangents: Floats
+
+    @property
+    def precision(self) -> Floats:
+        """(p,) one over the prior variance; 0 where nothing is claimed."""
+        return np.array([0.0 if u.deviation is None else u.deviation**-2 for u in self.unknowns])
+
+    @property
+    def expected(self) -> Floats:
+        """(p,) means of the priors."""
+        return np.array([u.expected for u in self.unknowns])
+
+    @property
+    def prior(self) -> float:
+        """What the deviations from what is expected cost."""
+        return float(np.sum(self.precision * (self.values - self.expected) ** 2))
+
+    @property
+    def cost(self) -> float:
+        """−2 ln posterior with white noise, up to a constant."""
+        return float(self.weighted @ self.weighted) + self.prior
+
+    @property
+    def misfit(self) -> float:
+        """Mean square of the weighted residual: 1 for white noise of the stated size."""
+        return float(np.mean(self.weighted**2))
+
+    @property
+    def information(self) -> Floats:
+        """(p, p) of data and priors."""
+        return self.tangents @ self.tangents.T + np.diag(self.precision)
+
+    def value(self, name: str) -> float:
+        """Value of one unknown."""
+        return float(self.values[[u.name for u in self.unknowns].index(name)])
+
+
+def point_at(
+    observation: Observation, model: Model, unknowns: Sequence[Unknown], values: Floats, noise: Signals,
+    tangents: Floats | None = None,
+) -> Point:  # fmt: skip
+    """A point with its own noise put back. Derivatives are computed unless some of a point near it are given.
+
+    Raises SpecError when the simulation does not stay finite.
+    """
+    unknowns = tuple(unknowns)
+    first = observation.residuals(model, unknowns, values, noise)
+    noise = observation.noise_of(first) if all(np.isfinite(r).all() for r in first) else noise
+    if tangents is None:
+        tangents = observation.tangents(model, unknowns, values, noise)
+    return _point(observation, model, unknowns, values, noise, tangents)
+
+
+def searched(observation: Observation, point: Point, steps: int, changing: Sequence[int] = ()) -> Point:
+    """The point to which at most so many steps lead. Derivatives by the unknowns of the indices `changing` are computed
+    anew at every step."""
+    for number in range(steps):
+        if changing:
+            own = observation.tangents(point.model, point.unknowns, point.values, point.noise, changing)
+            tangents = point.tangents.copy()
+            tangents[list(changing)] = own
+            point = replace(point, tangents=tangents)
+        following = _step(observation, point)
+        if following is None:
+            break
+        gained = point.cost - following.cost
+        point = _own_noise(observation, following)
+        if gained < SETTLED and number > 0:
+            break
+    return point
+
+
+def with_new_tangents(observation: Observation, point: Point) -> Point:
+    """The point with derivatives that were computed at it."""
+    tangents = observation.tangents(point.model, point.unknowns, point.values, point.noise)
+    return replace(point, tangents=tangents)
+
+
+def _step(observation: Observation, point: Point) -> Point | None:
+    """A step that descends, or None."""
+    information = point.information
+    diagonal = np.diag(information)
+    information[np.diag_indices_from(information)] += 1e-9 * np.maximum(diagonal, 1e-12 * diagonal.max())
+    gradient = point.tangents @ point.weighted - point.precision * (point.values - point.expected)
+    step = np.linalg.solve(information, gradient)
+    low, high = (np.array([getattr(u, side) for u in point.unknowns]) for side in ("low", "high"))
+    for share in SHORTER:
+        values = np.clip(point.values + share * step, low, high)
+        tried = _point(observation, point.model, point.unknowns, values, point.noise, point.tangents)
+        if np.isfinite(tried.weighted).all() and tried.cost < point.cost:
+            return tried
+    return None
+
+
+def _own_noise(observation: Observation, point: Point) -> Point:
+    noise = observation.noise_of(point.residuals)
+    return _point(observation, point.model, point.unknowns, point.values, noise, point.tangents)
+
+
+def _point(
+    observation: Observation, model: Model, unknowns: tuple[Unknown, ...], values: Floats, noise: Signals,
+    tangents: Floats,
+) -> Point:  # fmt: skip
+    residuals = observation.residuals(model, unknowns, values, noise)
+    return Point(model, unknowns, values, noise, residuals, observation.weighted(residuals), tangents)

@@ -1,0 +1,30 @@
+"""Where the lines are drawn. Every number was chosen on tuning arms, none of which is among those that report rates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """What it takes to say something.
+
+    Args:
+        significant: evidence from which an effect counts as found.
+        margin: evidence over the next answer from which one name is given, instead of a group.
+        unexplained: misfit (mean square of the weighted residual) above which something is missing that none of the
+            known effects is.
+        least_share: share of the excess misfit that an answer must explain, or it only resembles what is missing.
+        worse: rise of the held-out sum of squares (in variances of a reading) at which a step is rejected.
+        interesting: gain of a probe from which a candidate is worth a fit.
+    """
+
+    significant: float = 12.0
+    margin: float = 4.0
+    unexplained: float = 1.12
+    least_share: float = 0.8
+    worse: float = 9.0
+    interesting: float = 12.0
+
+
+THRESHOLDS = Thresholds()

@@ -1,0 +1,320 @@
+"""The whole workflow: where, what, add, show, and again until nothing significant is left."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from daq.contracts.machine import NoController
+from daq.contracts.progress import Cancel, Never, Progress, silent
+from daq.contracts.trace import Trace
+from model.discrepancy import reasons
+from model.discrepancy.answer import (
+    Candidate,
+    Diagnosis,
+    FoundValue,
+    RemainingShape,
+    SignalError,
+    Step,
+    Verdict,
+    Where,
+)
+from model.discrepancy.candidates import OF_THE_CONTROLLER
+from model.discrepancy.controller_check import ControllerFinding, check_controller, with_used_set_points
+from model.discrepancy.decision import Decision, decide, explained_share
+from model.discrepancy.holdout import HeldOut, errors, excess_removed, held_out
+from model.discrepancy.observation import Observation, Signals, observed
+from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.ranking import Ranking, ranked
+from model.discrepancy.refitting import Judged, Refitted, judge
+from model.discrepancy.remaining import shapes
+from model.discrepancy.search import Point, point_at, searched, with_new_tangents
+from model.discrepancy.thresholds import THRESHOLDS, Thresholds
+from model.discrepancy.torque_space.diagnose import diagnose_torques
+from model.discrepancy.where import located
+from model.fitting.unknowns import Unknown
+from model.machine_model.model import Lineage, Model
+
+FIRST_STEPS, LAST_STEPS = 6, 4
+INTERVAL = 1.959964
+
+
+@dataclass(frozen=True)
+class _Case:
+    """What stays the same during a diagnosis."""
+
+    observation: Observation
+    held: HeldOut | None
+    traces: tuple[Trace, ...]
+    options: DiagnosisOptions
+    thresholds: Thresholds
+    excluded: tuple[str, ...]
+    names: tuple[str, ...]
+
+
+def diagnose(
+    model: Model, traces: Sequence[Trace], holdout: Sequence[Trace] = (), options: DiagnosisOptions | None = None,
+    progress: Progress = silent, cancel: Cancel | None = None,
+) -> Diagnosis:  # fmt: skip
+    """Where a model and traces disagree, which effects are missing, and what adding them brings.
+
+    On a machine with a controller its loop is simulated from the recorded set points; without one, or where the traces
+    have no set points, the recorded drive is balanced against the motion in torques.
+
+    Raises:
+        TraceError, SpecError: for traces or options that cannot give an answer; one line says why.
+        CancelledError: when asked to end.
+    """
+    options, cancel, begun = options or DiagnosisOptions(), cancel or Never(), time.perf_counter()
+    if isinstance(model.machine.controller, NoController) or any(t.set_point is None for t in traces):
+        return diagnose_torques(model, traces, holdout, options, progress, cancel)
+    progress(0.0, "checking the controller's own numbers")
+    findings = check_controller(traces, model.machine)
+    known = _with_findings(model, findings)
+    traces, holdout = tuple(_used(t, findings) for t in traces), tuple(_used(t, findings) for t in holdout)
+    progress(0.02, "fitting the tolerance parameters")
+    observation, wider, unknowns = observed(known, traces)
+    recorded = all(t.error is not None and t.power_raw is not None for t in traces)
+    case = _Case(
+        observation, held_out(known, holdout), traces, options, THRESHOLDS,
+        OF_THE_CONTROLLER if recorded else (), tuple(t.record.trace_id for t in traces),
+    )  # fmt: skip
+    given = _given(observation, wider, unknowns)
+    point = _tolerances(observation, given)
+    steps = [_controller_step(model, observation, f) for f in findings]
+    current, verdict = judge(observation, point), None
+    first = current
+    while verdict is None:
+        number = len(steps) - len(findings)
+        share = 0.1 + 0.8 * number / options.most_steps
+        turn = _ranked_in(case, current, share, progress, cancel)
+        step, following = _turn(case, current, turn, decide(turn, case.thresholds))
+        if step is not None:
+            steps.append(step)
+        verdict = _verdict(case, steps, step, first, following, number + 1)
+        current = following
+    progress(0.95, "writing the answer")
+    remaining: tuple[RemainingShape, ...] = ()
+    if verdict == "unknown-effect":
+        remaining = _remaining(case, current.point)
+    answer = Diagnosis(
+        verdict=verdict, summary=_summary(verdict, steps, remaining), steps=tuple(steps), remaining=remaining,
+        model_before=model, model_after=_adopted(model, current.point, case.names),
+        traces=case.names, holdout=tuple(t.record.trace_id for t in holdout),
+        seconds=time.perf_counter() - begun, robot_seconds=float(sum(t.time[-1] - t.time[0] for t in traces)),
+        notes=_notes(case),
+    )  # fmt: skip
+    progress(1.0, "done")
+    return answer
+
+
+def _used(trace: Trace, findings: Sequence[ControllerFinding]) -> Trace:
+    """The trace with the set points that were not lost, where some were: what they did is known to the count."""
+    return with_used_set_points(trace) if any(f.effect == "lost_set_points" for f in findings) else trace
+
+
+def _with_findings(model: Model, findings: Sequence[ControllerFinding]) -> Model:
+    """The model with the gains that the records prove."""
+    for finding in findings:
+        if finding.effect == "wrong_gain":
+            model = model.with_effect("wrong_gain", (finding.joint,), {"relative": finding.value})
+    return model
+
+
+def _given(observation: Observation, model: Model, unknowns: Sequence[Unknown]) -> Point:
+    """The model as it was given, with its derivatives. Effects proved by the controller's numbers stay as they are."""
+    free = tuple(u for u in unknowns if ".wrong_gain." not in u.name)
+    values = np.array([u.start for u in free])
+    return point_at(observation, model, free, values, observation.quiet)
+
+
+def _tolerances(observation: Observation, given: Point) -> Point:
+    """The tolerance parameters fitted, with derivatives taken where they ended."""
+    point = searched(observation, given, FIRST_STEPS)
+    return searched(observation, with_new_tangents(observation, point), LAST_STEPS)
+
+
+def _ranked_in(case: _Case, current: Judged, share: float, progress: Progress, cancel: Cancel) -> Ranking:
+    width = 0.8 / case.options.most_steps
+
+    def tell(done: float, text: str) -> None:
+        progress(share + width * done, text)
+
+    return ranked(case.observation, current, case.options, case.excluded, case.thresholds, tell, cancel)
+
+
+def _turn(
+    case: _Case, current: Judged, ranking: Ranking, decision: Decision
+) -> tuple[Step | None, Judged]:  # fmt: skip
+    """The step that a decision leads to, and where it leaves the model. No step when nothing is significant."""
+    best = decision.best
+    if decision.kind == "nothing" or best is None:
+        return None, current
+    rejected = _rejected(case, current.point, best)
+    observation, model = case.observation, best.judged.point.model
+    where = _where(case, current.point)
+    values = found_values(best)
+    held_errors: tuple[SignalError, ...] = ()
+    removed = None
+    if case.held is not None:
+        pair = case.held.residuals(current.point), case.held.residuals(best.judged.point)
+        held_errors = errors(case.held.observation, model, *pair)
+        removed = excess_removed(held_errors)
+    listed = tuple(_listed(r) for r in ranking.fitted) + _only_probed(ranking)
+    reason = reasons.reason(
+        best.candidate.name, best.candidate.joints, values, best.evidence, decision.margin,
+        model=_with_point(model, best.judged.point), before=_with_point(current.point.model, current.point),
+        records=observation.records, runner_up=_runner_up(listed),
+    )  # fmt: skip
+    step = Step(
+        effect=best.candidate.name, joints=best.candidate.joints, parameters=values, evidence=best.evidence,
+        margin=decision.margin, candidates=listed, group=tuple(_listed(r) for r in decision.group),
+        rmse_fit=errors(observation, model, current.point.residuals, best.judged.point.residuals),
+        rmse_holdout=held_errors, excess_removed_holdout=removed,
+        sum_lambda2_before=current.point.prior, sum_lambda2_after=best.judged.point.prior,
+        where=where, reason=reason, adopted=rejected is None, rejected_because=rejected,
+    )  # fmt: skip
+    if rejected is not None:
+        return step, current
+    settled = searched(observation, with_new_tangents(observation, best.judged.point), LAST_STEPS)
+    return step, judge(observation, settled)
+
+
+def _rejected(case: _Case, before: Point, best: Refitted) -> str | None:
+    """Why the step is not taken, if held-out traces speak against it."""
+    if case.held is None:
+        return None
+    rise = case.held.sum_of_squares(best.judged.point) - case.held.sum_of_squares(before)
+    if rise > case.thresholds.worse:
+        return f"the error on the held-out traces rises: the sum of squares by {rise:.0f} variances of a reading"
+    return None
+
+
+def _verdict(
+    case: _Case, steps: Sequence[Step], step: Step | None, first: Judged, current: Judged, turns: int
+) -> Verdict | None:
+    """The verdict, or None to go on."""
+    adopted = [s for s in steps if s.adopted]
+    if step is not None and step.adopted and not step.group and turns < case.options.most_steps:
+        return None
+    unexplained = current.point.misfit > case.thresholds.unexplained
+    share = explained_share(first.point.misfit, current.point.misfit)
+    if unexplained and share < case.thresholds.least_share:
+        return "unknown-effect"
+    if step is not None and step.group:
+        return "ambiguous"
+    if adopted:
+        return "named"
+    return "unknown-effect" if unexplained else "nothing-significant"
+
+
+def _where(case: _Case, point: Point) -> Where:
+    return located(
+        _with_point(point.model, point), case.observation.records, point.residuals, case.observation.deviations
+    )
+
+
+def _remaining(case: _Case, point: Point) -> tuple[RemainingShape, ...]:
+    model = _with_point(point.model, point)
+    return shapes(model, case.observation.records, point.residuals, case.observation.deviations)
+
+
+def found_values(found: Refitted) -> dict[str, FoundValue]:
+    """Estimates and 95 % intervals of a candidate's parameters, from the curvature at the solution; stretched by what
+    the residual's colour leaves of its samples."""
+    point = found.judged.point
+    covariance = np.linalg.pinv(point.information)
+    stretch = max(1.0, point.misfit)
+    values = {}
+    for p in found.candidate.free:
+        k = [u.name for u in point.unknowns].index(p.name)
+        value, deviation = float(point.values[k]), float(np.sqrt(max(covariance[k, k], 0.0) * stretch))
+        unknown = point.unknowns[k]
+        known = np.isfinite(deviation) and point.tangents[k] @ point.tangents[k] > 0
+        low = max(unknown.low, value - INTERVAL * deviation) if known else None
+        high = min(unknown.high, value + INTERVAL * deviation) if known else None
+        values[p.name] = FoundValue(value=value, low=low, high=high, unit=p.unit)
+    return values
+
+
+def _listed(found: Refitted) -> Candidate:
+    return Candidate(
+        effect=found.candidate.name, joints=found.candidate.joints, evidence=found.evidence, misfit=found.misfit,
+        refitted=True, parameters=found_values(found),
+    )  # fmt: skip
+
+
+def _only_probed(ranking: Ranking) -> tuple[Candidate, ...]:
+    """Candidates that were not worth a fit, by what their probe promised less the price of their parameters."""
+    fitted = {(r.candidate.name, r.candidate.joints) for r in ranking.fitted}
+    left = []
+    for probe in ranking.probed:
+        key = probe.candidate.name, probe.candidate.joints
+        if key not in fitted:
+            fitted.add(key)
+            price = 9.0 * len(probe.candidate.free)
+            left.append(Candidate(effect=key[0], joints=key[1], evidence=probe.gain - price))
+    return tuple(left)
+
+
+def _runner_up(listed: Sequence[Candidate]) -> Candidate | None:
+    return listed[1] if len(listed) > 1 else None
+
+
+def _with_point(model: Model, point: Point) -> Model:
+    """The model with a point's values, where they are parameters of it."""
+    named = {u.name: float(v) for u, v in zip(point.unknowns, point.values, strict=True) if u.name in model.by_name}
+    return model.with_values(named)
+
+
+def _adopted(model: Model, point: Point, names: tuple[str, ...]) -> Model:
+    fit = {"misfit": point.misfit, "fitted": [u.name for u in point.unknowns if u.name in point.model.by_name]}
+    lineage = Lineage(parent=model.identity, traces=names, fit=fit, note="diagnosis")
+    return _with_point(point.model, point).with_lineage(lineage)
+
+
+def _controller_step(model: Model, observation: Observation, finding: ControllerFinding) -> Step:
+    """A step that the recorded controller's own numbers prove; nothing was fitted for it."""
+    part = "relative" if finding.effect == "wrong_gain" else "share"
+    name = f"joint{finding.joint}.{finding.effect}.{part}"
+    value = FoundValue(value=finding.value, low=finding.low, high=finding.high, unit="1")
+    evidence = float(finding.samples)
+    proof = Candidate(
+        effect=finding.effect, joints=(finding.joint,), evidence=evidence, parameters={name: value}, refitted=False
+    )
+    share = f"{finding.samples} of {finding.of} samples"
+    if finding.effect == "wrong_gain":
+        said = f"the recorded power is {1 + finding.value:.3f} times the gain times the recorded error ({share})"
+    else:
+        said = f"the recorded error is not set point − position in {finding.samples} samples: set points were lost"
+    quiet: Signals = tuple(np.zeros_like(r.measured) for r in observation.records)
+    where = Where(joint=finding.joint, phase=None, summary=f"joint {finding.joint}: {said}", cells=(), dependences=())
+    return Step(
+        effect=finding.effect, joints=(finding.joint,), parameters={name: value}, evidence=evidence, margin=evidence,
+        candidates=(proof,), rmse_fit=errors(observation, model, quiet, quiet), where=where,
+        reason=f"joint {finding.joint}: {said}; this needs no model of the arm", adopted=True,
+    )  # fmt: skip
+
+
+def _summary(verdict: Verdict, steps: Sequence[Step], remaining: Sequence[RemainingShape]) -> str:
+    if verdict == "nothing-significant":
+        return "nothing significant: the model explains the traces within noise and stated tolerances"
+    last = steps[-1] if steps else None
+    if verdict == "named":
+        return "; ".join(s.reason for s in steps if s.adopted)
+    if verdict == "ambiguous" and last is not None:
+        return reasons.undecided(last.group, last.where)
+    where = last.where if last is not None else Where(joint=None, phase=None, summary="", cells=(), dependences=())
+    return reasons.unexplained(where, remaining)
+
+
+def _notes(case: _Case) -> tuple[str, ...]:
+    found = [f"tolerance parameters: {len(case.names)} trace(s), priors as the machine file states them"]
+    if case.held is None:
+        found.append("no held-out trace was given: nothing here has been shown on data it was not fitted to")
+    return tuple(found)
+
+
