@@ -71,8 +71,11 @@ def blind(
     kept = TrialFolder.open(folder, experiment, acquire, drawn, suffix)
     mine = kept.in_order(chosen[:cases])[index - 1 :: count]
     campaign = Campaign(kept, load_machine("ma2000"), until=until)
-    campaign.run(mine, processes, lambda number, said: console().print(f"{number}/{len(mine)}  {said}"))
+    left = campaign.run(mine, processes, lambda number, said: console().print(f"{number}/{len(mine)}  {said}"))
     _show(campaign.table(), folder, as_json=json)
+    if left:
+        console().print(f"{left} cases are not done; the same command goes on with them")
+        raise typer.Exit(5)
 
 
 def _chosen(seeds: str, kinds: str, loads: str) -> list[int]:

@@ -37,9 +37,14 @@ class Campaign:
     diagnoser: Sequence[str] = DIAGNOSER
     until: Stage = "score"
     _tangents: dict[int, Lock] = field(default_factory=dict)
+    _counting: Lock = field(default_factory=Lock)
+    _failed: int = 0
 
-    def run(self, seeds: Sequence[int], processes: int, tell: Tell) -> None:
-        """Does what is left to do of all cases, several at once; `tell` hears of every case that is done."""
+    def run(self, seeds: Sequence[int], processes: int, tell: Tell) -> int:
+        """Does what is left to do of all cases, several at once; `tell` hears of every case that is done.
+
+        Returns how many are not done, because a process of theirs failed; they are tried again next time.
+        """
         self._tangents = {seed % 10: Lock() for seed in seeds}
         seen_by = "diagnostic" if self.folder.asked.acquire else self.folder.asked.experiment
         set_points = self.folder.path / f"{seen_by}{self.folder.shard}.csv"
@@ -53,6 +58,7 @@ class Campaign:
             except BaseException:
                 pool.shutdown(cancel_futures=True)
                 raise
+        return self._failed
 
     def table(self) -> TrialTable:
         """Of all cases in the folder that are scored, those of other shards too."""
@@ -67,6 +73,8 @@ class Campaign:
                 if self.folder.row(stage, seed) is None and not self._stage(stage, seed, set_points):
                     break
         except TrialStageError as error:
+            with self._counting:
+                self._failed += 1
             return f"{self.folder.name_of(seed)}: {error}"
         return f"{self.folder.name_of(seed)}: done"
 

@@ -67,8 +67,20 @@ class TrialFolder:
         finally:
             aside.unlink()
         folder = cls(path, asked, shard)
+        folder._finish_lines()
         folder.reload()
         return folder
+
+    def _finish_lines(self) -> None:
+        """Ends lines of this shard that a crash cut short, so that the next is not added to them."""
+        for stage in STAGES:
+            file = self._file(stage)
+            if file.exists() and not file.read_bytes().endswith(b"\n"):
+                with file.open("ab") as cut:
+                    cut.write(b"\n")
+
+    def _file(self, stage: Stage) -> Path:
+        return self.path / f"{stage}{self.shard}.jsonl"
 
     def reload(self) -> None:
         """Reads the lines of all shards."""
@@ -93,7 +105,7 @@ class TrialFolder:
     def add(self, stage: Stage, row: dict[str, Any]) -> None:
         """Writes a line, and waits until it is on the disk."""
         with self._lock:
-            with (self.path / f"{stage}{self.shard}.jsonl").open("a", encoding="utf-8") as file:
+            with self._file(stage).open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row, ensure_ascii=False) + "\n")
                 file.flush()
                 os.fsync(file.fileno())

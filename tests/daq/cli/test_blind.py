@@ -1,0 +1,258 @@
+"""A blind trial from seeds to the table: what each stage is told, what it keeps, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.stream_reader import StreamReader
+
+from daq.cli.trial import campaign as campaign_module
+from daq.cli.trial.campaign import Campaign
+from daq.cli.trial.experiments import machine_with_load, trial_experiment, write_set_points
+from daq.cli.trial.folder import TrialFolder
+from daq.cli.trial.mock_side import TrialStageError
+from daq.cli.trial.registered import source_tree, tree_hashes
+from daq.cli.trial.sealed import diagnose_sealed
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import ExperimentSpec, Ramp
+from daq.contracts.machine import load_machine
+from daq.traces.reader import read_trace
+from model.discrepancy.answer import Diagnosis
+from model.machine_model.model import base_model
+from model.trial.arms import compose
+from tests.daq.cli.invoke import CommandLine
+
+FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
+MACHINE = load_machine("ma2000")
+SECRETS = [compose(7654321, "single", "heavy"), compose(7654321, "clean", "nominal")]
+STAGES = ("detect", "record", "diagnose", "score")
+
+
+def short(name: str) -> ExperimentSpec:
+    """The trial's experiments, much shorter."""
+    return ExperimentSpec(
+        trajectory=Ramp(amplitude=0.1, duration=0.3), joints=(1, 2, 3), settle=0.1, hold=0.2, name=name
+    )
+
+
+def trial(path: Path, acquire: bool = False, shard: str = "", until: Any = "score") -> Campaign:
+    folder = TrialFolder.open(path, "ramp", acquire, None, shard)
+    return Campaign(folder, MACHINE, FAKE, until)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    """A trial of two arms, from the first stage to the last."""
+    path = tmp_path_factory.mktemp("trial")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(campaign_module, "trial_experiment", short)
+        patch.setenv("DAQ_RUNTIME_FOLDER", str(path / "run"))
+        made = trial(path, acquire=True)
+        said: list[str] = []
+        made.run(SECRETS, 2, lambda _number, line: said.append(line))
+    assert [line.partition(": ")[2] for line in said] == ["done", "done"]
+    return made
+
+
+def rows(done: Campaign, stage: Any) -> dict[int, dict[str, Any]]:
+    return {row["seed"]: row for row in done.folder.rows(stage)}
+
+
+def given(done: Campaign, seed: int) -> dict[str, Any]:
+    """What the diagnosing process saw of the world."""
+    file = done.folder.path / "answers" / rows(done, "diagnose")[seed]["answer"]
+    told: dict[str, Any] = json.loads(Diagnosis.model_validate_json(file.read_text("utf-8")).notes[0])
+    return told
+
+
+def everything_in(file: Path) -> str:
+    """All records of a trace, decompressed."""
+    with file.open("rb") as stream:
+        return "\n".join(repr(record) for record in StreamReader(stream).records)
+
+
+def test_every_stage_leaves_a_line_a_case(done: Campaign) -> None:
+    for stage in STAGES:
+        assert set(rows(done, stage)) == set(SECRETS), stage
+    table = done.table()
+    assert (table.cases, table.kinds) == (2, {"single": 1, "clean": 1})
+    false_alarm = next(line for line in table.lines if line.what.startswith("false alarm"))
+    assert (false_alarm.rate.hits, false_alarm.rate.cases) == (0, 1)
+
+
+def test_the_diagnosis_is_given_traces_and_the_model_and_nothing_else(done: Campaign) -> None:
+    told = given(done, SECRETS[0])
+    assert told["files"] == ["held-out.mcap", "model.json", "trace-1.mcap", "trace-2.mcap"]
+    assert told["arguments"] == []
+    assert "DAQ_RUNTIME_FOLDER" not in told["environment"]
+    everything = json.dumps(told)
+    for seed in SECRETS:
+        assert str(seed) not in everything
+        assert str(seed // 100) not in everything
+
+
+def test_it_is_told_the_load_that_was_announced(done: Campaign) -> None:
+    assert given(done, SECRETS[0])["load"] == 2.0
+    assert given(done, SECRETS[1])["load"] == pytest.approx(1.250307)
+    announced = machine_with_load(MACHINE, 0.4).load
+    assert announced is not None
+    assert announced.deviation == pytest.approx(0.04)
+
+
+def test_traces_and_names_do_not_tell_the_secret(done: Campaign) -> None:
+    names = [file.name for file in done.folder.path.rglob("*")]
+    for seed, row in rows(done, "record").items():
+        number = str(seed // 100)
+        noises = [int(sha256(f"noise {seed} {run}".encode()).hexdigest()[:7], 16) for run in ("ramp", "held-out")]
+        for name in (row["trace"], row["held_out"]):
+            inside = everything_in(done.folder.path / "traces" / name)
+            assert "ramp" in inside, "the records are readable here"
+            for telling in (str(seed), number, *map(str, noises), "secret"):
+                assert telling not in inside, telling
+        assert not any(number in name for name in names)
+
+
+def test_the_two_traces_of_an_arm_have_different_noise(done: Campaign) -> None:
+    row = rows(done, "record")[SECRETS[0]]
+    first, second = (read_trace(done.folder.path / "traces" / row[key]) for key in ("trace", "held_out"))
+    assert first.record.trace_id != second.record.trace_id
+    assert (first.position != second.position).any()
+
+
+def test_what_the_answer_asked_for_was_run_once_on_the_same_arm(done: Campaign) -> None:
+    row = rows(done, "diagnose")[SECRETS[0]]
+    assert len(row["traces"]) == 2
+    assert row["robot_seconds"] == pytest.approx(rows(done, "record")[SECRETS[0]]["robot_seconds"] + 0.5, abs=0.1)
+
+
+def test_a_trial_that_goes_on_does_nothing_twice(done: Campaign) -> None:
+    before = {stage: (done.folder.path / f"{stage}.jsonl").read_bytes() for stage in STAGES}
+    again = trial(done.folder.path, acquire=True)
+    again.run(SECRETS, 1, lambda _number, _said: None)
+    assert {stage: (done.folder.path / f"{stage}.jsonl").read_bytes() for stage in STAGES} == before
+
+
+def test_an_answer_that_was_changed_after_it_was_sealed_is_not_scored(done: Campaign, tmp_path: Path) -> None:
+    answers, sealed = done.folder.path / "answers", rows(done, "diagnose")[SECRETS[1]]
+    copy = trial(tmp_path)
+    copy.folder.add("detect", rows(done, "detect")[SECRETS[1]])
+    copy.folder.add("diagnose", sealed)
+    (tmp_path / "answers" / sealed["answer"]).write_bytes((answers / sealed["answer"]).read_bytes() + b" ")
+    with pytest.raises(TrialStageError, match="is not the one that was sealed"):
+        copy._score(SECRETS[1])
+
+
+def test_cases_run_in_an_order_that_tells_nothing(done: Campaign) -> None:
+    seeds = [compose(number, kind, "nominal") for kind in ("clean", "single") for number in range(20)]
+    order = done.folder.in_order(seeds)
+    assert sorted(order) == sorted(seeds)
+    assert order not in (seeds, sorted(seeds))
+    assert order == trial(done.folder.path, acquire=True).folder.in_order(seeds[::-1])
+
+
+def test_a_folder_of_another_trial_is_refused(done: Campaign) -> None:
+    with pytest.raises(SpecError, match="holds a trial of other options"):
+        TrialFolder.open(done.folder.path, "diagnostic", False, None, "")
+
+
+def test_a_line_that_a_crash_cut_short_is_done_again(tmp_path: Path) -> None:
+    folder = trial(tmp_path).folder
+    folder.add("detect", {"seed": 110})
+    with (tmp_path / "detect.jsonl").open("a", encoding="utf-8") as file:
+        file.write('{"seed": 12')
+    again = trial(tmp_path).folder
+    assert [row["seed"] for row in again.rows("detect")] == [110]
+    again.add("detect", {"seed": 120})
+    assert [row["seed"] for row in trial(tmp_path).folder.rows("detect")] == [110, 120]
+
+
+def test_shards_write_lines_of_their_own_and_see_all(tmp_path: Path) -> None:
+    first, second = (trial(tmp_path, shard=f"-{k}of2").folder for k in (1, 2))
+    assert first.asked == second.asked
+    first.add("detect", {"seed": 110})
+    second.add("detect", {"seed": 120})
+    first.reload()
+    assert {row["seed"] for row in first.rows("detect")} == {110, 120}
+
+
+def test_a_diagnosis_that_gives_no_answer_says_why(tmp_path: Path, done: Campaign) -> None:
+    model = base_model(MACHINE)
+    with pytest.raises(TrialStageError, match="ended with code 3: no idea"):
+        diagnose_sealed(
+            [], None, model, (sys.executable, "-c", "import sys; print('no idea', file=sys.stderr); sys.exit(3)")
+        )
+    silent = trial(tmp_path)
+    silent.diagnoser = (sys.executable, "-c", "raise SystemExit(1)")
+    for stage in ("detect", "record"):
+        silent.folder.add(stage, rows(done, stage)[SECRETS[0]])
+    for part in ("traces",):
+        for file in (done.folder.path / part).iterdir():
+            (tmp_path / part / file.name).write_bytes(file.read_bytes())
+    row = silent._diagnose(SECRETS[0])
+    assert row["failure"] == "the diagnosis ended with code 1: it said nothing"
+    silent.folder.add("diagnose", row)
+    assert silent._score(SECRETS[0])["place"] == "failed"
+
+
+def test_set_points_for_the_mock_s_side_are_those_that_are_sent(tmp_path: Path) -> None:
+    table = write_set_points(trial_experiment("ramp"), MACHINE, tmp_path / "ramp.csv").read_text("utf-8").splitlines()
+    assert table[0] == "set_point_1,set_point_2,set_point_3,set_point_4,set_point_5,set_point_6"
+    assert len(table) - 1 == pytest.approx(8 * 50, abs=3)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--seeds", "9:1"), "write FIRST:LAST"),
+        (("--seeds", "1:2", "--kinds", "dirty"), "kind 'dirty': allowed are clean"),
+        (("--seeds", "1:2", "--loads", "none"), "load 'none': allowed are nominal"),
+        (("--seeds", "1:2", "--shard", "3/2"), "write I/K"),
+        ((), "--seeds or --registration"),
+        (("--registration", "nowhere.toml"), "nowhere.toml: cannot be read"),
+    ],
+)
+def test_wrong_options_are_refused_in_one_line(daq: CommandLine, words: tuple[str, ...], says: str) -> None:
+    daq("blind", "--folder", "trial", *words).complains(2, says)
+
+
+def test_the_hashes_that_a_registration_holds(daq: CommandLine) -> None:
+    printed = daq("blind", "--folder", "trial", "--hashes").out.splitlines()
+    expected = tree_hashes()
+    assert printed == [f'"{path}" = "{digest}"' for path, digest in expected.items()]
+    assert {"model", "mock_controller", "daq/cli/trial"} <= set(expected)
+    thresholds = "model/trial/truth.py"
+    digest = sha256((source_tree() / thresholds).read_bytes()).hexdigest()
+    assert tree_hashes([thresholds]) == {thresholds: digest}
+
+
+def git(folder: Path, *words: str) -> str:
+    identity = ("-c", "user.name=test", "-c", "user.email=test@example.org", "-c", "commit.gpgsign=false")
+    return subprocess.run(
+        ["git", *identity, *words], cwd=folder, check=True, capture_output=True, text=True
+    ).stdout.strip()
+
+
+def test_a_registered_trial_runs_only_committed_and_with_the_code_that_was_registered(
+    daq: CommandLine, nobodys_desk: Path
+) -> None:
+    path, digest = "model/trial/truth.py", tree_hashes(["model/trial/truth.py"])["model/trial/truth.py"]
+    text = (
+        f'version = 1\ntitle = "t"\ndetectable = 5.0\nruns.diagnostic.cases.clean = 1\nhashes."{path}" = "{digest}"\n'
+    )
+    file = nobodys_desk / "registration.toml"
+    file.write_text(text, "utf-8")
+    git(nobodys_desk, "init", "-q")
+    words = ("blind", "--folder", "trial", "--registration", file, "--until", "detect")
+    daq(*words).complains(2, "is not committed as it stands")
+    git(nobodys_desk, "add", file.name)
+    git(nobodys_desk, "commit", "-q", "-m", "registered")
+    daq(*words, "--seeds", "1:2").complains(2, "--seeds and --registration")
+    daq(*words, "--run", "ramp").complains(2, "run 'ramp': the registration has diagnostic")
+    file.write_text(text.replace(digest, "0" * 64), "utf-8")
+    daq(*words).complains(2, f"{path}: not as registered")

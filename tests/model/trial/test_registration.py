@@ -1,0 +1,99 @@
+"""Which arms a trial takes, and what a registration pins down."""
+
+from __future__ import annotations
+
+import pytest
+
+from daq.contracts.errors import SpecError
+from mock_controller.hidden.arm import Kind, Load, compose_seed, draw_arm
+from model.trial.arms import KINDS, LOADS, arms, compose, drawn_arms, parse_choice, parse_numbers
+from model.trial.registration import parse_registration
+
+TEXT = """
+version = 1
+title = "A trial"
+detectable = 5.0
+
+[runs.diagnostic]
+cases = { single = 4, clean = 3 }
+
+[runs.ramp]
+experiment = "ramp"
+cases = { single = 2 }
+
+[hashes]
+"model" = "abc"
+"""
+
+
+def test_seeds_are_the_mock_s() -> None:
+    kinds = {"shared": Kind.SHARED_BY_JOINTS, "open-set": Kind.OPEN_SET, "wrong-priors": Kind.WRONG_PRIORS}
+    for kind in KINDS:
+        for load in LOADS:
+            ours = compose(77, kind, load)
+            assert ours == compose_seed(77, kinds.get(kind) or Kind[kind.upper()], Load[load.upper()])
+
+
+def test_numbers() -> None:
+    assert parse_numbers("3:6") == [3, 4, 5, 6]
+    assert parse_numbers("1,5") == [1, 5]
+    for wrong in ("", "a", "5:3", "-1", "1:2:3"):
+        with pytest.raises(SpecError, match="FIRST:LAST"):
+            parse_numbers(wrong)
+    with pytest.raises(SpecError, match=r"kind 'all': allowed are clean, single"):
+        parse_choice("clean,all", KINDS, "kind")
+
+
+def test_loads_go_in_turn() -> None:
+    assert arms([1, 3, 4], ["single"]) == [120, 321, 422]
+    assert arms([1], ["single", "clean"], ["heavy"]) == [122, 112]
+
+
+def test_seeds_drawn_from_a_commit_are_new_with_each_commit_and_far_from_those_for_tuning() -> None:
+    cases = {"single": 50, "clean": 30}
+    first, again, other = drawn_arms("c0ffee", cases), drawn_arms("c0ffee", cases), drawn_arms("decaf", cases)
+    assert first == again
+    assert not set(first) & set(other)
+    assert len(set(first)) == 80
+    assert min(first) >= 10**8
+    assert [draw_arm(seed).kind for seed in first] == [Kind.SINGLE] * 50 + [Kind.CLEAN] * 30
+    assert {draw_arm(seed).load for seed in first} == set(Load)
+
+
+def test_more_of_a_kind_keeps_those_drawn_before() -> None:
+    assert drawn_arms("c0ffee", {"pair": 5})[:3] == drawn_arms("c0ffee", {"pair": 3})
+
+
+def test_a_registration_draws_each_run() -> None:
+    registration = parse_registration(TEXT, "here")
+    assert len(registration.arms("diagnostic", "c0ffee")) == 7
+    assert registration.run("ramp").experiment == "ramp"
+    assert registration.arms("ramp", "c0ffee") == registration.arms("diagnostic", "c0ffee")[:2]
+    with pytest.raises(SpecError, match="run 'x': the registration has diagnostic, ramp"):
+        registration.run("x")
+
+
+def test_other_code_needs_another_registration() -> None:
+    registration = parse_registration(TEXT, "here")
+    registration.check_hashes({"model": "abc"})
+    with pytest.raises(SpecError, match=r"model: not as registered"):
+        registration.check_hashes({"model": "abd"})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("5.0", "4.0", "detectable: 4.0: the scoring takes d′ ≥ 5"),
+        ("clean = 3", "dirty = 3", "kind 'dirty'"),
+        ("single = 4", "single = 0", "greater than or equal to 1"),
+        ('"ramp"\n', '"walk"\n', "runs.ramp.experiment"),
+        ("title", "titel", "title: Field required"),
+        ("[hashes]", "[hashes", "no TOML"),
+        ("detectable", 'loads = ["none"]\ndetectable', "loads: 'none': allowed are nominal"),
+    ],
+)
+def test_wrong_registrations_are_refused_in_one_line(old: str, new: str, says: str) -> None:
+    with pytest.raises(SpecError, match=r"^here: ") as error:
+        parse_registration(TEXT.replace(old, new), "here")
+    assert says in str(error.value)
+    assert "\n" not in str(error.value)
