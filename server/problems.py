@@ -112,7 +112,7 @@ def install(app: FastAPI) -> None:
     async def not_valid(request: Request, error: RequestValidationError) -> JSONResponse:
         fields = [FieldProblem(field=_where(one["loc"]), message=_what(one)) for one in error.errors()[:20]]
         detail = f"{fields[0].field}: {fields[0].message}" if fields else "the request is not valid"
-        advice = "correct the fields named; /docs shows what is allowed"
+        advice = "correct the fields named; /api/v1/openapi.json says what is allowed"
         return response(request, ProblemError(422, "not-valid", detail, advice, fields))
 
     @app.exception_handler(HTTPException)
@@ -120,9 +120,8 @@ def install(app: FastAPI) -> None:
         kind = {404: "not-found", 405: "no-such-method"}.get(error.status_code, "http")
         path = request.url.path
         detail = f"{request.method} {path}: {error.detail}"
-        return response(
-            request, ProblemError(error.status_code, kind, detail, "/docs lists every address", (), error.headers)
-        )
+        advice = "/api/v1/openapi.json lists every address"
+        return response(request, ProblemError(error.status_code, kind, detail, advice, (), error.headers))
 
     @app.exception_handler(OperationalError)
     async def database(request: Request, error: OperationalError) -> JSONResponse:

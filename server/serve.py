@@ -9,8 +9,12 @@ from contextlib import suppress
 import uvicorn
 
 from daq.config import Settings
-from daq.contracts.errors import DaqError
+from daq.config.service import ServiceSettings
+from daq.contracts.errors import DaqError, SpecError
+from server import logs
 from server.access.gate import Gate
+from server.access.origin import is_loopback
+from server.access.tokens import KnownTokens
 from server.app import make_app
 from server.services import Services
 
@@ -26,10 +30,11 @@ class ListenError(DaqError):
 
 def serve(settings: Settings, ready: Callable[[str], None]) -> None:
     """Serves until a signal ends it. `ready` is called with the address. Raises ListenError, StoreError, SpecError."""
+    logs.begin()
     listener = _listen(settings.server.host, settings.server.port)
     with listener:
         services = Services(settings)
-        app = make_app(services, Gate())
+        app = make_app(services, _gate(services, settings.server))
         config = uvicorn.Config(
             app,
             log_config=None,
@@ -45,6 +50,19 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         address = f"http://{f'[{host}]' if ':' in host else host}:{port}"
         with suppress(KeyboardInterrupt):  # the service has ended in order by then
             _Server(config, lambda: ready(address)).run([listener])
+
+
+def _gate(services: Services, section: ServiceSettings) -> Gate:
+    """Raises SpecError where others than this computer's users would get in without a token."""
+    local = is_loopback(section.host)
+    if not local and all(token.revoked is not None for token in services.tokens.all()):
+        raise SpecError(
+            f"server.host {section.host}: others than this computer's users could reach the robot, and there is no "
+            "token: make one with `daq token add NAME --role operator`, or listen at 127.0.0.1"
+        )
+    known = KnownTokens(services.tokens, services.clock)
+    names = tuple(name.lower() for name in section.names)
+    return Gate(known, services.tickets, local, names, services.metrics.request)
 
 
 class _Server(uvicorn.Server):

@@ -15,10 +15,12 @@ from daq.contracts.errors import DaqError
 from daq.contracts.service.live import EventMessage
 from daq.trajectories import control_period
 from server.access.tickets import Tickets
+from server.access.tokens import TokenStore
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock, SystemClock
 from server.live.history import History
 from server.live.hub import Hub
+from server.metrics import Metrics
 from server.owner.messages import Answer, ArmReport, Finish, Opened, Report
 from server.problems import ProblemError, conflict, not_found
 from server.queue.desk import QueueDesk, QueueParts
@@ -75,9 +77,13 @@ class Services:
         self.traces = TraceStore(self.store)
         self.events = EventStore(self.store)
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
+        self.begun = self.clock.monotonic()
+        self.metrics = Metrics()
+        self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
         self._robots: dict[str, RobotServices] = {}
         self._robots = {settings.robot.name: self._make_robot(settings)}
+        self.metrics.look_at(self)
 
     def robots(self) -> list[RobotServices]:
         """All of them: one, for now."""
@@ -154,6 +160,7 @@ class Services:
         history = History(len(robot.machine.joints), control_period(robot.machine), settings.server.history)
         hub = Hub(self.clock, history, lambda: status_of(self._robots[name]))
         robot.listeners.append(hub.hear)
+        robot.listeners.append(lambda report: self.metrics.hear(name, report))
         robot.disconnected.append(lambda _why: hub.look())
         stop = StopDesk(robot, self.clock)
         return RobotServices(robot, Keeper(robot), stop, control, queue, catalogue, teaching, hub)

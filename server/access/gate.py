@@ -1,34 +1,158 @@
-"""The gate that every request passes: who calls, under which number it is logged."""
+"""The gate that every request passes: who calls, from where, how often, how much; what browsers are told."""
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import secrets
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from urllib.parse import parse_qs
 
-from starlette.datastructures import MutableHeaders
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocketClose
 
-from server.access.caller import LOCAL
+from server import logs
+from server.access.caller import LOCAL, Caller
+from server.access.headers import secure
+from server.access.limits import LARGEST_BODY, Buckets, counted
+from server.access.origin import SAFE_METHODS, is_from_elsewhere, is_known_name
+from server.access.tickets import Tickets
+from server.access.tokens import KnownTokens
+from server.problems import ProblemError, response
+
+STOP = "/stop"
+"""The end of the one address that no limit holds up."""
+NOT_ALLOWED = 1008
+UPLOADS = ("/traces", "/models")
+"""Ends of addresses that take files, and count their bytes themselves."""
+log = logging.getLogger("server.access")
 
 
+@dataclass
 class Gate:
-    """Decides who a caller is."""
+    """Decides who a caller is and whether a request goes on.
+
+    open_on_loopback: whether whoever reaches this service without a token is an operator: it listens at loopback alone
+    observed:         called with method, status and seconds of every request
+    """
+
+    tokens: KnownTokens
+    tickets: Tickets
+    open_on_loopback: bool
+    names: tuple[str, ...] = ()
+    observed: Callable[[str, int, float], None] = lambda _method, _status, _seconds: None
+    buckets: Buckets = field(default_factory=Buckets)
 
     def middleware(self, app: ASGIApp) -> ASGIApp:
         """`app` behind this gate."""
 
         async def guarded(scope: Scope, receive: Receive, send: Send) -> None:
-            if scope["type"] not in ("http", "websocket"):
+            if scope["type"] == "http":
+                await self._http(app, scope, receive, send)
+            elif scope["type"] == "websocket":
+                await self._websocket(app, scope, receive, send)
+            else:
                 await app(scope, receive, send)
-                return
-            state = scope.setdefault("state", {})
-            state["request_id"] = request_id = secrets.token_hex(8)
-            state["caller"] = LOCAL
-
-            async def numbered(message: Message) -> None:
-                if message["type"] == "http.response.start":
-                    MutableHeaders(scope=message)["X-Request-Id"] = request_id
-                await send(message)
-
-            await app(scope, receive, numbered)
 
         return guarded
+
+    async def _http(self, app: ASGIApp, scope: Scope, receive: Receive, send: Send) -> None:
+        begun = time.perf_counter()
+        state = scope.setdefault("state", {})
+        state["request_id"] = request_id = secrets.token_hex(8)
+        logs.request_id.set(request_id)
+        status = 500
+
+        async def secured(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                headers = MutableHeaders(scope=message)
+                headers["X-Request-Id"] = request_id
+                secure(headers, scope["path"])
+            await send(message)
+
+        try:
+            try:
+                state["caller"] = await self._admit(scope)
+            except ProblemError as problem:
+                await response(Request(scope), problem)(scope, receive, secured)
+                return
+            limited = receive if scope["path"].endswith(UPLOADS) else counted(receive, LARGEST_BODY)
+            await app(scope, limited, secured)
+        finally:
+            seconds = time.perf_counter() - begun
+            self.observed(scope["method"], status, seconds)
+            self._log(scope, state.get("caller"), status, seconds)
+
+    async def _websocket(self, app: ASGIApp, scope: Scope, receive: Receive, send: Send) -> None:
+        state = scope.setdefault("state", {})
+        state["request_id"] = secrets.token_hex(8)
+        logs.request_id.set(state["request_id"])
+        try:
+            state["caller"] = await self._admit(scope)
+        except ProblemError as problem:
+            log.warning("refused a WebSocket: %s", problem.detail)
+            await WebSocketClose(NOT_ALLOWED, problem.detail)(scope, receive, send)
+            return
+        await app(scope, receive, send)
+
+    async def _admit(self, scope: Scope) -> Caller | None:
+        """Who calls. Raises a 401, 403, 413 or 429."""
+        headers, path = Headers(scope=scope), scope["path"]
+        changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS
+        if not is_known_name(headers.get("host", ""), self.names, loopback_only=self.open_on_loopback):
+            line = f"this service is not called {headers.get('host', '')!r:.100}"
+            raise ProblemError(403, "unknown-name", line, "use its address, or add the name to server.names")
+        if is_from_elsewhere(headers, changes_something=changes):
+            line = f"a page of another origin ({headers.get('origin')!r:.100}) may not do this"
+            raise ProblemError(403, "other-origin", line, "use the page that this service serves")
+        caller = await self._caller(scope, headers)
+        if not path.endswith(STOP):
+            self._count(caller, scope)
+        length = headers.get("content-length", "0")
+        if not path.endswith(UPLOADS) and (not length.isdecimal() or int(length) > LARGEST_BODY):
+            raise ProblemError(413, "too-large", f"a body may have {LARGEST_BODY >> 20} MB", "send less at once")
+        return caller
+
+    async def _caller(self, scope: Scope, headers: Headers) -> Caller | None:
+        kind, _, token = headers.get("authorization", "").partition(" ")
+        if token and kind.lower() == "bearer":
+            known, caller = self.tokens.remembered(token.strip())
+            if not known:
+                caller = await asyncio.to_thread(self.tokens.look_up, token.strip())
+            if caller is None:
+                self._count(None, scope)
+                line = "this token is not known, or was revoked"
+                raise ProblemError(401, "token-unknown", line, "`daq token ls` lists tokens by name", (), _BEARER)
+            return caller
+        if scope["type"] == "websocket":
+            ticket = parse_qs(scope["query_string"].decode("latin-1")).get("ticket")
+            if ticket:
+                caller = self.tickets.take(ticket[0])
+                if caller is None:
+                    line = "this ticket was used, or is too old"
+                    raise ProblemError(401, "ticket-unknown", line, "ask for a new one")
+                return caller
+        return LOCAL if self.open_on_loopback else None
+
+    def _count(self, caller: Caller | None, scope: Scope) -> None:
+        address = scope["client"][0] if scope.get("client") else ""
+        wait = self.buckets.take(caller.name if caller else "", address, time.monotonic())
+        if wait > 0:
+            headers = {"Retry-After": str(max(1, round(wait)))}
+            raise ProblemError(429, "too-many", "too many requests", "ask less often", (), headers)
+
+    @staticmethod
+    def _log(scope: Scope, caller: Caller | None, status: int, seconds: float) -> None:
+        level = logging.WARNING if status >= 500 else logging.DEBUG if status < 400 else logging.INFO
+        name = caller.name if caller else None
+        extra = {"caller": name, "status": status, "ms": round(1000 * seconds, 1)}
+        log.log(level, "%s %s", scope["method"], scope["path"], extra=extra)
+
+
+_BEARER = {"WWW-Authenticate": "Bearer"}

@@ -1,0 +1,49 @@
+"""How the service itself is, and who calls it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from daq.contracts.service.base import Wire
+from daq.contracts.service.queue import Role
+
+
+class Health(Wire):
+    """Whether it answers, and whether it can take experiments. `checks`: one line each; empty where all is well."""
+
+    status: Literal["ok", "not ready"]
+    version: str
+    checks: dict[str, str]
+
+
+class Me(Wire):
+    """Who the service takes the caller for."""
+
+    name: str
+    role: Role
+
+
+class StorageStatus(Wire):
+    """Where things are kept, and how much room there is (bytes)."""
+
+    traces_folder: str
+    traces_free: int
+    traces_reserve: int
+    """New experiments are refused when less than this is free."""
+    traces: int
+    """Traces in the catalogue."""
+    database: str
+    database_size: int | None
+
+
+class SystemStatus(Wire):
+    """The service: version, since when it runs, storage, watchers."""
+
+    version: str
+    uptime: float
+    """s."""
+    storage: StorageStatus
+    live_clients: int
+    live_dropped: int
+    jobs_at_once: int
+    unattended: bool

@@ -1,0 +1,73 @@
+"""How much a client may ask for: requests a second, and bytes a request. Pure but for what is remembered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from starlette.exceptions import HTTPException
+from starlette.types import Message, Receive
+
+REQUESTS_A_SECOND = 300.0
+"""Sustained, for one caller at one address: three times what the whole service is measured with."""
+AT_ONCE = 600.0
+LARGEST_BODY = 16 << 20
+"""Bytes: a recorded path of an hour."""
+MOST_REMEMBERED = 10_000
+
+
+@dataclass
+class Bucket:
+    """Holds up to `size` requests and is filled with `rate` a second."""
+
+    rate: float
+    size: float
+    level: float
+    at: float
+
+    def take(self, now: float) -> float:
+        """Takes one. Returns 0, or the s after which there is one again."""
+        self.level = min(self.size, self.level + (now - self.at) * self.rate)
+        self.at = now
+        if self.level >= 1:
+            self.level -= 1
+            return 0.0
+        return (1 - self.level) / self.rate
+
+
+@dataclass
+class Buckets:
+    """One for each caller and address."""
+
+    rate: float = REQUESTS_A_SECOND
+    size: float = AT_ONCE
+    _buckets: dict[tuple[str, str], Bucket] = field(default_factory=dict)
+
+    def take(self, who: str, address: str, now: float) -> float:
+        """As `Bucket.take`."""
+        key = (who, address)
+        bucket = self._buckets.get(key)
+        if bucket is None:
+            if len(self._buckets) >= MOST_REMEMBERED:
+                self._forget_full(now)
+            bucket = self._buckets[key] = Bucket(self.rate, self.size, self.size, now)
+        return bucket.take(now)
+
+    def _forget_full(self, now: float) -> None:
+        """A bucket that is full again remembers nothing."""
+        self._buckets = {k: b for k, b in self._buckets.items() if b.level + (now - b.at) * b.rate < b.size}
+
+
+def counted(receive: Receive, largest: int) -> Receive:
+    """`receive`, up to `largest` bytes of body; raises a 413 beyond."""
+    size = 0
+
+    async def limited() -> Message:
+        nonlocal size
+        message = await receive()
+        if message["type"] == "http.request":
+            size += len(message.get("body", b""))
+            if size > largest:
+                raise HTTPException(413, f"a body may have {largest >> 20} MB")
+        return message
+
+    return limited

@@ -1,0 +1,63 @@
+"""What a browser may not do on behalf of another page. Pure.
+
+A page from elsewhere can make a browser send requests here. It cannot hide its origin in those that change something,
+and not the name by which it reached this service: a name of its own that it lets point to this computer (rebinding).
+"""
+
+from __future__ import annotations
+
+import ipaddress
+from collections.abc import Collection, Mapping
+from urllib.parse import urlsplit
+
+SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
+LOOPBACK_NAMES = ("localhost", "localhost.localdomain")
+
+
+def is_loopback(host: str) -> bool:
+    """Whether an address or name is this computer's own."""
+    if host in LOOPBACK_NAMES:
+        return True
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
+def name_of(host_header: str) -> str:
+    """The name in a Host header, without port, in small letters."""
+    try:
+        return (urlsplit(f"//{host_header}").hostname or "").lower()
+    except ValueError:
+        return ""
+
+
+def is_known_name(host_header: str, names: Collection[str], *, loopback_only: bool) -> bool:
+    """Whether this service is meant: a loopback name or address, or one of `names`; an address where others listen."""
+    name = name_of(host_header)
+    if is_loopback(name) or name in names:
+        return True
+    if loopback_only:
+        return False
+    if not names:
+        return True  # tokens keep strangers out, and no browser sends one along by itself
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def is_from_elsewhere(headers: Mapping[str, str], *, changes_something: bool) -> bool:
+    """Whether a browser sends this for a page of another origin. Programs say nothing, and are not browsers."""
+    if not changes_something:
+        return False
+    if headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
+        return True
+    origin = headers.get("origin")
+    if origin is None:
+        return False
+    try:
+        return urlsplit(origin).netloc.lower() != headers.get("host", "").lower()
+    except ValueError:
+        return True

@@ -1,0 +1,96 @@
+"""The service itself: is it well, is it ready, what does it count, who calls it."""
+
+from __future__ import annotations
+
+import shutil
+from importlib.metadata import version
+from pathlib import Path
+
+from fastapi import APIRouter, Response
+from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
+from sqlalchemy import func, select, text
+from sqlalchemy.engine import make_url
+from sqlalchemy.exc import SQLAlchemyError
+
+from daq.contracts.service.system import Health, Me, StorageStatus, SystemStatus
+from daq.traces.room import RESERVE
+from server.api.parts import ServicesPart, Viewer
+from server.problems import PROBLEMS
+from server.services import Services
+from server.store.tables import TraceRow
+
+plain = APIRouter(tags=["system"])
+router = APIRouter(tags=["system"], responses=PROBLEMS)
+VERSION = version("ma2000-daq")
+
+
+@plain.get("/healthz")
+async def healthz() -> Health:
+    """200 while the service answers."""
+    return Health(status="ok", version=VERSION, checks={})
+
+
+@plain.get("/readyz", responses={503: {"model": Health}})
+def readyz(found: ServicesPart, response: Response) -> Health:
+    """200 while experiments can be taken: database and traces' folder can be written. A robot need not be there."""
+    problems = _checks(found)
+    if any(problems[name] for name in ("database", "traces")):
+        response.status_code = 503
+        return Health(status="not ready", version=VERSION, checks=problems)
+    return Health(status="ok", version=VERSION, checks=problems)
+
+
+@plain.get("/metrics", response_class=Response, responses={200: {"content": {"text/plain": {}}}})
+def metrics(found: ServicesPart, _: Viewer) -> Response:
+    """For Prometheus."""
+    return Response(generate_latest(found.metrics.registry), media_type=CONTENT_TYPE_LATEST)
+
+
+@router.get("/me")
+def get_me(who: Viewer) -> Me:
+    """Who the service takes the caller for."""
+    return Me(name=who.name, role=who.role)
+
+
+@router.get("/system")
+def get_system(found: ServicesPart, _: Viewer) -> SystemStatus:
+    """The service: version, storage, watchers."""
+    folder = found.settings.traces.folder.absolute()
+    url = make_url(found.store.url)
+    file = Path(url.database) if url.get_backend_name() == "sqlite" and url.database else None
+    with found.store.reading() as session:
+        count = session.scalar(select(func.count()).select_from(TraceRow)) or 0
+    return SystemStatus(
+        version=VERSION,
+        uptime=found.clock.monotonic() - found.begun,
+        storage=StorageStatus(
+            traces_folder=str(folder),
+            traces_free=shutil.disk_usage(folder).free,
+            traces_reserve=RESERVE,
+            traces=count,
+            database=url.get_backend_name(),
+            database_size=file.stat().st_size if file is not None and file.is_file() else None,
+        ),
+        live_clients=sum(one.hub.clients for one in found.robots()),
+        live_dropped=sum(one.hub.dropped for one in found.robots()),
+        jobs_at_once=found.settings.server.jobs_at_once,
+        unattended=found.settings.server.unattended,
+    )
+
+
+def _checks(found: Services) -> dict[str, str]:
+    checks = {"database": "", "traces": ""}
+    try:
+        with found.store.reading() as session:
+            session.execute(text("SELECT 1"))
+    except SQLAlchemyError as error:
+        checks["database"] = " ".join(str(error).split())[:200]
+    try:
+        free = shutil.disk_usage(found.settings.traces.folder).free
+        if free < RESERVE:
+            checks["traces"] = f"{free / 1e6:.0f} MB are free, {RESERVE / 1e6:.0f} MB stay free"
+    except OSError as error:
+        checks["traces"] = str(error)
+    for one in found.robots():
+        checks[f"robot {one.robot.name}"] = one.robot.problem if one.robot.identity is None else ""
+    return checks

@@ -1,0 +1,27 @@
+"""A clock that tests turn by hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+
+@dataclass
+class HandClock:
+    """Stands still until it is turned."""
+
+    now: float = 1000.0
+    wall: datetime = datetime(2026, 1, 1, tzinfo=UTC)
+
+    def utc(self) -> datetime:
+        """The wall clock."""
+        return self.wall
+
+    def monotonic(self) -> float:
+        """The other one."""
+        return self.now
+
+    def turn(self, seconds: float) -> None:
+        """Both go on."""
+        self.now += seconds
+        self.wall += timedelta(seconds=seconds)
