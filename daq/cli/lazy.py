@@ -19,6 +19,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "teach": ("daq.cli.teach", "Jog, lead by the nose, steps, and playing back."),
     "calibrate": ("daq.cli.calibrate", "Find what the machine really does."),
     "serve": ("daq.cli.serve", "Serve experiments and traces to people and programs."),
+    "token": ("daq.cli.token", "Tokens of the service: make, list, revoke."),
     "traces": ("daq.cli.traces", "List, show, plot, convert and verify traces."),
     "config": ("daq.cli.config", "Show and check the configuration."),
     "mock": ("daq.cli.mock", "Start a mock controller that others can connect to."),
