@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from pydantic import BaseModel, ConfigDict
-from scipy.stats import binomtest
 
 
 class Rate(BaseModel):
@@ -27,6 +26,8 @@ class Rate(BaseModel):
 
 def rate(outcomes: Iterable[bool | None]) -> Rate:
     """The share of True; None does not count."""
+    from scipy.stats import binomtest  # late: the command line starts without it
+
     counted = [outcome for outcome in outcomes if outcome is not None]
     hits = sum(counted)
     if not counted:
