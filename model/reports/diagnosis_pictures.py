@@ -176,6 +176,9 @@ def candidate_name(candidate: Candidate) -> str:
 
 def error_picture(fit: Sequence[SignalError], held: Sequence[SignalError]) -> Picture:
     """Errors before and after beside the noise floor, in sample and held out."""
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
     groups = [("fitted to", fit)] + ([("held out", held)] if held else [])
 
     def draw(figure: Figure) -> None:
@@ -186,17 +189,21 @@ def error_picture(fit: Sequence[SignalError], held: Sequence[SignalError]) -> Pi
                 colour = COLOURS[(e.joint - 1) % len(COLOURS)]
                 before, after, floor = (factor * v for v in (e.before, e.after, e.floor))
                 place.plot([before, after], [row, row], color=colour, lw=1.6, solid_capstyle="butt", alpha=0.55)
-                place.plot([before], [row], "o", mfc="none", color=colour, ms=5.5, label="before" if row == 0 else None)
-                place.plot([after], [row], "o", color=colour, ms=5.5, label="after" if row == 0 else None)
-                place.plot([floor], [row], "|", color=INK, ms=13, mew=1.2, label="noise floor" if row == 0 else None)
+                place.plot([before], [row], "o", mfc="none", color=colour, ms=5.5)
+                place.plot([after], [row], "o", color=colour, ms=5.5)
+                place.plot([floor], [row], "|", color=INK, ms=13, mew=1.2)
             place.set_yticks(range(len(errors)), [f"joint {e.joint}" for e in reversed(errors)])
             place.set_ylim(-0.6, len(errors) - 0.4)
             place.set_xscale("log")
+            place.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            place.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            place.xaxis.set_minor_locator(NullLocator())
             place.set_title(name)
             place.set_xlabel(f"rms error / {unit}")
             place.grid(visible=False, axis="y")
-        handles, names = axes[0].get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside upper right", ncols=3)
+        marks = (("before", "o", "none"), ("after", "o", INK), ("noise floor", "|", INK))
+        handles = [Line2D([], [], marker=m, mfc=fill, color=INK, ls="", ms=5.5, label=name) for name, m, fill in marks]
+        figure.legend(handles=handles, loc="outside upper right", ncols=3)
 
     caption = "Root mean square of measured − simulated before the step (ring) and after it (dot); the bar is noise."
     return Picture(drawn(draw, 0.85 + 0.24 * len(fit)), caption)

@@ -25,6 +25,8 @@ VERDICTS = {
     "ambiguous": "ambiguous: the data cannot tell several effects apart",
     "unknown-effect": "an effect that is not among the known ones",
 }
+NOTABLE = 1.5
+"""Times the noise from which an error is large enough to ask for the share that is gone."""
 LABELS = ("before", "after")
 """Of the models that a comparison for this report is made with."""
 
@@ -40,7 +42,7 @@ def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> 
     for number, step in enumerate(found.steps, start=1):
         sections += _step_sections(number, len(found.steps), step)
     if comparison is not None:
-        sections.append(motion_section(comparison.signals, [m.label for m in comparison.models]))
+        sections.append(_overlays(comparison))
     sections.append(_remaining(found))
     sections.append(_next(found.next_experiment, found.verdict))
     if found.notes:
@@ -115,8 +117,6 @@ def _what(step: Step) -> tuple[Block, ...]:
     if step.group:
         told = ", ".join(candidate_name(c) for c in step.group)
         blocks.append(Text(f"These traces cannot tell apart: {told}.", "warning"))
-    elif step.effect is not None:
-        blocks.append(Text(f"The next best that would be another answer explains {step.margin:.0f} less."))
     return tuple(blocks)
 
 
@@ -159,17 +159,34 @@ def _parameters(parameters: dict[str, FoundValue]) -> Table:
 
 def _errors(step: Step) -> Table:
     rows = [_error_row("fitted to", e) for e in step.rmse_fit] + [_error_row("held out", e) for e in step.rmse_holdout]
-    caption = "Root mean square of measured − simulated. Beyond noise: what exceeds it, after / before."
-    return Table(("traces", "joint", "before", "after", "noise floor", "beyond noise"), tuple(rows), caption)
+    caption = (
+        "Root mean square of measured − simulated with tolerance parameters fitted, without the effect and with it. "
+        "Gone: share of the variance beyond noise that the effect took off."
+    )
+    return Table(("traces", "joint", "before", "after", "noise floor", "gone"), tuple(rows), caption)
 
 
 def _error_row(kind: str, e: SignalError) -> tuple[Cell, ...]:
     factor, unit = shown_unit(e.unit)
-    beyond = [max(v**2 - e.floor**2, 0.0) ** 0.5 * factor for v in (e.after, e.before)]
-    return (
-        Cell(kind), *cells(str(e.joint), *(f"{v * factor:.4g} {unit}" for v in (e.before, e.after, e.floor)),
-        f"{beyond[0]:.2g} / {beyond[1]:.2g} {unit}"),
-    )  # fmt: skip
+    gap = "" if unit.startswith("°") else " "
+    sizes = (f"{v * factor:.4g}{gap}{unit}" for v in (e.before, e.after, e.floor))
+    return (Cell(kind), *cells(str(e.joint), *sizes, _gone(e)))
+
+
+def _gone(e: SignalError) -> str:
+    """Share of the excess variance; a dash where there was hardly any."""
+    if e.before < NOTABLE * e.floor:
+        return "–"
+    return f"{100 * (e.before**2 - e.after**2) / (e.before**2 - e.floor**2):.0f} %"
+
+
+def _overlays(comparison: Comparison) -> Section:
+    motion = motion_section(comparison.signals, [m.label for m in comparison.models])
+    text = (
+        "Before is the model as it was given; after, its tolerance parameters are fitted as well. What the effects "
+        "brought by themselves stands in the tables above."
+    )
+    return Section("Measured, before and after", (Text(text), *motion.blocks))
 
 
 def _remaining(found: Diagnosis) -> Section:
@@ -180,8 +197,8 @@ def _remaining(found: Diagnosis) -> Section:
     first = found.remaining[0]
     text = (
         f"A torque at joint {first.joint} that goes with {QUANTITIES[first.against]} would explain "
-        f"{100 * first.explained:.0f} % of what is left there. No effect of the library has this shape; one of "
-        "your own can be tried with --effect-file."
+        f"{100 * first.explained:.0f} % of what is left there. None of the candidates explains it. An effect "
+        "of your own with this shape can be tried with --effect-file."
     )
     return Section("What remains", (Text(text, "warning"), remaining_picture(found.remaining), _shapes(found)))
 
@@ -207,12 +224,12 @@ def _next(experiment: NextExperiment | None, verdict: str) -> Section:
     if experiment is None:
         text = "No further experiment is asked for." if verdict == "named" else "Nothing is left to tell apart."
         return Section(title, (Text(text, "quiet"),))
-    told = " and ".join(experiment.separates) if len(experiment.separates) <= 2 else listed(experiment.separates)
+    apart = [name.replace("_", " ") for name in experiment.separates]
     reason = experiment.reason[0].upper() + experiment.reason[1:]
     rows = (
-        ("experiment", experiment.name),
         ("on the arm", f"{experiment.duration:.1f} s"),
-        ("would tell apart", told),
+        ("would tell apart", " and ".join(apart) if len(apart) <= 2 else listed(apart)),
         ("predicted separation", f"{experiment.predicted_separation:.1f} standard deviations, tolerances fitted again"),
     )
-    return Section(title, (Text(f"{reason.rstrip('.')}."), Table(("", ""), tuple((Cell(a), Cell(b)) for a, b in rows))))
+    table = Table(("experiment", experiment.name), tuple((Cell(a), Cell(b)) for a, b in rows))
+    return Section(title, (Text(f"{reason.rstrip('.')}."), table))
