@@ -16,6 +16,7 @@ class Thresholds:
             known effects is.
         least_share: share of the excess misfit that an answer must explain, or it only resembles what is missing.
         worse: rise of the held-out sum of squares (in variances of a reading) at which a step is rejected.
+        quiet_joint: misfit of a joint up to which, once an effect has been added, nothing more is looked for there.
         interesting: gain of a probe from which a candidate is worth a fit.
     """
 
@@ -24,6 +25,7 @@ class Thresholds:
     unexplained: float = 1.12
     least_share: float = 0.8
     worse: float = 9.0
+    quiet_joint: float = 1.08
     interesting: float = 12.0
 
 

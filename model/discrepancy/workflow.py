@@ -90,7 +90,8 @@ def diagnose(
     while verdict is None:
         number = len(steps) - len(findings)
         share = 0.1 + 0.8 * number / options.most_steps
-        turn = _ranked_in(case, current, share, progress, cancel)
+        joints = _to_search(case, current, number)
+        turn = _ranked_in(case, current, joints, share, progress, cancel) if joints else Ranking((), ())
         step, following = _turn(case, current, turn, decide(turn, case.thresholds))
         if step is not None:
             steps.append(step)
@@ -137,13 +138,27 @@ def _tolerances(observation: Observation, given: Point) -> Point:
     return searched(observation, with_new_tangents(observation, point), LAST_STEPS)
 
 
-def _ranked_in(case: _Case, current: Judged, share: float, progress: Progress, cancel: Cancel) -> Ranking:
+def _to_search(case: _Case, current: Judged, number: int) -> tuple[int, ...]:
+    """Joints on which something may be missing: all at first, then those that are worse than noise would be."""
+    joints = case.options.joints or current.point.model.machine.modelled_joints
+    if number == 0:
+        return joints
+    places = current.point.model.machine.modelled_joints
+    runs = case.observation.by_joint(current.point.weighted)
+    misfit = {j: float(np.mean(np.concatenate(own) ** 2)) for j, own in zip(places, runs, strict=True)}
+    return tuple(j for j in joints if misfit[j] > case.thresholds.quiet_joint)
+
+
+def _ranked_in(
+    case: _Case, current: Judged, joints: tuple[int, ...], share: float, progress: Progress, cancel: Cancel
+) -> Ranking:
     width = 0.8 / case.options.most_steps
 
     def tell(done: float, text: str) -> None:
         progress(share + width * done, text)
 
-    return ranked(case.observation, current, case.options, case.excluded, case.thresholds, tell, cancel)
+    options = case.options.model_copy(update={"joints": joints})
+    return ranked(case.observation, current, options, case.excluded, case.thresholds, tell, cancel)
 
 
 def _turn(
