@@ -25,6 +25,7 @@ from model.discrepancy.answer import (
 from model.discrepancy.candidates import OF_THE_CONTROLLER
 from model.discrepancy.controller_check import ControllerFinding, check_controller, with_used_set_points
 from model.discrepancy.decision import Decision, decide, explained_share
+from model.discrepancy.distortion import sum_of_contributions
 from model.discrepancy.holdout import HeldOut, errors, excess_removed, held_out
 from model.discrepancy.observation import Observation, Signals, observed
 from model.discrepancy.options import DiagnosisOptions
@@ -189,7 +190,7 @@ def _turn(
         margin=decision.margin, candidates=listed, group=tuple(_listed(r) for r in decision.group),
         rmse_fit=errors(observation, model, current.point.residuals, best.judged.point.residuals),
         rmse_holdout=held_errors, excess_removed_holdout=removed,
-        sum_lambda2_before=current.point.prior, sum_lambda2_after=best.judged.point.prior,
+        sum_lambda2_before=_sum_lambda2(current.point), sum_lambda2_after=_sum_lambda2(best.judged.point),
         where=where, reason=reason, adopted=rejected is None, rejected_because=rejected,
     )  # fmt: skip
     if rejected is not None:
@@ -224,6 +225,12 @@ def _verdict(
     if adopted:
         return "named"
     return "unknown-effect" if unexplained else "nothing-significant"
+
+
+def _sum_lambda2(point: Point) -> float:
+    """Σλ² of the distortion method: 1 where deviations as large as expected explain what is left."""
+    names = [u.name for u in point.unknowns]
+    return sum_of_contributions(_with_point(point.model, point), names, point.weighted, point.tangents)
 
 
 def _where(case: _Case, point: Point) -> Where:
