@@ -13,7 +13,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 
 if TYPE_CHECKING:
-    from model.trial.table import TrialTable
+    from daq.cli.trial.campaign import Campaign
 
 app = typer.Typer(add_completion=False)
 
@@ -72,7 +72,7 @@ def blind(
     mine = kept.in_order(chosen[:cases])[index - 1 :: count]
     campaign = Campaign(kept, load_machine("ma2000"), until=until)
     left = campaign.run(mine, processes, lambda number, said: console().print(f"{number}/{len(mine)}  {said}"))
-    _show(campaign.table(), folder, as_json=json)
+    _show(campaign, folder, as_json=json)
     if left:
         console().print(f"{left} cases are not done; the same command goes on with them")
         raise typer.Exit(5)
@@ -88,7 +88,7 @@ def _registered(path: Path, run: str) -> tuple[list[int], Literal["diagnostic", 
     """Seeds, experiment, whether more may be asked for, and where all that comes from."""
     from daq.cli.trial.registered import read_registration
 
-    registration, commit = read_registration(path)
+    registration, commit = read_registration(path, run)
     chosen = registration.run(run)
     origin = {"file": path.name, "sha256": sha256(path.read_bytes()).hexdigest(), "run": run, "commit": commit}
     return registration.arms(run, commit), chosen.experiment, chosen.acquire, origin
@@ -101,9 +101,12 @@ def _shard(text: str) -> tuple[int, int]:
     return int(index), int(count)
 
 
-def _show(table: TrialTable, folder: Path, *, as_json: bool) -> None:
+def _show(campaign: Campaign, folder: Path, *, as_json: bool) -> None:
+    from model.trial.cases import as_csv
     from model.trial.markdown import as_markdown
 
+    table = campaign.table()
+    (folder / "cases.csv").write_text(as_csv(campaign.scores()), "utf-8")
     (folder / "table.json").write_text(table.model_dump_json(indent=1) + "\n", "utf-8")
     (folder / "table.md").write_text(as_markdown(table), "utf-8")
     if as_json:

@@ -60,10 +60,14 @@ class Campaign:
                 raise
         return self._failed
 
-    def table(self) -> TrialTable:
+    def scores(self) -> list[Score]:
         """Of all cases in the folder that are scored, those of other shards too."""
         self.folder.reload()
-        scores = [Score.model_validate(row) for row in self.folder.rows("score")]
+        return [Score.model_validate(row) for row in self.folder.rows("score")]
+
+    def table(self) -> TrialTable:
+        """The table over them."""
+        scores = self.scores()
         return trial_table(scores, sum(row["outcome"] != "complete" for row in self.folder.rows("record")))
 
     def _case(self, seed: int, set_points: Path) -> str:

@@ -12,10 +12,23 @@ from daq.contracts.errors import SpecError
 from model.trial.registration import Registration, parse_registration
 
 REGISTERED = (
-    "model",
+    "model/discrepancy/thresholds.py",
+    "model/discrepancy",
+    "model/effects",
+    "model/simulation",
+    "model/fitting",
+    "model/machine_model",
+    "model/dynamics",
+    "model/drives",
+    "model/kinematics",
+    "model/control",
+    "model/design",
+    "model/validation",
+    "model/trial",
     "mock_controller",
     "firmware_protocol",
     "daq/contracts",
+    "daq/driver",
     "daq/trajectories",
     "daq/runner",
     "daq/cli/trial",
@@ -47,14 +60,25 @@ def _hash(root: Path, path: Path) -> str:
     return found.hexdigest()
 
 
-def read_registration(path: Path) -> tuple[Registration, str]:
-    """The registration and the commit that last changed it. Raises SpecError unless it is committed as it stands and
-    the code is what it registers."""
+def published_table(path: Path, run: str) -> Path:
+    """Where the table of a registration's run is kept once it has been run: beside it."""
+    return path.with_name(f"{path.stem}-{run}.md")
+
+
+def read_registration(path: Path, run: str) -> tuple[Registration, str]:
+    """The registration and the commit that last changed it.
+
+    Raises SpecError unless it is committed as it stands, the code is what it registers, and no table of this run is
+    kept beside it yet.
+    """
     try:
         text = path.read_text("utf-8")
     except OSError as error:
         raise SpecError(f"registration {path}: cannot be read: {error.strerror}") from error
     registration = parse_registration(text, str(path))
+    table = published_table(path, run)
+    if table.exists():
+        raise SpecError(f"{table}: this run has been made; another one needs a registration of its own, with new seeds")
     registration.check_hashes(tree_hashes(registration.hashes))
     return registration, _commit(path)
 

@@ -225,10 +225,9 @@ def test_the_hashes_that_a_registration_holds(daq: CommandLine) -> None:
     printed = daq("blind", "--folder", "trial", "--hashes").out.splitlines()
     expected = tree_hashes()
     assert printed == [f'"{path}" = "{digest}"' for path, digest in expected.items()]
-    assert {"model", "mock_controller", "daq/cli/trial"} <= set(expected)
-    thresholds = "model/trial/truth.py"
-    digest = sha256((source_tree() / thresholds).read_bytes()).hexdigest()
-    assert tree_hashes([thresholds]) == {thresholds: digest}
+    assert {"model/discrepancy", "mock_controller", "daq/cli/trial"} <= set(expected)
+    thresholds = "model/discrepancy/thresholds.py"
+    assert expected[thresholds] == sha256((source_tree() / thresholds).read_bytes()).hexdigest()
 
 
 def git(folder: Path, *words: str) -> str:
@@ -254,5 +253,9 @@ def test_a_registered_trial_runs_only_committed_and_with_the_code_that_was_regis
     git(nobodys_desk, "commit", "-q", "-m", "registered")
     daq(*words, "--seeds", "1:2").complains(2, "--seeds and --registration")
     daq(*words, "--run", "ramp").complains(2, "run 'ramp': the registration has diagnostic")
+    kept = nobodys_desk / "registration-diagnostic.md"
+    kept.write_text("a table", "utf-8")
+    daq(*words).complains(2, "registration-diagnostic.md: this run has been made")
+    kept.unlink()
     file.write_text(text.replace(digest, "0" * 64), "utf-8")
     daq(*words).complains(2, f"{path}: not as registered")

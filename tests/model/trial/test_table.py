@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from model.discrepancy.answer import Diagnosis
+from model.trial.cases import as_csv
 from model.trial.markdown import as_markdown
 from model.trial.rates import rate
 from model.trial.score import Score, score
@@ -94,3 +95,13 @@ def test_nothing_scored_yet_is_said() -> None:
 
 def test_a_table_survives_json(table: TrialTable) -> None:
     assert TrialTable.model_validate_json(table.model_dump_json()) == table
+
+
+def test_every_case_is_a_line_that_can_be_counted_again() -> None:
+    pair = truth("pair", ("dead_zone", (1,)), ("payload", ()), parameters={"width": 0.5, "mass": 1.0})
+    group = answer("ambiguous", step("dead_zone", 1, group=("dead_zone", "backlash")))
+    head, *lines = as_csv([judged(pair, group), judged(truth("clean"), answer("nothing-significant"))]).splitlines()
+    cells = dict(zip(head.split(","), lines[0].split(","), strict=True))
+    assert (cells["hidden"], cells["joints"], cells["d_prime"]) == ("dead_zone + payload", "1 + -", "20.0 + 20.0")
+    assert (cells["answered"], cells["named_right"], cells["alarm"]) == ("dead_zone | backlash", "no", "")
+    assert dict(zip(head.split(","), lines[1].split(","), strict=True))["alarm"] == "no"

@@ -1,0 +1,44 @@
+"""Every case of a trial as one line of a table that anybody can count again."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterable
+
+from model.trial.score import Score
+
+_AS_IT_STANDS = (
+    "seed", "kind", "load", "detectable", "verdict", "named_right", "merged_right", "in_answer", "in_first",
+    "joint_right", "at_least_one", "alarm", "honest", "excess_removed", "seconds", "robot_seconds",
+)  # fmt: skip
+_MADE: dict[str, Callable[[Score], str]] = {
+    "hidden": lambda score: " + ".join(score.effects),
+    "joints": lambda score: " + ".join("".join(map(str, joints)) or "-" for joints in score.joints),
+    "strength": lambda score: " + ".join(f"{strength:.2f}" for strength in score.strengths),
+    "d_prime": lambda score: " + ".join(f"{value:.1f}" for value in score.d_primes),
+    "answered": lambda score: (" | " if score.place == "group" else " + ").join(score.answered),
+    "intervals": lambda score: str(len(score.covered)),
+    "intervals_right": lambda score: str(sum(covered.inside for covered in score.covered)),
+}
+COLUMNS = (*_AS_IT_STANDS[:3], *list(_MADE)[:4], *_AS_IT_STANDS[3:5], *list(_MADE)[4:], *_AS_IT_STANDS[5:])
+
+
+def as_csv(scores: Iterable[Score]) -> str:
+    """CSV with a line a case, in the order of their seeds; empty where a question does not arise."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(COLUMNS)
+    for score in sorted(scores, key=lambda each: each.seed):
+        table.writerow(
+            [_MADE[column](score) if column in _MADE else _plain(getattr(score, column)) for column in COLUMNS]
+        )
+    return text.getvalue()
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return "" if value is None else str(value)
