@@ -146,14 +146,20 @@ def _case(truth: Truth, seen: Detectability) -> dict[str, Any]:
 
 
 def named_effects(answer: Diagnosis) -> tuple[str, ...]:
-    """Effects that were named: of steps that were adopted and gave one name, not a group."""
-    found = [step.effect for step in answer.steps if step.adopted and step.effect is not None and not step.group]
+    """Effects that were named: of steps that were adopted and gave one name, be it at one of several joints."""
+    found = [step.effect for step in answer.steps if step.adopted and step.effect is not None and _one_name(step)]
     return tuple(dict.fromkeys(found))
+
+
+def _one_name(step: Step) -> bool:
+    """Whether the step gives one name, not a group of several."""
+    return {candidate.effect for candidate in step.group} <= {step.effect}
 
 
 def group_of(answer: Diagnosis) -> tuple[str, ...]:
     """Effects of the groups that were given instead of a name."""
-    return tuple(dict.fromkeys(candidate.effect for step in answer.steps for candidate in step.group))
+    groups = (step.group for step in answer.steps if not _one_name(step))
+    return tuple(dict.fromkeys(candidate.effect for group in groups for candidate in group))
 
 
 def excess_removed(answer: Diagnosis) -> float | None:
@@ -215,7 +221,8 @@ def _answered_joints(effect: HiddenEffect, steps: tuple[Step, ...]) -> set[int]:
     """Joints of the steps that name the effect; else of the first step, which may say where without saying what."""
     same = [step for step in steps if step.effect == effect.known_as and (step.adopted or step.group)]
     if same:
-        return {joint for step in same for joint in step.joints}
+        alike = (c for step in same for c in step.group if c.effect == effect.known_as)
+        return {joint for found in (*same, *alike) for joint in found.joints}
     first = steps[0]
     if first.joints or first.effect is not None:
         return set(first.joints)

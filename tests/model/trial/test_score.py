@@ -7,7 +7,7 @@ import pytest
 from model.discrepancy.answer import Diagnosis
 from model.trial.score import Score, score, score_of_failure
 from model.trial.truth import Truth
-from tests.model.trial.answers import MACHINE, answer, found, seen, step, truth
+from tests.model.trial.answers import MACHINE, answer, candidate, found, seen, step, truth
 
 BACKLASH = truth("single", ("backlash", (2,)), parameters={"play": 0.01, "stiffness": 1.0, "damping": 1.0})
 STICTION = truth("single", ("stiction", (1,)))
@@ -79,6 +79,13 @@ def test_the_same_effect_at_several_joints_takes_one_place_of_the_ranking() -> N
 
 def test_a_wrong_joint() -> None:
     result = judged(BACKLASH, answer("named", step("backlash", 3)))
+    assert result.named_right
+    assert result.joint_right is False
+
+
+def test_one_effect_at_one_of_several_joints_is_a_name_without_a_joint() -> None:
+    torn = step("backlash", 2).model_copy(update={"group": (candidate("backlash", 2), candidate("backlash", 3))})
+    result = judged(BACKLASH, answer("ambiguous", torn))
     assert result.named_right
     assert result.joint_right is False
 
