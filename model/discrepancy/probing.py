@@ -28,11 +28,13 @@ LEAST_RESPONSE = 0.1
 
 @dataclass(frozen=True)
 class Probed:
-    """A candidate at its best trial: the fall of the cost that it promises, and parameters to start a fit from."""
+    """A candidate at its best trial: the fall of the cost that it promises, parameters to start a fit from, and how
+    far the other unknowns would then move (p,)."""
 
     candidate: Candidate
     gain: float
     start: dict[str, float]
+    moved: Floats
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,10 @@ class Projection:
         explained = self.inverse @ shared
         squares = np.einsum("kn,kn->k", responses, responses) - np.einsum("pk,pk->k", shared, explained)
         return responses @ self.residual[columns] - explained.T @ self.pull, np.maximum(squares, 0.0)
+
+    def moves(self, response: Floats, columns: slice | NDArray[np.int64] = slice(None)) -> Floats:
+        """How far the tolerance parameters move, (p,), when a response (N′,) is there."""
+        return np.asarray(self.inverse @ (self.pull - self.tangents[:, columns] @ response))
 
     def cross(self, one: Floats, other: Floats, columns: slice | NDArray[np.int64]) -> Floats:
         """Inner products, pair by pair, of responses (k, N′) after projection, (k,)."""
@@ -105,7 +111,7 @@ def _best_trial(
         start, stretch = _stretched(point, candidate, trial, stretch)
         gain = float(2 * stretch * products[k] - stretch**2 * squares[k])
         if best is None or gain > best.gain:
-            best = Probed(candidate, gain, start)
+            best = Probed(candidate, gain, start, clear.moves(stretch * responses[k]))
     return best
 
 

@@ -24,8 +24,8 @@ from model.fitting.unknowns import Unknown
 
 Floats = NDArray[np.float64]
 
-STEPS = 5
-POLISHING = 3
+STEPS = 8
+POLISHING = 4
 SHAPE_PRIOR = 3.0
 """Expected deviations within which a parameter that only shapes an effect is looked for: keeps it from running away
 where the effect is too small to show its shape."""
@@ -101,7 +101,9 @@ def _started(point: Point, probed: Probed) -> Point:
     candidate = probed.candidate
     names = {p.name for p in candidate.free}
     kept = [k for k, u in enumerate(point.unknowns) if u.name not in names]
-    unknowns, values = [point.unknowns[k] for k in kept], [float(point.values[k]) for k in kept]
+    unknowns = [point.unknowns[k] for k in kept]
+    there = point.values + probed.moved
+    values = [float(np.clip(there[k], point.unknowns[k].low, point.unknowns[k].high)) for k in kept]
     for p in candidate.free:
         low, high = candidate.bounds.get(p.name, (p.low, p.high))
         low, high = max(low, p.low), min(high, p.high)

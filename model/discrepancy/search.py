@@ -1,8 +1,9 @@
 """Least squares with derivatives that are kept: what fits the tolerance parameters, alone and with a candidate.
 
 Most of the time goes into derivatives, and those by the tolerance parameters change little when an effect is added. So
-they are computed once, kept, and only the residual is exact at every step (a chord method); a step that does not
-descend is shortened, and in the end given up.
+they are computed once and kept. Every simulation that a step costs, also one that does not descend, corrects them along
+the step (Broyden's update, in the metric of the information); a step that does not descend is then computed anew, or
+shortened, and in the end given up.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from model.machine_model.model import Model
 
 Floats = NDArray[np.float64]
 
-SHORTER = (1.0, 0.4, 0.12)
-"""Shares of a step that are tried."""
+SHARES = (1.0, 1.0, 0.4, 0.12)
+"""Of the steps that are tried, each from derivatives that the ones before have corrected."""
 SETTLED = 1.0
 """A step that lowers the cost by less ends the search: one unit is one standard deviation of one parameter."""
 
@@ -102,9 +103,9 @@ def searched(observation: Observation, point: Point, steps: int, changing: Seque
             tangents = point.tangents.copy()
             tangents[list(changing)] = own
             point = replace(point, tangents=tangents)
-        following = _step(observation, point)
-        if following is None:
-            break
+        following, descends = _step(observation, point)
+        if not descends:
+            return following
         gained = point.cost - following.cost
         point = _own_noise(observation, following)
         if gained < SETTLED and number > 0:
@@ -118,20 +119,39 @@ def with_new_tangents(observation: Observation, point: Point) -> Point:
     return replace(point, tangents=tangents)
 
 
-def _step(observation: Observation, point: Point) -> Point | None:
-    """A step that descends, or None."""
+def _step(observation: Observation, point: Point) -> tuple[Point, bool]:
+    """A step, and whether it descends; if not, the same point with derivatives that know better."""
+    low, high = (np.array([getattr(u, side) for u in point.unknowns]) for side in ("low", "high"))
+    for share in SHARES:
+        values = np.clip(point.values + share * _gauss_newton(point), low, high)
+        tried = _point(observation, point.model, point.unknowns, values, point.noise, point.tangents)
+        if not np.isfinite(tried.weighted).all():
+            continue
+        corrected = _corrected(point, tried)
+        if tried.cost < point.cost:
+            return replace(tried, tangents=corrected), True
+        point = replace(point, tangents=corrected)
+    return point, False
+
+
+def _gauss_newton(point: Point) -> Floats:
+    """The step to the least of the linearised problem."""
     information = point.information
     diagonal = np.diag(information)
     information[np.diag_indices_from(information)] += 1e-9 * np.maximum(diagonal, 1e-12 * diagonal.max())
     gradient = point.tangents @ point.weighted - point.precision * (point.values - point.expected)
-    step = np.linalg.solve(information, gradient)
-    low, high = (np.array([getattr(u, side) for u in point.unknowns]) for side in ("low", "high"))
-    for share in SHORTER:
-        values = np.clip(point.values + share * step, low, high)
-        tried = _point(observation, point.model, point.unknowns, values, point.noise, point.tangents)
-        if np.isfinite(tried.weighted).all() and tried.cost < point.cost:
-            return tried
-    return None
+    return np.asarray(np.linalg.solve(information, gradient), dtype=np.float64)
+
+
+def _corrected(point: Point, tried: Point) -> Floats:
+    """Derivatives that repeat what a step really did, changed as little as possible otherwise (Broyden 1965)."""
+    moved = tried.values - point.values
+    metric = np.diag(point.information) * moved
+    length = float(metric @ moved)
+    if length <= 0.0:
+        return point.tangents
+    surprise = (point.weighted - tried.weighted) - moved @ point.tangents
+    return point.tangents + np.outer(metric / length, surprise)
 
 
 def _own_noise(observation: Observation, point: Point) -> Point:

@@ -127,4 +127,7 @@ def _best_tone(
     shape = "cycles" if name == "torque_ripple" else "frequency"
     trial = {"sine": float(first[best]), "cosine": float(second[best]), shape: float(values[best])}
     candidate = tone(point.model, name, joint, trial)
-    return None if candidate is None else Probed(candidate, float(gains[best]), candidate.trials[0])
+    if candidate is None:
+        return None
+    moved = clear.moves(first[best] * sine[best] + second[best] * cosine[best], columns)
+    return Probed(candidate, float(gains[best]), candidate.trials[0], moved)
