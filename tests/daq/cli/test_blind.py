@@ -31,6 +31,7 @@ from tests.daq.cli.invoke import CommandLine
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
 MACHINE = load_machine("ma2000")
 SECRETS = [compose(7654321, "single", "heavy"), compose(7654321, "clean", "nominal")]
+pytestmark = pytest.mark.timeout(300)  # a trial of two arms is a dozen processes one after the other
 STAGES = ("detect", "record", "diagnose", "score")
 
 
@@ -125,7 +126,8 @@ def test_the_two_traces_of_an_arm_have_different_noise(done: Campaign) -> None:
     assert (first.position != second.position).any()
 
 
-def test_what_the_answer_asked_for_was_run_once_on_the_same_arm(done: Campaign) -> None:
+def test_what_an_answer_asked_for_was_run_once_on_the_same_arm(done: Campaign) -> None:
+    assert len(rows(done, "diagnose")[SECRETS[1]]["traces"]) == 1
     row = rows(done, "diagnose")[SECRETS[0]]
     assert len(row["traces"]) == 2
     assert row["robot_seconds"] == pytest.approx(rows(done, "record")[SECRETS[0]]["robot_seconds"] + 0.5, abs=0.1)
