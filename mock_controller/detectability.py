@@ -46,13 +46,16 @@ def load_tangents(
 
 
 def detectability(arm: HiddenArm, experiment: Experiment, known: Tangents, refits: int = MOST_REFITS) -> dict[str, Any]:
-    """d′ of all effects of an arm together (0 for a clean one), and of each while the others act."""
+    """d′ of all effects of an arm together (0 for a clean one), and of each while the others act.
+
+    Where there are several, that of all together is told as the tangents give it: nobody decides by it.
+    """
     plant, board = default_plant(), default_board()
     if not arm.effects:
         return {"seed": arm.seed, "load_kg": LOAD_KG[arm.load], "d_prime": 0.0, "effects": []}
     parts = arm.parts(plant, board)
     present = seen(parts, experiment)
-    together = separation(parts, experiment, known, refits=refits, present=present)
+    together = separation(parts, experiment, known, refits=refits if len(arm.effects) == 1 else 0, present=present)
     alone = (
         [together]
         if len(arm.effects) == 1
