@@ -14,6 +14,7 @@ from starlette.exceptions import HTTPException
 
 from daq.contracts.errors import DaqError
 from daq.contracts.service.problems import FieldProblem, ProblemDetails
+from daq.transport import PortBusyError
 
 MEDIA_TYPE = "application/problem+json"
 log = logging.getLogger("server")
@@ -69,6 +70,8 @@ def conflict(kind: str, detail: str, advice: str) -> ProblemError:
 
 def of_error(error: DaqError) -> ProblemError:
     """The problem that an error of the host side is."""
+    if isinstance(error, PortBusyError):
+        return conflict("port-in-use", str(error), "end the other program, then connect again")
     return of_exit_code(error.exit_code, str(error))
 
 

@@ -12,12 +12,14 @@ from daq.acquisition.messages import EventHappened, Progress
 from daq.config import Settings
 from daq.config.robot_files import load_memory_map
 from daq.contracts.errors import DaqError
-from daq.contracts.service.live import EventMessage
+from daq.contracts.service.live import EventMessage, JobMessage
 from daq.trajectories import control_period
 from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock, SystemClock
+from server.jobs.desk import JobDesk, JobParts
+from server.jobs.models import Models
 from server.live.history import History
 from server.live.hub import Hub
 from server.metrics import Metrics
@@ -33,6 +35,8 @@ from server.robot.teaching import TeachingDesk
 from server.store.engine import Store
 from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
+from server.store.jobs import JobStore
+from server.store.models import ModelStore
 from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
@@ -54,6 +58,8 @@ class RobotServices:
     catalogue: Catalogue
     teaching: TeachingDesk
     hub: Hub
+    jobs: JobDesk
+    models: Models
 
     def require_motion(self, lease: str | None) -> None:
         """Raises a 409 unless this lease has the control now, and with it the operator's word for a real arm."""
@@ -75,6 +81,9 @@ class Services:
         self.experiments = ExperimentStore(self.store)
         self.schedules = ScheduleStore(self.store)
         self.traces = TraceStore(self.store)
+        self.jobs = JobStore(self.store)
+        self.models = ModelStore(self.store)
+        self.folder = settings.server.folder.absolute()
         self.events = EventStore(self.store)
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
         self.begun = self.clock.monotonic()
@@ -101,6 +110,7 @@ class Services:
             found = one.catalogue.bring_up_to_date()
             log.info("catalogue of %s: %s new traces in %s", one.robot.name, found, one.catalogue.folder)
             one.queue.start()
+            one.jobs.start()
             one.keeper.start(connect=self.settings.server.connect_at_start)
 
     def close(self) -> None:
@@ -109,6 +119,7 @@ class Services:
             closing = threading.Thread(target=one.keeper.close, args=(SHUTDOWN,))
             closing.start()
             one.queue.close(SHUTDOWN)
+            one.jobs.close(SHUTDOWN)
             closing.join()
             one.control.close()
             one.stop.close()
@@ -163,7 +174,21 @@ class Services:
         robot.listeners.append(lambda report: self.metrics.hear(name, report))
         robot.disconnected.append(lambda _why: hub.look())
         stop = StopDesk(robot, self.clock)
-        return RobotServices(robot, Keeper(robot), stop, control, queue, catalogue, teaching, hub)
+        models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
+        jobs = JobDesk(
+            JobParts(
+                robot=name,
+                machine=robot.machine,
+                folder=self.folder / "jobs",
+                jobs=self.jobs,
+                catalogue=catalogue,
+                models=models,
+                clock=self.clock,
+                changed=lambda job: hub.publish("jobs", JobMessage(job=job)),
+                at_once=settings.server.jobs_at_once,
+            )
+        )
+        return RobotServices(robot, Keeper(robot), stop, control, queue, catalogue, teaching, hub, jobs, models)
 
     def tell(
         self, robot: str, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None

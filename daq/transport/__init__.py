@@ -4,7 +4,7 @@ from daq.transport.channel import ByteChannel, ChannelError
 from daq.transport.discovery import FoundPort, ports
 from daq.transport.endpoint import Endpoint, open_endpoint
 from daq.transport.reconnect import ReconnectDelay
-from daq.transport.url import MockPort, PortUrl, SerialPort, TcpPort, TransportError, parse_port_url
+from daq.transport.url import MockPort, PortBusyError, PortUrl, SerialPort, TcpPort, TransportError, parse_port_url
 
 __all__ = [
     "ByteChannel",
@@ -12,6 +12,7 @@ __all__ = [
     "Endpoint",
     "FoundPort",
     "MockPort",
+    "PortBusyError",
     "PortUrl",
     "ReconnectDelay",
     "SerialPort",

@@ -9,7 +9,7 @@ import serial
 
 from daq.transport.channel import ByteChannel, DescriptorChannel
 from daq.transport.mock_process import MockProcess, start_mock
-from daq.transport.url import MockPort, PortUrl, SerialPort, TcpPort, TransportError, parse_port_url
+from daq.transport.url import MockPort, PortBusyError, PortUrl, SerialPort, TcpPort, TransportError, parse_port_url
 
 CONNECT_TIMEOUT_S = 3.0
 BITS_PER_BYTE = 10
@@ -111,14 +111,19 @@ def _connect_serial(port: SerialPort) -> ByteChannel:
     try:
         device = serial.Serial(port.device, port.baud, timeout=0, exclusive=True)
     except (serial.SerialException, OSError, ValueError) as error:
-        raise TransportError(_why_serial_failed(port.device, error)) from error
+        kind = PortBusyError if _is_busy(error) else TransportError
+        raise kind(_why_serial_failed(port.device, error)) from error
     device.reset_input_buffer()
     return DescriptorChannel(device.fileno(), port.device, device.close)
 
 
+def _is_busy(error: Exception) -> bool:
+    return "exclusively lock" in str(error) or "Resource busy" in str(error)
+
+
 def _why_serial_failed(device: str, error: Exception) -> str:
     text = str(error)
-    if "exclusively lock" in text or "Resource busy" in text:
+    if _is_busy(error):
         return f"{device} is in use by another program: end that one, or stop the arm with `daq stop`"
     if "No such file" in text:
         return f"{device} does not exist: `daq ports` lists the ports that do"

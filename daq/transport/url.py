@@ -24,6 +24,10 @@ class TransportError(DaqError):
     exit_code = 3
 
 
+class PortBusyError(TransportError):
+    """Another program has the port."""
+
+
 class PortUrlError(TransportError):
     """A port URL that cannot be understood."""
 

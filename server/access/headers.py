@@ -21,6 +21,6 @@ API_PREFIX = "/api/"
 def secure(headers: MutableHeaders, path: str) -> None:
     """Adds them. Answers of the API are not kept by anybody on the way."""
     for name, value in SECURITY.items():
-        headers[name] = value
+        headers.setdefault(name, value)
     if path.startswith(API_PREFIX) and "cache-control" not in headers:
         headers["Cache-Control"] = "no-store"

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
+from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import (
     Experiment,
@@ -20,11 +21,14 @@ from daq.contracts.service.experiments import (
 )
 from daq.safety import Violation, check_plan
 from daq.traces.room import RESERVE
-from daq.trajectories import plan, start_angles
+from daq.trajectories import Plan, plan, start_angles
 from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
 from server.problems import PROBLEMS, ProblemError
+from server.queue.length import LONGEST, longest_length
 from server.services import RobotServices
 
+MOST_SHOWN = 5000
+"""Set points of a preview; of a longer motion every second, third, … is shown."""
 router = APIRouter(prefix="/robots/{robot}/experiments", tags=["experiments"], responses=PROBLEMS)
 StateFilter = Annotated[list[ExperimentState] | None, Query(description="Only those in one of these states.")]
 
@@ -41,7 +45,7 @@ def submit_experiment(
 
     The same Idempotency-Key gives the same experiment (200), and never a second one.
     """
-    _require_possible(one, request)
+    require_possible(one, request.spec)
     _require_room(one)
     experiment, new = one.queue.submit(request, who.name, idempotency_key)
     response.status_code = 201 if new else 200
@@ -67,12 +71,12 @@ def list_experiments(
 @router.post("/preview")
 def preview_experiment(request: ExperimentRequest, one: RobotPart, _: Viewer) -> MotionPreview:
     """The motion of an experiment and everything that speaks against it. Nothing is queued, nothing moves."""
-    machine = one.robot.machine
-    motion = plan(request.spec, machine, start_angles(request.spec, machine))
+    motion, machine = _planned(one, request.spec), one.robot.machine
     violations = check_plan(motion, machine, machine.limits)
+    every = max(1, math.ceil(len(motion) / MOST_SHOWN))
     return MotionPreview(
-        time=tuple(index * motion.period for index in range(len(motion))),
-        set_points=tuple(map(tuple, motion.angles.tolist())),
+        time=tuple(index * motion.period for index in range(0, len(motion), every)),
+        set_points=tuple(map(tuple, motion.angles[::every].tolist())),
         moving=motion.moving,
         duration=motion.duration,
         violations=tuple(_told(violation) for violation in violations),
@@ -105,6 +109,15 @@ def cancel_experiment(experiment: Identity, one: RobotPart, who: Operator) -> Ex
     return one.queue.cancel(experiment, who.name)
 
 
+def _planned(one: RobotServices, spec: ExperimentSpec) -> Plan:
+    """Raises SpecError, and a 422 for what is too long to be planned."""
+    length = longest_length(spec)
+    if length > LONGEST:
+        line = f"spec: takes {length / 3600:.1f} h, allowed are {LONGEST / 3600:g} h"
+        raise ProblemError(422, "beyond-limits", line, "make a schedule of shorter ones")
+    return plan(spec, one.robot.machine, start_angles(spec, one.robot.machine))
+
+
 def _told(violation: Violation) -> MotionViolation:
     """JSON knows no infinity."""
     value, limit = (number if math.isfinite(number) else None for number in (violation.value, violation.limit))
@@ -114,10 +127,9 @@ def _told(violation: Violation) -> MotionViolation:
     )  # fmt: skip
 
 
-def _require_possible(one: RobotServices, request: ExperimentRequest) -> None:
+def require_possible(one: RobotServices, spec: ExperimentSpec) -> None:
     """Raises SpecError, and a 422 for a motion beyond the limits."""
-    machine = one.robot.machine
-    motion = plan(request.spec, machine, start_angles(request.spec, machine))
+    motion, machine = _planned(one, spec), one.robot.machine
     violations = check_plan(motion, machine, machine.limits)
     if violations:
         more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Response
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Experiment, Schedule, ScheduleChange, ScheduleRequest
 from daq.contracts.service.queue import Control, ControlLease, ControlRequest, QueueResume, QueueStatus
+from server.api.experiments import require_possible
 from server.api.parts import CursorOf, Identity, LeaseHeader, Limit, Operator, RobotPart, ServicesPart, Viewer
 from server.problems import PROBLEMS, ProblemError
 
@@ -52,7 +53,8 @@ def attend_queue(one: RobotPart, _: Operator) -> QueueStatus:
 
 @router.post("/schedules", tags=["queue"], status_code=201)
 def create_schedule(request: ScheduleRequest, one: RobotPart, found: ServicesPart, who: Operator) -> Schedule:
-    """An experiment to be run every so often."""
+    """An experiment to be run every so often. It is checked now, and again before every run."""
+    require_possible(one, request.spec)
     made = found.schedules.create(one.robot.name, request, found.clock.utc(), who.name)
     found.tell(one.robot.name, "schedule", f"schedule {made.id}: every {made.every:g} s", actor=who.name)
     one.queue.wake()

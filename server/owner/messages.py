@@ -215,6 +215,8 @@ class CannotOpen(_Message):
     kind: Literal["cannot_open"] = "cannot_open"
     problem: str
     exit_code: int
+    busy: bool = False
+    """Another program has the port."""
 
 
 Report = Annotated[

@@ -11,6 +11,7 @@ from daq.acquisition.speaker import Speaker
 from daq.acquisition.stop_socket import stop_listener
 from daq.contracts.errors import DaqError
 from daq.runner import ArmControl
+from daq.transport import PortBusyError
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.memory_map import default_memory_map, parse_memory_map
 from server.owner.desk import Desk
@@ -30,7 +31,8 @@ def main() -> int:
         try:
             own(inbox.first(), inbox, speaker)
         except DaqError as error:
-            speaker.ended(CannotOpen(problem=str(error), exit_code=error.exit_code))
+            busy = isinstance(error, PortBusyError)
+            speaker.ended(CannotOpen(problem=str(error), exit_code=error.exit_code, busy=busy))
             return error.exit_code
         except ProtocolError as error:
             speaker.ended(CannotOpen(problem=str(error), exit_code=EXIT_WRONG_INPUT))

@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from daq.acquisition.messages import EventHappened, Progress
-from daq.contracts.errors import DaqError, ReachError
+from daq.contracts.errors import ReachError
 from daq.contracts.machine import Machine
 from daq.contracts.service.robot import ConnectionState, RobotIdentity
+from daq.transport import PortBusyError
 from server.clock import Clock
 from server.owner.messages import (
     Answer,
@@ -198,8 +199,8 @@ class Robot:
         with self._lock:
             self._problem = report.problem
             if self._opened is not None and not self._opened.done():
-                error: type[DaqError] = ReachError
-                self._opened.set_exception(error(report.problem))
+                error = PortBusyError(report.problem) if report.busy else ReachError(report.problem)
+                self._opened.set_exception(error)
 
     def _gone(self, why: str) -> None:
         with self._lock:

@@ -2,14 +2,95 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AwareDatetime
+from pydantic import AwareDatetime, Field, FiniteFloat
 
+from daq.contracts.experiment import JointNumber
 from daq.contracts.service.base import Wire
 
 JobKind = Literal["fit", "validate", "compare", "diagnose"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
+"""As those of experiments; a job that is interrupted does not run again by itself either."""
+
+MACHINE = "machine"
+"""Instead of a model's number: the model that the robot's machine file describes."""
+TraceNumber = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
+TraceNumbers = Annotated[tuple[TraceNumber, ...], Field(min_length=1, max_length=200)]
+ModelNumber = Annotated[str, Field(pattern=r"^(machine|[0-9a-f]{12})$")]
+Pattern = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.*+?\[\]-]{1,100}$")]
+"""Name of a parameter, or a pattern such as `*.mass` and `joint2.*`."""
+ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.-]{0,63}$")]
+Bound = FiniteFloat | None
+
+
+class EffectChoice(Wire):
+    """An effect to be in the model; on all joints where none are named."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")]
+    joints: tuple[JointNumber, ...] = ()
+
+
+class FitRequest(Wire):
+    """Finds the parameters with which a model best repeats traces. Fields as those of `daq fit`."""
+
+    kind: Literal["fit"] = "fit"
+    traces: TraceNumbers
+    held_out: tuple[TraceNumber, ...] = ()
+    """Traces to judge by, not fitted to."""
+    model: ModelNumber = MACHINE
+    """What to begin from."""
+    effects: tuple[EffectChoice, ...] = ()
+    """Effects to add before."""
+    parameters: tuple[Pattern, ...] | None = None
+    """What to find; None for all uncertain."""
+    held: tuple[Pattern, ...] = ()
+    bounds: dict[Pattern, tuple[Bound, Bound]] = Field(default_factory=dict)
+    use_priors: bool = True
+    method: Literal["least_squares", "nelder_mead"] = "least_squares"
+    starts: Annotated[int, Field(ge=1, le=20)] = 1
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
+    loop: Literal["closed", "open"] | None = None
+    name: ModelName | None = None
+    """Of the model that is made."""
+
+
+class ValidateRequest(Wire):
+    """What would have to move, when, and against what, for a model to explain traces. Fields as of `daq validate`."""
+
+    kind: Literal["validate"] = "validate"
+    traces: TraceNumbers
+    model: ModelNumber
+    parameters: tuple[Pattern, ...] | None = None
+    joints: tuple[JointNumber, ...] | None = None
+    damping_ratio: Annotated[float, Field(gt=0, le=10)] = 0.5
+
+
+class CompareRequest(Wire):
+    """Simulates the same traces with one model or several, beside what was measured."""
+
+    kind: Literal["compare"] = "compare"
+    traces: TraceNumbers
+    models: Annotated[tuple[ModelNumber, ...], Field(min_length=1, max_length=10)]
+
+
+class DiagnoseRequest(Wire):
+    """Where a model and traces disagree, which effect is missing, what adding it brings; as `daq diagnose`."""
+
+    kind: Literal["diagnose"] = "diagnose"
+    traces: TraceNumbers
+    held_out: tuple[TraceNumber, ...] = ()
+    model: ModelNumber = MACHINE
+    effects: tuple[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")], ...] | None = None
+    """Candidates; None for every effect known."""
+    joints: tuple[JointNumber, ...] | None = None
+    most_steps: Annotated[int, Field(ge=1, le=10)] = 3
+    name: ModelName | None = None
+
+
+JobRequest = Annotated[
+    FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest, Field(discriminator="kind")
+]  # fmt: skip
 
 
 class Job(Wire):
@@ -17,11 +98,8 @@ class Job(Wire):
 
     id: str
     robot: str
-    kind: JobKind
+    request: JobRequest
     state: JobState
-    traces: tuple[str, ...]
-    models: tuple[str, ...]
-    """The models that it takes."""
     submitted: AwareDatetime
     submitted_by: str
     started: AwareDatetime | None = None
@@ -32,3 +110,56 @@ class Job(Wire):
     """Why it is not done, in one line."""
     model: str | None = None
     """The model that it made."""
+    has_report: bool = False
+
+
+class JobResult(Wire):
+    """What a job found: the same data as `--json` of its command, and the signals that a plot needs."""
+
+    id: str
+    kind: JobKind
+    data: dict[str, Any]
+
+
+class ModelEntry(Wire):
+    """A model of the service, and where it comes from."""
+
+    id: str
+    robot: str
+    name: str
+    created: AwareDatetime
+    created_by: str
+    parent: str | None
+    """The model that it was made from."""
+    job: str | None
+    """The job that made it."""
+    traces: tuple[str, ...] = ()
+    """The traces that it was made from."""
+    notes: str = ""
+
+
+class ModelParameter(Wire):
+    """A parameter of a model, in its unit. `deviation`: of what is expected; None where nothing is claimed."""
+
+    name: str
+    unit: str
+    value: float
+    low: float | None
+    high: float | None
+    deviation: float | None
+
+
+class ModelDetails(Wire):
+    """A model: its effects, its parameters, and the models that it comes from, the nearest first."""
+
+    entry: ModelEntry
+    effects: tuple[EffectChoice, ...]
+    parameters: tuple[ModelParameter, ...]
+    ancestors: tuple[ModelEntry, ...]
+
+
+class ModelChange(Wire):
+    """A new name or notes; what is None stays."""
+
+    name: ModelName | None = None
+    notes: Annotated[str, Field(max_length=10000)] | None = None

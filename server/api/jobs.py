@@ -1,0 +1,165 @@
+"""Jobs: fits, validations, comparisons, diagnoses in the background; and the models they make."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import FileResponse
+
+from daq.contracts.service.base import Page
+from daq.contracts.service.jobs import (
+    Job,
+    JobKind,
+    JobRequest,
+    JobResult,
+    JobState,
+    ModelChange,
+    ModelDetails,
+    ModelEntry,
+    ModelName,
+    ModelParameter,
+)
+from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
+from server.jobs.desk import REPORT, RESULT
+from server.jobs.models import LARGEST_MODEL
+from server.problems import PROBLEMS, ProblemError
+from server.services import RobotServices, Services
+
+router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
+REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
+"""A report is one page with its styles in it, and no script."""
+_JSON_FILE = {"application/json": {"schema": {"type": "object"}}}
+
+
+@router.post("/jobs", tags=["jobs"], status_code=201, responses={200: {"model": Job}})
+def submit_job(
+    request: JobRequest,
+    one: RobotPart,
+    who: Operator,
+    response: Response,
+    idempotency_key: IdempotencyKey = None,
+) -> Job:
+    """Begins a computation as soon as a worker is free. The same Idempotency-Key gives the same job (200)."""
+    job, new = one.jobs.submit(request, who.name, idempotency_key)
+    response.status_code = 201 if new else 200
+    response.headers["Location"] = f"/api/v1/robots/{one.robot.name}/jobs/{job.id}"
+    return one.jobs.as_told(job)
+
+
+@router.get("/jobs", tags=["jobs"])
+def list_jobs(
+    one: RobotPart,
+    found: ServicesPart,
+    _: Viewer,
+    state: Annotated[list[JobState] | None, Query()] = None,
+    kind: JobKind | None = None,
+    limit: Limit = 50,
+    cursor: CursorOf = None,
+) -> Page[Job]:
+    """Jobs, the newest first."""
+    page = found.jobs.page(one.robot.name, state or (), kind, cursor, limit)
+    return page.model_copy(update={"items": tuple(one.jobs.as_told(job) for job in page.items)})
+
+
+@router.get("/jobs/{job}", tags=["jobs"])
+def get_job(job: Identity, one: RobotPart, found: ServicesPart, _: Viewer) -> Job:
+    """One job: its state, how far it is, what became of it."""
+    return one.jobs.as_told(found.jobs.get(one.robot.name, job))
+
+
+@router.post("/jobs/{job}/cancel", tags=["jobs"])
+def cancel_job(job: Identity, one: RobotPart, who: Operator) -> Job:
+    """Takes back what waits, and asks what runs to end, which it does within a second or so."""
+    return one.jobs.cancel(job, who.name)
+
+
+@router.delete("/jobs/{job}", tags=["jobs"], status_code=204)
+def delete_job(job: Identity, one: RobotPart, _: Operator) -> Response:
+    """Takes an ended job and its result away; a model that it made stays."""
+    one.jobs.remove(job)
+    return Response(status_code=204)
+
+
+@router.get("/jobs/{job}/result", tags=["jobs"])
+def get_job_result(job: Identity, one: RobotPart, found: ServicesPart, _: Viewer) -> JobResult:
+    """What a job found: as `--json` of its command, with the signals that a plot needs."""
+    data = json.loads(one.jobs.result_file(job, RESULT).read_text("utf-8"))
+    return JobResult(id=job, kind=found.jobs.get(one.robot.name, job).request.kind, data=data)
+
+
+@router.get("/jobs/{job}/report.html", tags=["jobs"], response_class=FileResponse)
+def get_job_report(job: Identity, one: RobotPart, _: Viewer) -> FileResponse:
+    """The job's report: one page that stands by itself."""
+    path = one.jobs.result_file(job, REPORT)
+    return FileResponse(path, media_type="text/html", headers={"Content-Security-Policy": REPORT_POLICY})
+
+
+@router.get("/models", tags=["models"])
+def list_models(
+    one: RobotPart, found: ServicesPart, _: Viewer, limit: Limit = 50, cursor: CursorOf = None
+) -> Page[ModelEntry]:
+    """Models, the newest first."""
+    return found.models.page(one.robot.name, cursor, limit)
+
+
+@router.post(
+    "/models",
+    tags=["models"],
+    status_code=201,
+    openapi_extra={"requestBody": {"required": True, "content": _JSON_FILE}},
+)
+async def upload_model(
+    request: Request, one: RobotPart, found: ServicesPart, who: Operator, name: Annotated[ModelName, Query()]
+) -> ModelEntry:
+    """Takes in a model from elsewhere: a file as `daq fit` writes it. Effects of a user's own are refused."""
+    text = bytearray()
+    async for piece in request.stream():
+        text += piece
+        if len(text) > LARGEST_MODEL:
+            raise ProblemError(413, "too-large", f"a model may have {LARGEST_MODEL >> 20} MB", "send less")
+    return await run_in_threadpool(_taken_in, bytes(text), name, one, found, who.name)
+
+
+@router.get("/models/machine/parameters", tags=["models"])
+def list_machine_parameters(one: RobotPart, _: Viewer) -> tuple[ModelParameter, ...]:
+    """Parameters of the model that the machine file describes: `machine` in requests."""
+    return one.models.machine_parameters()
+
+
+@router.get("/models/{model}", tags=["models"])
+def get_model(model: Identity, one: RobotPart, _: Viewer) -> ModelDetails:
+    """One model: its effects, its parameters, the models that it comes from."""
+    return one.models.details(model)
+
+
+@router.get(
+    "/models/{model}/model.json",
+    tags=["models"],
+    response_class=FileResponse,
+    responses={200: {"content": _JSON_FILE}},
+)
+def download_model(model: Identity, one: RobotPart, _: Viewer) -> FileResponse:
+    """The model's file, for `daq validate` and the like."""
+    path = one.models.path_of(model)
+    return FileResponse(path, media_type="application/json", filename=path.name)
+
+
+@router.patch("/models/{model}", tags=["models"])
+def change_model(model: Identity, change: ModelChange, one: RobotPart, found: ServicesPart, _: Operator) -> ModelEntry:
+    """A new name or notes."""
+    return found.models.change(one.robot.name, model, change)
+
+
+@router.delete("/models/{model}", tags=["models"], status_code=204)
+def delete_model(model: Identity, one: RobotPart, found: ServicesPart, who: Operator) -> Response:
+    """Deletes a model for good. Refused while another model comes from it."""
+    one.models.remove(model)
+    found.tell(one.robot.name, "model", f"model {model} was deleted", actor=who.name)
+    return Response(status_code=204)
+
+
+def _taken_in(text: bytes, name: str, one: RobotServices, found: Services, by: str) -> ModelEntry:
+    return found.models.get(one.robot.name, one.models.take_in_text(text, name, by))

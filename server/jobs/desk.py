@@ -1,0 +1,224 @@
+"""The jobs of one robot: queued, computed in worker processes one after the other, followed, cancelled, kept."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import multiprocessing
+import os
+import shutil
+import signal
+import threading
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from daq.contracts.machine import Machine
+from daq.contracts.service.jobs import MACHINE, DiagnoseRequest, FitRequest, Job, JobRequest
+from server.catalogue.catalogue import Catalogue
+from server.clock import Clock
+from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
+from server.jobs.models import Models
+from server.jobs.work import Ended, Task, begin_worker, carry_out
+from server.problems import conflict, not_found
+from server.queue.states import Event
+from server.store.jobs import JobStore, models_of, traces_of
+
+LOOK_EVERY = 0.5
+"""s between two looks at how far the jobs are."""
+log = logging.getLogger("server.jobs")
+
+
+def worker_processes(count: int) -> Executor:
+    """The executor of one computer. Spawned, not forked: this process has threads."""
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(count, mp_context=context, initializer=begin_worker)
+
+
+@dataclass(frozen=True)
+class JobParts:
+    """What the desk works with. `changed` is told of every job that has changed; it must not wait."""
+
+    robot: str
+    machine: Machine
+    folder: Path
+    jobs: JobStore
+    catalogue: Catalogue
+    models: Models
+    clock: Clock
+    changed: Callable[[Job], None]
+    at_once: int
+    make_executor: Callable[[int], Executor] = worker_processes
+
+
+class JobDesk:
+    """Gives jobs to an executor, and follows them. Safe to use from any thread."""
+
+    def __init__(self, parts: JobParts) -> None:
+        self._parts = parts
+        self._wake = threading.Event()
+        self._closing = False
+        self._executor: Executor | None = None
+        self._running: dict[str, Future[Ended]] = {}
+        self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
+        parts.jobs.settle_after_restart(parts.robot, parts.clock.utc())
+
+    def start(self) -> None:
+        """Begins to compute what waits: a job moves nothing."""
+        self._thread.start()
+
+    def submit(self, request: JobRequest, by: str, key: str | None) -> tuple[Job, bool]:
+        """Takes a job in. Raises a 404 for a trace or model that is not there, a 409 for a key used otherwise."""
+        parts = self._parts
+        task = Task(
+            request=request,
+            machine=parts.machine,
+            traces={number: parts.catalogue.path_of(number) for number in traces_of(request)},
+            models={number: parts.models.path_of(number) for number in models_of(request) if number != MACHINE},
+            names={number: parts.models.name_of(number) for number in models_of(request)},
+        )
+        job, new = parts.jobs.submit(parts.robot, request, parts.clock.utc(), by, key)
+        if new:
+            folder = self._folder(job.id)
+            folder.mkdir(parents=True)
+            Mailbox(folder).write(REQUEST, task.model_dump(mode="json"))
+            self._tell(job)
+            self._wake.set()
+        return job, new
+
+    def cancel(self, identity: str, by: str) -> Job:
+        """Takes back what waits; asks what runs to end. Raises a 404, and a 409 for what has ended."""
+        parts = self._parts
+        job = parts.jobs.get(parts.robot, identity)
+        if job.state == "running":
+            Mailbox(self._folder(identity)).cancel()
+            return self.as_told(job)
+        job = parts.jobs.change(parts.robot, identity, Event.CANCELLED, parts.clock.utc(), f"cancelled by {by}")
+        self._tell(job)
+        return job
+
+    def remove(self, identity: str) -> None:
+        """Takes an ended job and its results away; a model that it made stays. Raises a 404, 409."""
+        self._parts.jobs.remove(self._parts.robot, identity)
+        shutil.rmtree(self._folder(identity), ignore_errors=True)
+
+    def result_file(self, identity: str, name: str) -> Path:
+        """The result (`RESULT`) or report (`REPORT`) of a job. Raises a 404, and a 409 while there is none."""
+        job = self._parts.jobs.get(self._parts.robot, identity)
+        if job.state != "done":
+            line = f"job {identity} is {job.state}{': ' if job.reason else ''}{job.reason}"
+            raise conflict("job-state", line, "only a job that is done has a result")
+        path = self._folder(identity) / name
+        if not path.is_file():
+            raise not_found(f"{name} of job {identity} any more", "run it again")
+        return path
+
+    def as_told(self, job: Job) -> Job:
+        """With its progress while it runs."""
+        if job.state != "running":
+            return job
+        reported = self._reported(job.id)
+        if reported is None:
+            return job.model_copy(update={"progress": 0.0, "progress_text": "starting"})
+        return job.model_copy(update={"progress": reported.fraction, "progress_text": reported.text})
+
+    def close(self, patience: float) -> None:
+        """Ends what runs: it is interrupted. What waits goes on waiting."""
+        self._closing = True
+        self._wake.set()
+        if self._thread.is_alive():
+            self._thread.join(patience)
+        for identity in self._running:
+            reported = self._reported(identity)
+            if reported is not None:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(reported.process, signal.SIGTERM)
+        if self._executor is not None:
+            self._executor.shutdown(wait=False, cancel_futures=True)
+
+    def _folder(self, identity: str) -> Path:
+        return self._parts.folder / identity
+
+    def _reported(self, identity: str) -> Reported | None:
+        try:
+            return Mailbox(self._folder(identity)).reported()
+        except (OSError, ValueError, KeyError):
+            return None
+
+    def _tell(self, job: Job) -> None:
+        self._parts.changed(self.as_told(job))
+
+    def _follow(self) -> None:
+        told: dict[str, Reported] = {}
+        while not self._closing:
+            self._wake.clear()
+            try:
+                self._collect()
+                self._begin()
+                self._tell_progress(told)
+            except Exception:
+                # A disk that is full, a database that is locked: the next look may go better.
+                log.exception("jobs")
+            self._wake.wait(LOOK_EVERY if self._running else None)
+
+    def _begin(self) -> None:
+        parts = self._parts
+        for job in parts.jobs.waiting(parts.robot)[: max(0, parts.at_once - len(self._running))]:
+            if self._executor is None:
+                self._executor = parts.make_executor(parts.at_once)
+            try:
+                future = self._executor.submit(carry_out, self._folder(job.id))
+            except BrokenExecutor:
+                self._executor = None
+                self._wake.set()
+                return
+            self._running[job.id] = future
+            self._tell(parts.jobs.change(parts.robot, job.id, Event.TAKEN, parts.clock.utc()))
+            future.add_done_callback(lambda _future: self._wake.set())
+
+    def _collect(self) -> None:
+        for identity, future in list(self._running.items()):
+            if future.done():
+                self._end(identity, future)
+                del self._running[identity]
+
+    def _end(self, identity: str, future: Future[Ended]) -> None:
+        parts = self._parts
+        event, reason, model = Event.COMPLETED, "", None
+        try:
+            ended = future.result()
+        except BrokenExecutor:
+            self._executor = None
+            event, reason = Event.LOST, "its worker process ended: it was killed, or the memory did not suffice"
+        except Exception as error:
+            log.exception("job %s", identity)
+            event, reason = Event.FAULT, f"program fault: {type(error).__name__}: {error}"
+        else:
+            if ended.cancelled:
+                event, reason = Event.STOPPED, "cancelled while it ran"
+            elif ended.problem:
+                event, reason = Event.REFUSED, ended.problem
+            elif ended.model is not None:
+                model = self._keep_model(identity)
+        self._tell(parts.jobs.change(parts.robot, identity, event, parts.clock.utc(), reason, model))
+
+    def _keep_model(self, identity: str) -> str:
+        parts = self._parts
+        job = parts.jobs.get(parts.robot, identity)
+        name = job.request.name if isinstance(job.request, FitRequest | DiagnoseRequest) else None
+        path = self._folder(identity) / MODEL
+        try:
+            return parts.models.take_in(path, name or f"{job.request.kind} {identity}", job.submitted_by, identity)
+        finally:
+            path.unlink(missing_ok=True)
+
+    def _tell_progress(self, told: dict[str, Reported]) -> None:
+        for identity in self._running:
+            reported = self._reported(identity)
+            if reported is not None and told.get(identity) != reported:
+                told[identity] = reported
+                self._tell(self._parts.jobs.get(self._parts.robot, identity))
+
+
+__all__ = ["REPORT", "RESULT", "JobDesk", "JobParts", "worker_processes"]

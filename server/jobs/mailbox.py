@@ -1,0 +1,85 @@
+"""What a job's folder holds: its request, how far it is, whether it is to end, its result. Files, so that a worker on
+another computer can share them; each is written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+TELL_EVERY = 0.2
+"""s between two reports of progress, and between two looks at whether the job is to end."""
+REQUEST, PROGRESS, CANCEL, RESULT, REPORT, MODEL = (
+    "request.json", "progress.json", "cancel", "result.json", "report.html", "model.json",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Reported:
+    """How far a job is, and the process that does it."""
+
+    fraction: float
+    text: str
+    process: int
+
+
+class Mailbox:
+    """One job's folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._told = 0.0
+        self._looked = 0.0
+        self._cancelled = False
+
+    def write(self, name: str, data: Any) -> None:
+        """A JSON file."""
+        self.write_text(name, json.dumps(data, allow_nan=False))
+
+    def write_text(self, name: str, text: str) -> None:
+        """A text file, there whole or not at all."""
+        part = self.folder / f"{name}.part"
+        with part.open("w", encoding="utf-8") as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        part.replace(self.folder / name)
+
+    def read(self, name: str) -> Any:
+        """A JSON file; None when it is not there."""
+        try:
+            return json.loads((self.folder / name).read_text("utf-8"))
+        except FileNotFoundError:
+            return None
+
+    def cancel(self) -> None:
+        """The job is to end."""
+        (self.folder / CANCEL).touch()
+
+    def reported(self) -> Reported | None:
+        """How far it is; None before it has begun."""
+        data = self.read(PROGRESS)
+        return None if data is None else Reported(data["fraction"], data["text"], data["process"])
+
+    # ---- the worker's side
+
+    def tell(self, fraction: float, text: str) -> None:
+        """Progress, as `daq.contracts.progress.Progress`."""
+        now = time.monotonic()
+        if now - self._told < TELL_EVERY and fraction < 1:
+            return
+        self._told = now
+        part = self.folder / f"{PROGRESS}.part"
+        part.write_text(json.dumps({"fraction": fraction, "text": text, "process": os.getpid()}), "utf-8")
+        part.replace(self.folder / PROGRESS)
+
+    def is_set(self) -> bool:
+        """Whether the job is to end, as `daq.contracts.progress.Cancel`."""
+        now = time.monotonic()
+        if not self._cancelled and now - self._looked >= TELL_EVERY:
+            self._looked = now
+            self._cancelled = (self.folder / CANCEL).exists()
+        return self._cancelled

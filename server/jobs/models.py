@@ -1,0 +1,132 @@
+"""The models of one robot: files in a folder, found by the database."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import Machine
+from daq.contracts.service.jobs import MACHINE, EffectChoice, ModelDetails, ModelParameter
+from model.machine_model.model import Model, base_model
+from model.machine_model.model_file import load_model, save_model
+from server.clock import Clock
+from server.problems import ProblemError
+from server.store.models import ModelStore, NewModel
+
+LARGEST_MODEL = 16 << 20
+
+
+class Models:
+    """Takes models in and finds them. Safe to use from any thread."""
+
+    def __init__(self, folder: Path, robot: str, machine: Machine, store: ModelStore, clock: Clock) -> None:
+        self.folder = folder
+        self.store = store
+        self._robot = robot
+        self._machine = machine
+        self._clock = clock
+
+    def take_in(self, path: Path, name: str, by: str, job: str | None) -> str:
+        """A model's file; returns the model's number. The same model twice is one. Raises SpecError."""
+        model = load_model(path)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        file = f"{model.identity}.json"
+        part = self.folder / f"{file}.part"
+        save_model(model, part)
+        with part.open("rb") as stream:
+            os.fsync(stream.fileno())
+        part.replace(self.folder / file)
+        lineage = model.lineage
+        self.store.insert(
+            NewModel(
+                id=model.identity,
+                robot=self._robot,
+                name=name[:64],
+                file=file,
+                created=self._clock.utc(),
+                created_by=by,
+                parent=lineage.parent,
+                job=job,
+                traces=lineage.traces,
+            )
+        )
+        return model.identity
+
+    def take_in_text(self, text: bytes, name: str, by: str) -> str:
+        """A model from elsewhere. Raises a 422, also for one that brings a program of its own with it."""
+        try:
+            data = json.loads(text)
+        except ValueError as error:
+            advice = "send a file as `daq fit` writes it"
+            raise ProblemError(422, "not-a-model", "the body is not JSON", advice) from error
+        if _has_program(data):
+            line = "this model has effects that are programs of its user's own: a service does not run those"
+            raise ProblemError(422, "not-a-model", line, "use it with the command line")
+        self.folder.mkdir(parents=True, exist_ok=True)
+        path = self.folder / f"upload-{os.urandom(6).hex()}.json"
+        path.write_bytes(text)
+        try:
+            return self.take_in(path, name, by, None)
+        except SpecError as error:
+            line = str(error).replace(str(path), "upload")
+            raise ProblemError(422, "not-a-model", line, "send a file as `daq fit` writes it") from error
+        finally:
+            path.unlink(missing_ok=True)
+
+    def path_of(self, identity: str) -> Path:
+        """Raises a 404."""
+        return self.folder / self.store.file_of(self._robot, identity)
+
+    def name_of(self, identity: str) -> str:
+        """For tables. Raises a 404."""
+        return self._machine.name if identity == MACHINE else self.store.get(self._robot, identity).name
+
+    def details(self, identity: str) -> ModelDetails:
+        """One model: effects, parameters, ancestors. Raises a 404."""
+        entry = self.store.get(self._robot, identity)
+        model = load_model(self.path_of(identity))
+        return ModelDetails(
+            entry=entry,
+            effects=tuple(EffectChoice(name=use.name, joints=use.joints) for use in model.effects),
+            parameters=_parameters(model),
+            ancestors=self.store.ancestors(self._robot, identity),
+        )
+
+    def machine_parameters(self) -> tuple[ModelParameter, ...]:
+        """Those of the model that the machine file describes."""
+        return _parameters(base_model(self._machine))
+
+    def remove(self, identity: str) -> None:
+        """Row and file. Raises a 404, 409."""
+        file = self.store.remove(self._robot, identity)
+        (self.folder / file).unlink(missing_ok=True)
+
+
+def _parameters(model: Model) -> tuple[ModelParameter, ...]:
+    return tuple(
+        ModelParameter(
+            name=one.name,
+            unit=one.unit,
+            value=one.value,
+            low=_finite(one.low),
+            high=_finite(one.high),
+            deviation=one.deviation,
+        )
+        for one in model.parameters
+    )
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or abs(value) == float("inf") else value
+
+
+def _has_program(data: Any) -> bool:
+    """Whether any effect in it comes with a file."""
+    if isinstance(data, dict):
+        effects = data.get("effects")
+        own = isinstance(effects, list) and any(isinstance(use, dict) and use.get("file") for use in effects)
+        return own or any(_has_program(value) for value in data.values())
+    return isinstance(data, list) and any(_has_program(value) for value in data)

@@ -1,0 +1,48 @@
+"""How long an experiment takes, before it is planned: what is too long to be planned is refused by this alone. Pure."""
+
+from __future__ import annotations
+
+from daq.contracts.experiment import (
+    Cubic,
+    ExperimentSpec,
+    Multisine,
+    Path,
+    Pause,
+    Ramp,
+    Sequence,
+    Sine,
+    SlowRamp,
+    Staircase,
+    Step,
+    Trajectory,
+)
+
+LONGEST = 4 * 3600.0
+"""s of one experiment: 720 000 control periods, a trace of some 300 MB. A choice; a schedule makes longer studies."""
+
+
+def longest_length(spec: ExperimentSpec) -> float:
+    """s that the record takes, the slow ways back between repeats left out."""
+    return spec.settle + spec.repeats * _of(spec.trajectory) + spec.hold
+
+
+def _of(trajectory: Trajectory) -> float:
+    length = 0.0
+    match trajectory:
+        case Ramp() | Cubic() | Multisine() | Pause():
+            length = trajectory.duration
+        case Step():
+            pass
+        case Staircase():
+            length = trajectory.steps * trajectory.dwell * (2 if trajectory.back else 1)
+        case SlowRamp():
+            amplitude = trajectory.amplitude
+            farthest = max(map(abs, amplitude.values())) if isinstance(amplitude, dict) else abs(amplitude)
+            length = (trajectory.reversals + 1) * farthest / trajectory.speed
+        case Sine():
+            length = trajectory.period * trajectory.cycles
+        case Path():
+            length = trajectory.times[-1]
+        case Sequence():
+            length = sum(_of(segment.move) for segment in trajectory.segments)
+    return length

@@ -1,0 +1,164 @@
+"""Jobs and models in the database, and which traces they refer to."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from collections.abc import Sequence
+from datetime import datetime
+
+from pydantic import TypeAdapter
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from daq.contracts.service.base import Page
+from daq.contracts.service.jobs import (
+    CompareRequest,
+    DiagnoseRequest,
+    FitRequest,
+    Job,
+    JobKind,
+    JobRequest,
+    JobState,
+    ValidateRequest,
+)
+from server.problems import conflict, not_found
+from server.queue.states import Event, IllegalEventError, advance
+from server.store.engine import Store
+from server.store.pages import Cursor, page_of
+from server.store.tables import JobRow, TraceUseRow
+
+_REQUEST: TypeAdapter[FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest] = TypeAdapter(JobRequest)
+
+
+def traces_of(request: JobRequest) -> tuple[str, ...]:
+    """All traces that a request names."""
+    return (*request.traces, *(request.held_out if isinstance(request, FitRequest | DiagnoseRequest) else ()))
+
+
+def models_of(request: JobRequest) -> tuple[str, ...]:
+    """All models that a request names."""
+    return request.models if isinstance(request, CompareRequest) else (request.model,)
+
+
+class JobStore:
+    """Jobs of all robots."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def submit(
+        self, robot: str, request: JobRequest, now: datetime, by: str, key: str | None
+    ) -> tuple[Job, bool]:
+        """A new job, queued, and True; or the one that the same key made before, and False. Raises a 409."""
+        digest = hashlib.sha256(request.model_dump_json().encode()).hexdigest()
+        with self._store.writing() as session:
+            if key is not None:
+                found = session.scalar(select(JobRow).filter_by(robot=robot, idempotency_key=key))
+                if found is not None:
+                    if found.request_digest != digest:
+                        line = f"Idempotency-Key {key!r} was used for another request"
+                        raise conflict("idempotency-key", line, "use a new key for a new request")
+                    return as_job(found), False
+            row = JobRow(
+                id=secrets.token_hex(6),
+                robot=robot,
+                kind=request.kind,
+                request=request.model_dump(mode="json"),
+                state="queued",
+                idempotency_key=key,
+                request_digest=digest,
+                submitted=now,
+                submitted_by=by,
+                reason="",
+            )
+            session.add(row)
+            for trace in traces_of(request):
+                session.merge(TraceUseRow(trace=trace, used_by=f"job {row.id}"))
+            session.flush()
+            return as_job(row), True
+
+    def get(self, robot: str, identity: str) -> Job:
+        """One of them. Raises a 404."""
+        with self._store.reading() as session:
+            return as_job(_row(session, robot, identity))
+
+    def page(
+        self, robot: str, states: Sequence[JobState], kind: JobKind | None, cursor: str | None, limit: int
+    ) -> Page[Job]:
+        """The newest first."""
+        query = select(JobRow).where(JobRow.robot == robot).order_by(JobRow.sequence.desc())
+        if states:
+            query = query.where(JobRow.state.in_(states))
+        if kind is not None:
+            query = query.where(JobRow.kind == kind)
+        if cursor is not None:
+            query = query.where(JobRow.sequence < Cursor.parse(cursor).number)
+        with self._store.reading() as session:
+            rows = list(session.scalars(query.limit(limit + 1)))
+        return page_of(rows, limit, as_job, lambda row: Cursor(row.sequence))
+
+    def waiting(self, robot: str) -> list[Job]:
+        """Those queued, the first submitted first."""
+        query = select(JobRow).filter_by(robot=robot, state="queued").order_by(JobRow.sequence)
+        with self._store.reading() as session:
+            return [as_job(row) for row in session.scalars(query)]
+
+    def change(
+        self, robot: str, identity: str, event: Event, now: datetime, reason: str = "", model: str | None = None
+    ) -> Job:
+        """What happened to it. Raises a 409 when its state does not allow that."""
+        with self._store.writing() as session:
+            row = _row(session, robot, identity)
+            try:
+                row.state = advance(row.state, event)  # type: ignore[arg-type]
+            except IllegalEventError as error:
+                line = str(error).replace("an experiment", "a job")
+                raise conflict("job-state", line, "see its state: only what is queued or running can end") from error
+            if event is Event.TAKEN:
+                row.started = now
+            else:
+                row.ended, row.reason, row.model = now, reason, model
+            session.flush()
+            return as_job(row)
+
+    def settle_after_restart(self, robot: str, now: datetime) -> None:
+        """What ran when the service ended is interrupted."""
+        with self._store.writing() as session:
+            for row in session.scalars(select(JobRow).filter_by(robot=robot, state="running")):
+                row.state, row.ended = "interrupted", now
+                row.reason = "the service ended while this ran; it does not run again by itself"
+
+    def remove(self, robot: str, identity: str) -> None:
+        """Takes an ended job away, and with it what it says about traces. Raises a 404, 409."""
+        with self._store.writing() as session:
+            row = _row(session, robot, identity)
+            if row.state in ("queued", "running"):
+                raise conflict("job-state", f"job {identity} is {row.state}", "cancel it first")
+            for use in session.scalars(select(TraceUseRow).filter_by(used_by=f"job {identity}")):
+                session.delete(use)
+            session.delete(row)
+
+
+def as_job(row: JobRow) -> Job:
+    """A row as clients see it."""
+    return Job(
+        id=row.id,
+        robot=row.robot,
+        request=_REQUEST.validate_python(row.request),
+        state=row.state,
+        submitted=row.submitted,
+        submitted_by=row.submitted_by,
+        started=row.started,
+        ended=row.ended,
+        reason=row.reason,
+        model=row.model,
+        has_report=row.state == "done",
+    )
+
+
+def _row(session: Session, robot: str, identity: str) -> JobRow:
+    row = session.scalar(select(JobRow).filter_by(robot=robot, id=identity))
+    if row is None:
+        raise not_found(f"job {identity!r}", "GET …/jobs lists those there are")
+    return row

@@ -1,0 +1,129 @@
+"""Models in the database, with the traces that they were made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from sqlalchemy import select, tuple_
+from sqlalchemy.orm import Session
+
+from daq.contracts.service.base import Page
+from daq.contracts.service.jobs import ModelChange, ModelEntry
+from server.problems import conflict, not_found
+from server.store.engine import Store
+from server.store.pages import Cursor, page_of
+from server.store.tables import ModelRow, TraceUseRow
+
+MOST_ANCESTORS = 100
+
+
+@dataclass(frozen=True)
+class NewModel:
+    """A row to be, and the traces that the model was made from."""
+
+    id: str
+    robot: str
+    name: str
+    file: str
+    created: datetime
+    created_by: str
+    parent: str | None
+    job: str | None
+    traces: tuple[str, ...]
+
+
+class ModelStore:
+    """Models of all robots."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def insert(self, new: NewModel) -> bool:
+        """False when the same model is there already: equal models have equal numbers."""
+        with self._store.writing() as session:
+            if session.get(ModelRow, new.id) is not None:
+                return False
+            fields = {name: value for name, value in vars(new).items() if name != "traces"}
+            session.add(ModelRow(**fields, notes=""))
+            for trace in new.traces:
+                session.merge(TraceUseRow(trace=trace, used_by=f"model {new.id}"))
+            return True
+
+    def get(self, robot: str, identity: str) -> ModelEntry:
+        """One of them. Raises a 404."""
+        with self._store.reading() as session:
+            return _entry(session, _row(session, robot, identity))
+
+    def file_of(self, robot: str, identity: str) -> str:
+        """Raises a 404."""
+        with self._store.reading() as session:
+            return _row(session, robot, identity).file
+
+    def ancestors(self, robot: str, identity: str) -> tuple[ModelEntry, ...]:
+        """The models that it comes from, the nearest first, as far as they are here."""
+        found: list[ModelEntry] = []
+        with self._store.reading() as session:
+            row: ModelRow | None = _row(session, robot, identity)
+            while row is not None and row.parent is not None and len(found) < MOST_ANCESTORS:
+                row = session.get(ModelRow, row.parent)
+                if row is not None and row.id not in {one.id for one in found}:
+                    found.append(_entry(session, row))
+        return tuple(found)
+
+    def page(self, robot: str, cursor: str | None, limit: int) -> Page[ModelEntry]:
+        """The newest first."""
+        query = select(ModelRow).where(ModelRow.robot == robot)
+        if cursor is not None:
+            place = Cursor.parse(cursor)
+            moment = datetime.fromtimestamp(place.number, UTC)
+            query = query.where(tuple_(ModelRow.created, ModelRow.id) < tuple_(moment, place.identity))
+        query = query.order_by(ModelRow.created.desc(), ModelRow.id.desc()).limit(limit + 1)
+        with self._store.reading() as session:
+            rows = list(session.scalars(query))
+            return page_of(
+                rows, limit, lambda row: _entry(session, row), lambda row: Cursor(row.created.timestamp(), row.id)
+            )
+
+    def change(self, robot: str, identity: str, change: ModelChange) -> ModelEntry:
+        """A new name or notes. Raises a 404."""
+        with self._store.writing() as session:
+            row = _row(session, robot, identity)
+            row.name = row.name if change.name is None else change.name
+            row.notes = row.notes if change.notes is None else change.notes
+            session.flush()
+            return _entry(session, row)
+
+    def remove(self, robot: str, identity: str) -> str:
+        """Takes it away; returns the name of its file. Raises a 404, and a 409 when another model comes from it."""
+        with self._store.writing() as session:
+            row = _row(session, robot, identity)
+            child = session.scalar(select(ModelRow.id).filter_by(parent=identity))
+            if child is not None:
+                raise conflict("model-in-use", f"model {child} was made from {identity}", "delete that one first")
+            for use in session.scalars(select(TraceUseRow).filter_by(used_by=f"model {identity}")):
+                session.delete(use)
+            session.delete(row)
+            return row.file
+
+
+def _entry(session: Session, row: ModelRow) -> ModelEntry:
+    traces = session.scalars(select(TraceUseRow.trace).filter_by(used_by=f"model {row.id}"))
+    return ModelEntry(
+        id=row.id,
+        robot=row.robot,
+        name=row.name,
+        created=row.created,
+        created_by=row.created_by,
+        parent=row.parent,
+        job=row.job,
+        traces=tuple(sorted(traces)),
+        notes=row.notes,
+    )
+
+
+def _row(session: Session, robot: str, identity: str) -> ModelRow:
+    row = session.get(ModelRow, identity)
+    if row is None or row.robot != robot:
+        raise not_found(f"model {identity!r}", "GET …/models lists those there are")
+    return row

@@ -1,0 +1,30 @@
+"""The guide and the service say the same."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from daq.config.service import ServiceSettings
+
+ROOT = Path(__file__).parents[2]
+GUIDE = (ROOT / "docs" / "service.md").read_text("utf-8")
+
+
+def test_every_kind_of_problem_is_in_the_guide() -> None:
+    made = re.compile(r'(?:ProblemError\(\s*(?:\d+|error\.status_code),|conflict\()\s*"([a-z-]+)"')
+    text = "\n".join(path.read_text("utf-8") for path in (ROOT / "server").rglob("*.py"))
+    kinds = set(made.findall(text)) | set(re.findall(r'40[45]: "([a-z-]+)"', text)) | {"http"}
+    assert kinds == set(re.findall(r'<a id="([a-z-]+)"></a>', GUIDE))
+
+
+def test_every_setting_is_in_the_guide() -> None:
+    section = GUIDE.split("[server]\n")[1].split("```")[0]
+    named = set(re.findall(r"^(\w+) =", section, re.MULTILINE))
+    assert named == set(ServiceSettings.model_fields) - {"database"}
+
+
+def test_the_unit_keeps_what_the_guide_says() -> None:
+    unit = (ROOT / "deploy" / "ma2000-daq.service").read_text("utf-8")
+    assert "KillMode=mixed" in unit  # else the owner of the port would freeze an idle arm at every stop of the service
+    assert "DAQ_RUNTIME_FOLDER=/run/ma2000-daq" in unit

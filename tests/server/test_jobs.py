@@ -1,0 +1,135 @@
+"""Jobs: through real worker processes, and what becomes of them when those are killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from typing import Any
+
+import pytest
+
+from server.jobs.mailbox import PROGRESS
+from tests.server.service import Service
+
+SHORT = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.2}, "settle": 0.1, "hold": 0.1}
+
+
+@pytest.fixture
+def trace(service: Service) -> str:
+    """A short trace of joints 1 to 3."""
+    made = service.robot.post("/experiments", json={"spec": SHORT}).json()
+    ended = service.end_of(made["id"])
+    assert ended["state"] == "done", ended
+    number: str = ended["trace"]
+    return number
+
+
+def _submitted(service: Service, request: dict[str, Any]) -> dict[str, Any]:
+    answer = service.robot.post("/jobs", json=request)
+    assert answer.status_code == 201, answer.text
+    job: dict[str, Any] = answer.json()
+    return job
+
+
+def _until(service: Service, job: str, *states: str) -> dict[str, Any]:
+    while True:
+        found: dict[str, Any] = service.robot.get(f"/jobs/{job}").json()
+        if found["state"] in states:
+            return found
+        assert found["state"] in ("queued", "running"), found
+
+
+def _ended(service: Service, job: str) -> dict[str, Any]:
+    return _until(service, job, "done", "failed", "cancelled", "interrupted")
+
+
+def test_a_model_is_compared_with_a_trace_and_the_trace_is_kept(service: Service, trace: str) -> None:
+    job = _submitted(service, {"kind": "compare", "traces": [trace], "models": ["machine"]})
+    ended = _ended(service, job["id"])
+    assert (ended["state"], ended["reason"]) == ("done", "")
+    data = service.robot.get(f"/jobs/{job['id']}/result").json()["data"]
+    (signals,) = data["signals"]
+    assert signals["trace"] == trace
+    assert len(signals["time"]) == len(signals["measured"][0]) == len(signals["simulated"][0][0])
+    report = service.robot.get(f"/jobs/{job['id']}/report.html")
+    assert report.headers["Content-Security-Policy"].endswith("sandbox")
+    assert "<script" not in report.text
+    refused = service.robot.delete(f"/traces/{trace}")
+    assert (refused.status_code, refused.json()["type"]) == (409, "docs/service.md#trace-in-use")
+    assert service.robot.delete(f"/jobs/{job['id']}").status_code == 204
+    assert service.robot.delete(f"/traces/{trace}").status_code == 204
+    assert service.robot.get(f"/traces/{trace}").status_code == 404
+
+
+def test_what_a_job_cannot_do_is_its_reason(service: Service, trace: str) -> None:
+    request = {"kind": "fit", "traces": [trace], "effects": [{"name": "no_such_effect"}]}
+    ended = _ended(service, _submitted(service, request)["id"])
+    assert ended["state"] == "failed"
+    assert ended["reason"].startswith("effects: 'no_such_effect': not in the library")
+    assert service.robot.get(f"/jobs/{ended['id']}/result").status_code == 409
+
+
+@pytest.mark.parametrize(
+    ("request_", "status"),
+    [
+        ({"kind": "fit", "traces": ["no-such-trace"]}, 404),
+        ({"kind": "fit", "traces": []}, 422),
+        ({"kind": "fit", "traces": ["../../etc/passwd"]}, 422),
+        ({"kind": "validate", "traces": ["no-such-trace"], "model": "0123456789ab"}, 404),
+        ({"kind": "validate", "traces": ["a"], "model": "../secret"}, 422),
+        ({"kind": "shell", "command": "ls"}, 422),
+        ({"traces": ["a"]}, 422),
+    ],
+)
+def test_a_job_that_is_not_possible_is_refused(service: Service, request_: dict[str, Any], status: int) -> None:
+    answer = service.robot.post("/jobs", json=request_)
+    assert answer.status_code == status, answer.text
+    assert answer.headers["Content-Type"] == "application/problem+json"
+
+
+def test_a_killed_worker_interrupts_its_job_and_the_next_one_runs(service: Service, trace: str) -> None:
+    long = _submitted(service, {"kind": "fit", "traces": [trace], "starts": 20, "seed": 1})
+    following = _submitted(service, {"kind": "compare", "traces": [trace], "models": ["machine"]})
+    _until(service, long["id"], "running")
+    progress = service.folder / "service" / "jobs" / long["id"] / PROGRESS
+    while not progress.exists():
+        pass
+    os.kill(json.loads(progress.read_text())["process"], signal.SIGKILL)
+    ended = _ended(service, long["id"])
+    assert (ended["state"], ended["reason"]) == (
+        "interrupted", "its worker process ended: it was killed, or the memory did not suffice",
+    )  # fmt: skip
+    assert _ended(service, following["id"])["state"] == "done"
+
+
+def test_a_job_is_cancelled_before_and_while_it_runs(service: Service, trace: str) -> None:
+    running = _submitted(service, {"kind": "fit", "traces": [trace], "starts": 20, "seed": 2})
+    waiting = _submitted(service, {"kind": "fit", "traces": [trace], "seed": 3})
+    _until(service, running["id"], "running")
+    assert service.robot.post(f"/jobs/{waiting['id']}/cancel").json()["state"] == "cancelled"
+    assert service.robot.post(f"/jobs/{running['id']}/cancel").status_code == 200
+    ended = _ended(service, running["id"])
+    assert (ended["state"], ended["reason"]) == ("cancelled", "cancelled while it ran")
+    assert service.robot.post(f"/jobs/{running['id']}/cancel").status_code == 409
+
+
+def test_a_model_from_elsewhere_is_taken_in_once_and_one_with_a_program_is_refused(service: Service) -> None:
+    from daq.contracts.machine import load_machine
+    from model.machine_model.model import base_model
+
+    model = base_model(load_machine("ma2000"))
+    for _ in range(2):
+        answer = service.robot.post("/models", content=model.model_dump_json(), params={"name": "nominal"})
+        assert answer.status_code == 201, answer.text
+        assert answer.json()["id"] == model.identity
+    details = service.robot.get(f"/models/{model.identity}").json()
+    assert {one["name"] for one in details["parameters"]} == set(model.by_name)
+    with_program = json.loads(model.model_dump_json())
+    with_program["effects"] = [{"name": "own", "joints": [1], "file": {"name": "own.py", "text": "import os"}}]
+    answer = service.robot.post("/models", content=json.dumps(with_program), params={"name": "own"})
+    assert (answer.status_code, answer.json()["type"]) == (422, "docs/service.md#not-a-model")
+    for text in (b"", b"{}", b"[1]", b'"a"', b"\xff"):
+        assert service.robot.post("/models", content=text, params={"name": "x"}).status_code == 422
+    assert service.robot.delete(f"/models/{model.identity}").status_code == 204
+    assert service.robot.get("/models").json()["items"] == []
