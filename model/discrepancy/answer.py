@@ -162,6 +162,10 @@ class Diagnosis(_Part):
     verdict: Verdict
     summary: str
     steps: tuple[Step, ...]
+    rmse_fit: tuple[SignalError, ...] = ()
+    """From the model as it was given to the model that comes out, on the traces it was fitted to."""
+    rmse_holdout: tuple[SignalError, ...] = ()
+    """The same on the held-out traces."""
     remaining: tuple[RemainingShape, ...] = ()
     next_experiment: NextExperiment | None = None
     model_before: Model

@@ -15,6 +15,8 @@ from model.fitting.simulated import INITIAL
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 
+BLOCK = 10
+"""Samples whose errors may be alike."""
 START_STEPS = 2
 """Of the search for where a held-out trace begins."""
 
@@ -43,10 +45,17 @@ class HeldOut:
             return begun.residuals
         return searched(observation, begun, START_STEPS, range(len(held), len(unknowns))).residuals
 
-    def sum_of_squares(self, point: Point) -> float:
-        """Sum of the weighted squares; infinite where the simulation does not stay finite."""
-        weighted = self.observation.weighted(self.residuals(point))
-        return float(weighted @ weighted) if np.isfinite(weighted).all() else float("inf")
+    def rise(self, before: Point, after: Point) -> tuple[float, float]:
+        """How much the weighted sum of squares rises from one point to another, and the standard deviation that noise
+        alone gives that number: from the scatter of its blocks of 0.2 s or so, which are nearly independent. Infinite
+        where the simulation does not stay finite."""
+        old, new = (self.observation.weighted(self.residuals(point)) for point in (before, after))
+        if not np.isfinite(new).all():
+            return float("inf"), 0.0
+        risen = new**2 - old**2
+        width = BLOCK * len(self.observation.deviations)
+        blocks = np.add.reduceat(risen, np.arange(0, len(risen), width))
+        return float(risen.sum()), float(np.sqrt(len(blocks)) * blocks.std())
 
 
 def held_out(model: Model, traces: Sequence[Trace]) -> HeldOut | None:

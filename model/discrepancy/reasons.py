@@ -10,13 +10,17 @@ import numpy as np
 from daq.contracts.errors import SpecError
 from model.discrepancy.answer import Candidate, FoundValue, RemainingShape, Where
 from model.discrepancy.reasons_observations import Observation, Spoken
-from model.discrepancy.reasons_samples import Motions, Samples, motions
+from model.discrepancy.reasons_samples import Left, Motions, Samples, motions
 from model.discrepancy.reasons_table import telling
 from model.discrepancy.where import spoken_unit
 from model.discrepancy.where_dependence import drive_units
 from model.fitting.records import Record, Signal
 from model.machine_model.model import Model
 
+NOTICEABLE = 0.98
+"""Share to which an error must fall for the fall to be worth telling."""
+ALL = 0.95
+"""Share of the evidence by which a rival without any is behind."""
 CLEAR = 0.1
 """Share of a disagreement from which an observation is taken before those that come after it in an effect's list."""
 
@@ -24,7 +28,7 @@ CLEAR = 0.1
 def reason(
     effect: str, joints: Sequence[int], parameters: Mapping[str, FoundValue], evidence: float, margin: float,
     *, model: Model, before: Model, records: Sequence[Record], signal: Signal = "position",
-    runner_up: Candidate | None = None,
+    runner_up: Candidate | None = None, left: Left | None = None,
 ) -> str:  # fmt: skip
     """What speaks for an effect: the pattern that a record shows without it, its size, and what it takes off.
 
@@ -36,10 +40,12 @@ def reason(
         model: fitted, with the effect. before: the model without it; a parameter that it has already, such as the
             viscous friction of a machine file, goes back to its value there.
         runner_up: the next best that would be another answer.
+        left: measured − simulated of a model, where the caller simulates better than without noise: an arm without
+            noise sticks where the real one creeps, so that stiction or a dead zone would hardly show.
 
     Raises SpecError when a simulation does not stay finite.
     """
-    found = motions(model, without_effect(model, before, effect, joints, parameters), records, signal)
+    found = motions(model, without_effect(model, before, effect, joints, parameters), records, signal, left)
     own = list(joints) or [model.machine.modelled_joints[_most_affected(found)]]
     joint = max(own, key=lambda j: _gone(found.joint(model.machine.modelled_joints.index(j))))
     index = model.machine.modelled_joints.index(joint)
@@ -48,7 +54,7 @@ def reason(
     others = [j for j in own if j != joint]
     alike = f" (and likewise joint{'s' if len(others) > 1 else ''} {_listed(others)})" if others else ""
     called = telling(effect).called + _size(effect, parameters, joint)
-    rival = "" if runner_up is None else f"; {_named(runner_up)} would explain {margin:.0f} less of {evidence:.0f}"
+    rival = "" if runner_up is None else f"; {_beaten(runner_up, evidence, margin)}"
     return f"joint {joint} {seen.text}{alike}: {called}{_taken_off(model, samples, joint)}{rival}"
 
 
@@ -123,7 +129,16 @@ def _most_affected(found: Motions) -> int:
 def _taken_off(model: Model, samples: Samples, joint: int) -> str:
     factor, unit = spoken_unit(model, joint)
     first, last = (factor * float(np.sqrt(np.mean(r**2))) for r in (samples.without, samples.left))
+    if last > NOTICEABLE * first:
+        return f", whose mark is faint: the rms error stays near {last:.2g} {unit}"
     return f", which takes its rms error from {first:.2g} to {last:.2g} {unit}"
+
+
+def _beaten(rival: Candidate, evidence: float, margin: float) -> str:
+    """How far the next best is behind."""
+    if margin >= ALL * evidence:
+        return "no other candidate explains any of it"
+    return f"{_named(rival)} would explain {margin:.0f} less of {evidence:.0f}"
 
 
 def _spoken(model: Model, index: int) -> Spoken:

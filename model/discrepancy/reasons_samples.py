@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -59,9 +59,18 @@ class Motions:
         return Samples(**{name: values[:, index] for name, values in self.columns.items()}, rate=self.rate)  # type: ignore[arg-type]
 
 
-def motions(model: Model, without: Model, records: Sequence[Record], signal: Signal = "position") -> Motions:
-    """Records beside what a model with an effect and one without it make of them. Two simulations a record."""
+Left = Callable[[Model], Sequence[Floats]]
+"""Measured − simulated (m, n) a record, for a model: a simulation without noise unless the caller has a better one."""
+
+
+def motions(
+    model: Model, without: Model, records: Sequence[Record], signal: Signal = "position", left: Left | None = None
+) -> Motions:
+    """Records beside what a model with an effect and one without it make of them."""
     parts = [_of_record(model, without, record, signal) for record in records]
+    if left is not None:
+        for part, plain, full in zip(parts, left(without), left(model), strict=True):
+            part["without"], part["left"] = plain, full
     names = parts[0].keys()
     columns = {
         name: np.concatenate([p[name][run] for p, r in zip(parts, records, strict=True) for run in r.runs])

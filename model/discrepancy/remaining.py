@@ -37,6 +37,8 @@ ROUGHEST, SMOOTHEST = 1e-6, 1e6
 TRIALS = 16
 LEAST_EXCESS = 1.3
 """Mean square of the weighted residual from which there is anything to explain."""
+LEAST_EXPLAINED = 0.05
+"""Share of the torque's variance below which a dependence is no shape."""
 LEAST_SIGNIFICANCE = 4.0
 """Standard deviations of a dependence below which it is not shown."""
 
@@ -72,7 +74,7 @@ def shapes(
         size = float(np.sqrt(np.mean(torque**2)))
         for against in AGAINST:
             bins = dependence(torque, j, against, known, 1e-3 * size) if size > 0 else None
-            if bins is None or bins.significance < LEAST_SIGNIFICANCE:
+            if bins is None or bins.significance < LEAST_SIGNIFICANCE or bins.explained < LEAST_EXPLAINED:
                 continue
             found.append(RemainingShape(
                 joint=joint, against=against, unit=known.units[against][j],

@@ -15,7 +15,7 @@ class Thresholds:
         unexplained: misfit (mean square of the weighted residual) above which something is missing that none of the
             known effects is.
         least_share: share of the excess misfit that an answer must explain, or it only resembles what is missing.
-        worse: rise of the held-out sum of squares (in variances of a reading) at which a step is rejected.
+        worse: rise of the held-out sum of squares, in its own standard deviations, at which a step is rejected.
         quiet_joint: misfit of a joint up to which, once an effect has been added, nothing more is looked for there.
         interesting: gain of a probe from which a candidate is worth a fit.
     """
@@ -24,7 +24,7 @@ class Thresholds:
     margin: float = 4.0
     unexplained: float = 1.12
     least_share: float = 0.8
-    worse: float = 9.0
+    worse: float = 2.0
     quiet_joint: float = 1.08
     interesting: float = 12.0
 

@@ -32,6 +32,10 @@ WINDOW = 0.3
 """s of one cell of the map."""
 CHANCE = 0.01
 """Probability that noise alone makes any cell of the map significant."""
+QUIET, QUIET_OF_NOISE = 0.25, 0.75
+"""Share of the windows that count as quiet, and the mean square below which they lie where there is noise alone."""
+MOST_NOISE = 1.5
+"""Times the stated variance that noise may have."""
 LEAST = 0.3
 """Least deviation of a residual, in that of noise, from which its correlation is taken."""
 SPOKEN = {
@@ -67,7 +71,8 @@ def located(
 
     Args:
         residuals: per record (m, n) measured − simulated, in the unit of the measurement.
-        deviations: (n,) standard deviation of such a residual when nothing is wrong.
+        deviations: (n,) standard deviation of such a residual when nothing is wrong. Where even the quietest quarter of
+            a joint's windows has more, up to 1.5 times the variance, that counts as the noise.
         traces: the same records as traces, where α(t) is wanted; needs the recorded drive (about 0.5 s).
 
     Raises:
@@ -75,7 +80,7 @@ def located(
     """
     _check(records, residuals, deviations)
     phases = [phases_of(model, record) for record in records]
-    weighted = [r / deviations for r in residuals]
+    weighted = _quietened([r / deviations for r in residuals], records)
     correlations = [
         correlation_of([w[run, j] for w, record in zip(weighted, records, strict=True) for run in record.runs], LEAST)
         for j in range(model.joint_count)
@@ -91,6 +96,18 @@ def located(
     return Where(
         joint=joint, phase=phase, summary=summary, cells=tuple(cells), dependences=tuple(dependences), moving=moving
     )
+
+
+def _quietened(weighted: Sequence[Floats], records: Sequence[Record]) -> list[Floats]:
+    """Weighted residuals in terms of the noise that the record's quietest windows show, between what is stated and
+    `MOST_NOISE` times its variance: a sensor a little noisier than stated is no disagreement."""
+    squares = [
+        np.mean(signal[window] ** 2, axis=0)
+        for signal, record in zip(weighted, records, strict=True)
+        for run in record.runs for window in _windows(run, record.inputs.period)
+    ]  # fmt: skip
+    quiet = np.quantile(np.array(squares), QUIET, axis=0) / QUIET_OF_NOISE
+    return [signal / np.sqrt(np.clip(quiet, 1.0, MOST_NOISE)) for signal in weighted]
 
 
 def _check(records: Sequence[Record], residuals: Sequence[Floats], deviations: Floats) -> None:

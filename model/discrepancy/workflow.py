@@ -106,6 +106,8 @@ def diagnose(
         verdict=verdict, summary=_summary(verdict, steps, remaining), steps=tuple(steps), remaining=remaining,
         model_before=model, model_after=_adopted(model, current.point, case.names),
         traces=case.names, holdout=tuple(t.record.trace_id for t in holdout),
+        rmse_fit=errors(observation, model, given.residuals, current.point.residuals),
+        rmse_holdout=_held_errors(case, given, current.point),
         seconds=time.perf_counter() - begun, robot_seconds=float(sum(t.time[-1] - t.time[0] for t in traces)),
         notes=_notes(case),
     )  # fmt: skip
@@ -173,24 +175,20 @@ def _turn(
     observation, model = case.observation, best.judged.point.model
     where = _where(case, current.point)
     values = found_values(best)
-    held_errors: tuple[SignalError, ...] = ()
-    removed = None
-    if case.held is not None:
-        pair = case.held.residuals(current.point), case.held.residuals(best.judged.point)
-        held_errors = errors(case.held.observation, model, *pair)
-        removed = excess_removed(held_errors)
+    held_errors = _held_errors(case, current.point, best.judged.point)
     listed = tuple(_listed(r) for r in ranking.fitted) + _only_probed(ranking)
     reason = reasons.reason(
         best.candidate.name, best.candidate.joints, values, best.evidence, decision.margin,
         model=_with_point(model, best.judged.point), before=_with_point(current.point.model, current.point),
-        records=observation.records, runner_up=_runner_up(listed),
+        records=observation.records, runner_up=_runner_up(listed), left=_left(observation, best.judged.point),
     )  # fmt: skip
     step = Step(
         effect=best.candidate.name, joints=best.candidate.joints, parameters=values, evidence=best.evidence,
         margin=decision.margin, candidates=listed, group=tuple(_listed(r) for r in decision.group),
         rmse_fit=errors(observation, model, current.point.residuals, best.judged.point.residuals),
-        rmse_holdout=held_errors, excess_removed_holdout=removed,
-        sum_lambda2_before=_sum_lambda2(current.point), sum_lambda2_after=_sum_lambda2(best.judged.point),
+        rmse_holdout=held_errors, excess_removed_holdout=excess_removed(held_errors),
+        sum_lambda2_before=_sum_lambda2(current.point, current.point),
+        sum_lambda2_after=_sum_lambda2(best.judged.point, current.point),
         where=where, reason=reason, adopted=rejected is None, rejected_because=rejected,
     )  # fmt: skip
     if rejected is not None:
@@ -199,13 +197,23 @@ def _turn(
     return step, judge(observation, settled)
 
 
+def _held_errors(case: _Case, before: Point, after: Point) -> tuple[SignalError, ...]:
+    """Errors on the held-out traces; none where there are no such traces."""
+    if case.held is None:
+        return ()
+    return errors(case.held.observation, after.model, case.held.residuals(before), case.held.residuals(after))
+
+
 def _rejected(case: _Case, before: Point, best: Refitted) -> str | None:
     """Why the step is not taken, if held-out traces speak against it."""
     if case.held is None:
         return None
-    rise = case.held.sum_of_squares(best.judged.point) - case.held.sum_of_squares(before)
-    if rise > case.thresholds.worse:
-        return f"the error on the held-out traces rises: the sum of squares by {rise:.0f} variances of a reading"
+    rise, deviation = case.held.rise(before, best.judged.point)
+    if rise > case.thresholds.worse * deviation:
+        return (
+            f"the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} variances of a "
+            "reading"
+        )
     return None
 
 
@@ -227,10 +235,21 @@ def _verdict(
     return "unknown-effect" if unexplained else "nothing-significant"
 
 
-def _sum_lambda2(point: Point) -> float:
-    """Σλ² of the distortion method: 1 where deviations as large as expected explain what is left."""
-    names = [u.name for u in point.unknowns]
-    return sum_of_contributions(_with_point(point.model, point), names, point.weighted, point.tangents)
+def _left(observation: Observation, point: Point) -> reasons.Left:
+    """Measured − simulated of any model with the noise and the starts of a point: an effect is taken out, all else
+    stays."""
+    kept = [k for k, u in enumerate(point.unknowns) if u.name not in point.model.by_name]
+    unknowns, values = [point.unknowns[k] for k in kept], point.values[kept]
+    return lambda model: observation.residuals(model, unknowns, values, point.noise)
+
+
+def _sum_lambda2(point: Point, before: Point) -> float:
+    """Σλ² of the distortion method over the parameters that were there before a step: at 1 or more, deviations as large
+    as expected explain what is left."""
+    known = {u.name for u in before.unknowns}
+    kept = [k for k, u in enumerate(point.unknowns) if u.name in known]
+    names = [point.unknowns[k].name for k in kept]
+    return sum_of_contributions(_with_point(point.model, point), names, point.weighted, point.tangents[kept])
 
 
 def _where(case: _Case, point: Point) -> Where:

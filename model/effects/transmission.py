@@ -51,7 +51,7 @@ TRANSMISSION = (
     ),
     Effect(
         "gear_loss",
-        physics="τ = −κ |n K_T i| z: a share κ of the motor's torque is lost",
+        physics="τ = −κ |n K_T i − n² v_eff q̇_m| z: a share κ of the torque that the gear transmits is lost",
         source="load-dependent gear friction, as an efficiency 1 − κ",
         parameters=(EffectParameter("loss", at.GEAR_LOSS, "1", low=0.0, high=0.95, deviation=0.1),),
     ),

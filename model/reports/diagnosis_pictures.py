@@ -90,8 +90,8 @@ def _shade_legend() -> list[object]:
     ]
 
 
-def dependence_picture(where: Where, joint: int) -> Picture | None:
-    """Mean residual of a joint against each quantity."""
+def dependence_picture(where: Where, joint: int, residual_unit: str) -> Picture | None:
+    """Mean residual (of that unit) of a joint against each quantity."""
     own = [d for d in where.dependences if d.joint == joint]
     if not own:
         return None
@@ -99,8 +99,8 @@ def dependence_picture(where: Where, joint: int) -> Picture | None:
     def draw(figure: Figure) -> None:
         axes = panels(figure, 1, len(own), sharey=True)[0]
         for place, one in zip(axes, own, strict=True):
-            _dependence(place, one, COLOURS[(joint - 1) % len(COLOURS)])
-        axes[0].set_ylabel("mean residual / °" if _turns(where, joint) else "mean residual / mm")
+            _dependence(place, one, COLOURS[(joint - 1) % len(COLOURS)], shown_unit(residual_unit)[0])
+        axes[0].set_ylabel(f"mean residual / {shown_unit(residual_unit)[1]}")
 
     strongest = max(own, key=lambda d: d.significance)
     caption = (
@@ -110,11 +110,10 @@ def dependence_picture(where: Where, joint: int) -> Picture | None:
     return Picture(drawn(draw, 1.75), caption)
 
 
-def _dependence(axes: Axes, one: Dependence, colour: str) -> None:
+def _dependence(axes: Axes, one: Dependence, colour: str, scale: float) -> None:
     factor, unit = shown_unit(one.unit)
-    lengths = 180 / np.pi if "m" not in one.unit or one.unit == "N·m" else 1e3
     kept = [
-        (x * factor, y * lengths, (e or 0.0) * lengths)
+        (x * factor, y * scale, (e or 0.0) * scale)
         for x, y, e in zip(one.centres, one.residual, one.deviation, strict=True)
         if y is not None
     ]
@@ -130,11 +129,6 @@ def _dependence(axes: Axes, one: Dependence, colour: str) -> None:
     axes.set_title(f"{QUANTITIES[one.against]}: {one.significance:.3g} σ", fontsize=7.2)
     axes.set_xlabel("" if one.against == "direction" else unit, labelpad=1)
     axes.tick_params(labelsize=6.5)
-
-
-def _turns(where: Where, joint: int) -> bool:
-    units = {d.unit for d in where.dependences if d.joint == joint and d.against == "position"}
-    return units != {"m"}
 
 
 def evidence_picture(candidates: Sequence[Candidate], chosen: Sequence[Candidate]) -> Picture:

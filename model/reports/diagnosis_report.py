@@ -67,20 +67,22 @@ def diagnosis_page(found: Diagnosis, comparison: Comparison | None = None) -> st
 
 def _step_sections(number: int, count: int, step: Step) -> list[Section]:
     turn = f"Step {number}: " if count > 1 else ""
-    found = [Section(f"{turn}where they disagree", _where(step.where))]
+    found = [Section(f"{turn}where they disagree", _where(step))]
     found.append(Section(f"{turn}what is missing", _what(step)))
     if step.effect is not None:
         found.append(Section(f"{turn}what adding it did", _shown(step)))
     return [Section(s.title[0].upper() + s.title[1:], s.blocks) for s in found]
 
 
-def _where(where: Where) -> tuple[Block, ...]:
+def _where(step: Step) -> tuple[Block, ...]:
+    where = step.where
     summary = where.summary[0].upper() + where.summary[1:]
     blocks: list[Block] = [Text(f"{summary}.", "plain" if where.joint is None else "warning")]
     if where.cells:
         blocks += [map_picture(where, trace) for trace in sorted({c.trace for c in where.cells})]
     joint = where.joint if where.joint is not None else _most_dependent(where)
-    if joint is not None and (picture := dependence_picture(where, joint)) is not None:
+    unit = next((e.unit for e in step.rmse_fit if e.joint == joint), "rad")
+    if joint is not None and (picture := dependence_picture(where, joint, unit)) is not None:
         blocks.append(picture)
     if where.moving:
         blocks.append(_moving(where))
@@ -143,7 +145,12 @@ def _gap(step: Step) -> str:
 
 
 def _distortion(before: float, after: float) -> str:
-    told = f"Σλ² goes from {before:.3g} to {after:.3g}. "
+    told = f"Σλ² of the distortion method goes from {before:.3g} to {after:.3g}. "
+    if before >= 1.0:
+        return told + (
+            "Above 1 already before: judged by the size of the error alone, deviations of the parameters as large "
+            "as expected would explain it. What speaks for the effect is the pattern, which they cannot make."
+        )
     if after >= 1.0:
         return told + "At 1 or more, deviations of the parameters as large as expected explain all that is left."
     return told + "Below 1 the expected deviations of the parameters do not explain all that is left."

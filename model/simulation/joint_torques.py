@@ -83,11 +83,12 @@ def mean_current(joint: NDArray[Any], rise: Any, current: Any, steady: Any, h: A
 @internal
 def extra_torque(
     joint: NDArray[Any], flags: int, time: complex, q: complex, speed: complex, z: complex, stuck: complex,
-    motor_torque: complex,
+    through: complex,
 ) -> Any:  # fmt: skip
     """Torque on the joint from effects that most models leave out, N·m; zero at their null values.
 
-    `stuck` is 1 where the joint sticks, else 0; `motor_torque` is the motor's own at the joint.
+    `stuck` is 1 where the joint sticks, else 0; `through` is what the gear transmits, seen at the joint: the motor's
+    torque less what its own side's viscous friction takes.
     """
     torque = 0.0 * (q + time + joint[at.COULOMB])
     if flags & at.HAS_STICTION:
@@ -97,7 +98,7 @@ def extra_torque(
     if joint[at.DIRECTION] != 0.0:
         torque -= 0.5 * joint[at.DIRECTION] * z * z
     if joint[at.GEAR_LOSS] != 0.0:
-        torque -= z * joint[at.GEAR_LOSS] * magnitude(motor_torque)
+        torque -= z * joint[at.GEAR_LOSS] * magnitude(through)
     if joint[at.RIPPLE_SINE] != 0.0 or joint[at.RIPPLE_COSINE] != 0.0:
         s, c = sin_cos(joint[at.RIPPLE_CYCLES] * q)
         torque += joint[at.RIPPLE_SINE] * s + joint[at.RIPPLE_COSINE] * c
@@ -121,7 +122,8 @@ def special_torque(
         current = mean_current(joint, state[RISE], state[CURRENT], steady, h)
     to_torque = joint[at.GEAR] * joint[at.TORQUE_CONSTANT]
     torque = to_torque * (current - steady)
-    return torque + extra_torque(joint, flags, time, q, speed, z, state[STUCK], to_torque * current)
+    through = to_torque * current - joint[at.GEAR] * joint[at.GEAR] * joint[at.VISCOUS] * rotor_speed
+    return torque + extra_torque(joint, flags, time, q, speed, z, state[STUCK], through)
 
 
 @internal

@@ -63,6 +63,7 @@ TRANSLATIONS: dict[str, Translation] = {
     "dead_zone": _same(width="width"),
     "supply_limit": _supply,
     "torque_ripple": _same(cycles="periods"),
+    "gear_loss": _same(loss="loss"),
     "backlash": _same(gap="play"),
     "joint_compliance": _same(compliance="compliance"),
     "link_mass": _same(added="mass"),
@@ -80,7 +81,6 @@ TRANSLATIONS: dict[str, Translation] = {
 
 LEFT_OUT: dict[str, str] = {
     "stiction": "the mock's bond fades with speed, the model's breaks: their breakaway torques are not one quantity",
-    "gear_loss": "a share of the torque behind the motor's viscous friction there, of the motor's own torque here",
     "resistance_drift": "the mock's winding heats with its risen resistance, the model's with the cold one",
     "payload": "the mock's load has its centre up to 8 cm off, the model's has not: the masses that fit best differ",
     "potentiometer_nonlinearity": "a loaded divider there, a sine series here",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import BoardPid, DcMotor, NoController, SampledPid
 from model.discrepancy.torque_space.balance import levels_along
+from model.discrepancy.torque_space.options import TorqueOptions
 from model.discrepancy.torque_space.records import TorqueRecord
 from model.effects.effect import Effect
 from model.effects.library import library
@@ -73,19 +74,21 @@ class Trial:
 
 
 def trials(
-    model: Model, records: Sequence[TorqueRecord], residual: Sequence[Floats], names: Sequence[str] | None
+    model: Model, records: Sequence[TorqueRecord], residual: Sequence[Floats], options: TorqueOptions
 ) -> Iterator[Trial]:
     """Every effect that the model lacks, joint by joint, and those of the whole machine once.
 
     Raises SpecError for a name that the library has not.
     """
-    known = library()
+    known, names = library(), options.effects
     if names is not None and (wrong := [n for n in names if n not in known]):
         raise SpecError(f"effect {wrong[0]!r}: not in the library; it has {', '.join(known)}")
     for name, effect in known.items():
         if name in NOT_IN_TORQUE_SPACE or (names is not None and name not in names):
             continue
-        places: list[tuple[int, ...]] = [()] if effect.whole_machine else [(j,) for j in model.machine.modelled_joints]
+        places: list[tuple[int, ...]] = (
+            [()] if effect.whole_machine else [(j,) for j in options.joints or model.machine.modelled_joints]
+        )
         for joints in places:
             if _present(model, name, joints) or not _possible(model, effect, joints):
                 continue
@@ -226,8 +229,8 @@ def _ripple(model: Model, column: int, records: Sequence[TorqueRecord], left: Se
     every = np.concatenate([r.position[r.rows, column][r.moving[:, column]] for r in records])
     if np.ptp(every) <= 0:
         return
-    fastest = float(np.quantile(_magnitudes(lambda r: r.speed, records, column), 0.5))
-    highest = 2 * np.pi * records[0].cutoff / max(fastest, 1e-9)
+    slow = float(np.quantile(_magnitudes(lambda r: r.speed, records, column), 0.25))
+    highest = 2 * np.pi * records[0].cutoff / max(slow, 1e-9)
     lowest = 2 * np.pi / float(np.ptp(every))
     prismatic = model.machine.joint(column + 1).kind == "prismatic"
     grid = _scanned(max(lowest, 0.5), min(highest, 1000.0), 0.7 * np.pi / float(np.ptp(every)))

@@ -13,6 +13,7 @@ from daq.contracts.errors import TraceError
 from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.discrepancy.answer import Candidate, Diagnosis, Step, Verdict
+from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.torque_space import judging
 from model.discrepancy.torque_space.balance import TorqueBalance
 from model.discrepancy.torque_space.candidates import NOT_IN_TORQUE_SPACE
@@ -21,7 +22,7 @@ from model.discrepancy.torque_space.fitting import Data, TorqueFit, fit
 from model.discrepancy.torque_space.likelihood import stretches_of
 from model.discrepancy.torque_space.locating import located, remaining_shapes
 from model.discrepancy.torque_space.noise_floor import noise_floor
-from model.discrepancy.torque_space.options import TorqueOptions
+from model.discrepancy.torque_space.options import TorqueOptions, torque_options
 from model.discrepancy.torque_space.reasons import reason
 from model.discrepancy.torque_space.records import TorqueRecord, torque_records
 from model.discrepancy.torque_space.search import Fitted, Turn, evidence, look
@@ -39,8 +40,8 @@ SHOWN = 12
 
 
 def diagnose_torques(
-    model: Model, traces: Sequence[Trace], holdout: Sequence[Trace] = (), options: TorqueOptions | None = None,
-    progress: Progress = silent, cancel: Cancel | None = None,
+    model: Model, traces: Sequence[Trace], holdout: Sequence[Trace] = (),
+    options: DiagnosisOptions | TorqueOptions | None = None, progress: Progress = silent, cancel: Cancel | None = None,
 ) -> Diagnosis:  # fmt: skip
     """Name the effects that recorded drive and motion show and the model lacks, add them, and show the gap shrink.
 
@@ -53,12 +54,12 @@ def diagnose_torques(
     begun = time.perf_counter()
     if not traces:
         raise TraceError("no traces: a diagnosis needs at least one")
-    options = options or TorqueOptions()
-    cutoff = options.cutoff or chosen_cutoff(traces, model.machine)
+    chosen = torque_options(options)
+    cutoff = chosen.cutoff or chosen_cutoff(traces, model.machine)
     progress(0.0, f"low-passing the records at {cutoff:g} Hz")
     work = _Workflow(
         model, torque_records(traces, model.machine, cutoff), torque_records(holdout, model.machine, cutoff),
-        noise_floor(model, traces, cutoff), options, progress, cancel or Never(),
+        noise_floor(model, traces, cutoff), chosen, progress, cancel or Never(),
     )  # fmt: skip
     work.run()
     robot = sum(float(t.time[-1] - t.time[0]) for t in (*traces, *holdout))
@@ -85,6 +86,7 @@ class _Workflow:
         self.data = Data(stretches_of(self.records), np.maximum(FLOOR_SHARE * self.floor, 1e-12))
         self.begin = self.model
         self.now = self._fit(self.model)
+        self.first = self.now.values
         self.notes.append(tolerances(self.model)[1])
 
     def run(self) -> None:
@@ -92,7 +94,7 @@ class _Workflow:
         while len([s for s in self.steps if s.adopted]) < self.options.most_steps:
             done = len(self.steps)
             self._tell(0.1, "what is missing")
-            turn = look(self.model, self.now, self.data, self.options.effects, self._tell, self.cancel)
+            turn = look(self.model, self.now, self.data, self.options, self._tell, self.cancel)
             if not self._decide(turn):
                 break
             self._tell(0.9, "what is not needed any more")
@@ -198,6 +200,13 @@ class _Workflow:
                 )
                 self.notes.append(f"{names}, step {index + 1}, was taken out again: a later effect explains it")
 
+    def _shares(self) -> str:
+        """Residual as a share of the recorded torque, before and after, a figure that other work gives too."""
+        records, where = (self.held, "held-out traces") if self.held else (self.records, "the traces fitted to")
+        before = judging.relative_torque_error(self.begin.with_values(self.first), records)
+        after = judging.relative_torque_error(self.model.with_values(self.now.values), records)
+        return f"torque left unexplained on {where}: {before:.1%} of the recorded before, {after:.1%} after"
+
     def answer(
         self, before: Model, traces: list[str], holdout: list[str], seconds: float, robot: float, cutoff: float
     ) -> Diagnosis:
@@ -219,7 +228,7 @@ class _Workflow:
         return Diagnosis(
             verdict=verdict, summary=_summary(adopted, bool(shapes)), steps=tuple(self.steps), remaining=shapes,
             model_before=before, model_after=after, traces=tuple(traces), holdout=tuple(holdout), seconds=seconds,
-            robot_seconds=robot, notes=(*_assumptions(cutoff), *self.notes),
+            robot_seconds=robot, notes=(self._shares(), *_assumptions(cutoff), *self.notes),
         )  # fmt: skip
 
 

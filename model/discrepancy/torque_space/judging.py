@@ -60,6 +60,13 @@ def _fold(count: int, fold: int) -> NDArray[np.bool_]:
     return mask
 
 
+def relative_torque_error(model: Model, records: tuple[TorqueRecord, ...]) -> float:
+    """√(Σ residual² / Σ torque²) over all joints and compared samples, joints at rest included."""
+    balance = TorqueBalance(model, records)
+    left = sum(float((r**2).sum()) for r in balance.residual({}))
+    return float(np.sqrt(left / sum(float((r**2).sum()) for r in balance.supplied_by_drive())))
+
+
 def share_removed(fitted_before: Floats, fitted_after: Floats, before: Floats, after: Floats) -> float:
     """Share of the mean square that went, on records not fitted to, summed over the joints on which the fit fell."""
     with np.errstate(invalid="ignore"):

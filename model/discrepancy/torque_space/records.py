@@ -43,9 +43,9 @@ LEAST_REST = 0.15
 class TorqueRecord:
     """A record of k samples on an even grid of which m are compared.
 
-    position, speed, acceleration, drive: (k, n) in SI. contact: (k, n) direction of motion as friction has it, in [−1, 1];
-    it turns within a few standard deviations of the speed's noise, or a sample. moving: (m, n) False where a joint rests: friction then takes
-    whatever value holds it, so that the torque says nothing.
+    position, speed, acceleration, drive: (k, n) in SI. contact: (k, n) direction of motion as friction has it, in
+    [−1, 1]; it turns within a few standard deviations of the speed's noise, or a sample. moving: (m, n) False where a
+    joint rests: friction then takes whatever value holds it, so that the torque says nothing.
     """
 
     name: str

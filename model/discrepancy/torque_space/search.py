@@ -13,6 +13,7 @@ from model.discrepancy.torque_space.balance import TorqueBalance
 from model.discrepancy.torque_space.candidates import Start, Trial, trials
 from model.discrepancy.torque_space.fitting import Data, Slopes, TorqueFit, fit, slopes_of
 from model.discrepancy.torque_space.likelihood import noise_model
+from model.discrepancy.torque_space.options import TorqueOptions
 from model.discrepancy.torque_space.probing import Probe, prober
 from model.discrepancy.torque_space.tolerances import Adjustable
 from model.machine_model.model import Model
@@ -65,9 +66,7 @@ class Turn:
     trials: int
 
 
-def look(
-    model: Model, now: TorqueFit, data: Data, names: Sequence[str] | None, progress: Progress, cancel: Cancel
-) -> Turn:
+def look(model: Model, now: TorqueFit, data: Data, options: TorqueOptions, progress: Progress, cancel: Cancel) -> Turn:
     """Every effect that the model lacks, against the residuals of a fit.
 
     Raises CancelledError when asked to end.
@@ -76,7 +75,7 @@ def look(
     probing = prober(now, slopes, data)
     fitted_model = model.with_values(now.values)
     probes: list[Probe] = []
-    for trial in trials(fitted_model, now.balance.records, now.residual, names):
+    for trial in trials(fitted_model, now.balance.records, now.residual, options):
         if cancel.is_set():
             raise CancelledError("the diagnosis was cancelled")
         progress(0.3, f"trying {trial.effect.replace('_', ' ')}{_on(trial.joints)}")

@@ -65,9 +65,9 @@ def amplified(drive: NDArray[Any], joints: NDArray[Any], out: NDArray[Any]) -> N
 
 @compiled
 def supplied_torque(
-    position: NDArray[Any], speed: NDArray[Any], contact: NDArray[Any], rotor_speed: NDArray[Any], volts: NDArray[Any], time: NDArray[Any],
-    joints: NDArray[Any], flags: NDArray[Any], level: NDArray[Any], load: NDArray[Any], own: NDArray[Any],
-    motor: NDArray[Any], beside: NDArray[Any],
+    position: NDArray[Any], speed: NDArray[Any], contact: NDArray[Any], rotor_speed: NDArray[Any],
+    volts: NDArray[Any], time: NDArray[Any], joints: NDArray[Any], flags: NDArray[Any], level: NDArray[Any],
+    load: NDArray[Any], own: NDArray[Any], motor: NDArray[Any], beside: NDArray[Any],
 ) -> None:  # fmt: skip
     """Torques (k, n) on the joints: `motor` of the motors, before any loss; `beside` of friction and all other effects.
 
