@@ -23,8 +23,10 @@ from daq.safety import Violation, check_plan
 from daq.traces.room import RESERVE
 from daq.trajectories import Plan, plan, start_angles
 from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
+from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
 from server.queue.length import LONGEST, longest_length
+from server.queue.states import ENDS
 from server.services import RobotServices
 
 MOST_SHOWN = 5000
@@ -87,9 +89,17 @@ def preview_experiment(request: ExperimentRequest, one: RobotPart, _: Viewer) ->
 
 
 @router.get("/{experiment}")
-def get_experiment(experiment: Identity, one: RobotPart, found: ServicesPart, _: Viewer) -> Experiment:
-    """One experiment: its state, how far it is, what became of it."""
-    return one.queue.as_told(found.experiments.get(one.robot.name, experiment))
+async def get_experiment(
+    experiment: Identity, one: RobotPart, found: ServicesPart, _: Viewer, wait: Wait = 0
+) -> Experiment:
+    """One experiment: its state, how far it is, what became of it. With `wait` the answer comes when it has ended."""
+    return await when_ended(
+        one.hub,
+        {"events"},
+        lambda: one.queue.as_told(found.experiments.get(one.robot.name, experiment)),
+        lambda now: now.state in ENDS,
+        wait,
+    )
 
 
 @router.patch("/{experiment}")

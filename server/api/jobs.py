@@ -25,7 +25,9 @@ from daq.contracts.service.jobs import (
 from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
 from server.jobs.desk import REPORT, RESULT
 from server.jobs.models import LARGEST_MODEL
+from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
+from server.queue.states import ENDS
 from server.services import RobotServices, Services
 
 router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
@@ -65,9 +67,15 @@ def list_jobs(
 
 
 @router.get("/jobs/{job}", tags=["jobs"])
-def get_job(job: Identity, one: RobotPart, found: ServicesPart, _: Viewer) -> Job:
-    """One job: its state, how far it is, what became of it."""
-    return one.jobs.as_told(found.jobs.get(one.robot.name, job))
+async def get_job(job: Identity, one: RobotPart, found: ServicesPart, _: Viewer, wait: Wait = 0) -> Job:
+    """One job: its state, how far it is, what became of it. With `wait` the answer comes when it has ended."""
+    return await when_ended(
+        one.hub,
+        {"jobs"},
+        lambda: one.jobs.as_told(found.jobs.get(one.robot.name, job)),
+        lambda now: now.state in ENDS,
+        wait,
+    )
 
 
 @router.post("/jobs/{job}/cancel", tags=["jobs"])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from pydantic import BaseModel
@@ -92,6 +93,16 @@ class Hub:
     def leave(self, client: Client) -> None:
         """It has gone."""
         self._clients.discard(client)
+
+    @contextmanager
+    def listening(self, topics: set[Topic]) -> Iterator[asyncio.Event]:
+        """An event that is set whenever there is news of these topics: for whoever waits without a WebSocket."""
+        client = Client(Outbox(self._clock.monotonic()), "waiting", topics)
+        self.join(client)
+        try:
+            yield client.something
+        finally:
+            self.leave(client)
 
     def shown(self, topics: set[Topic]) -> list[str]:
         """What clients of these topics see now, encoded."""

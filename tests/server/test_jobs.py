@@ -34,7 +34,7 @@ def _submitted(service: Service, request: dict[str, Any]) -> dict[str, Any]:
 
 def _until(service: Service, job: str, *states: str) -> dict[str, Any]:
     while True:
-        found: dict[str, Any] = service.robot.get(f"/jobs/{job}").json()
+        found: dict[str, Any] = service.robot.get(f"/jobs/{job}", params={"wait": 1}).json()
         if found["state"] in states:
             return found
         assert found["state"] in ("queued", "running"), found

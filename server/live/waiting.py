@@ -1,0 +1,38 @@
+"""Answers that wait until something has ended: for programs that hold no WebSocket."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Annotated, TypeVar
+
+from fastapi import Query
+from fastapi.concurrency import run_in_threadpool
+
+from daq.contracts.service.live import Topic
+from server.live.hub import Hub
+
+LOOK_EVERY = 5.0
+"""s after which is looked anyway: news may be lost with a database that is busy."""
+Wait = Annotated[
+    float, Query(ge=0, le=60, description="s for which the answer may wait for the end; 0 answers at once.")
+]
+T = TypeVar("T")
+
+
+async def when_ended(hub: Hub, topics: set[Topic], look: Callable[[], T], ended: Callable[[T], bool], wait: float) -> T:
+    """What `look` (on a thread) finds as soon as it has ended; after `wait` s at the latest, whatever it is then."""
+    loop = asyncio.get_running_loop()
+    until = loop.time() + wait
+    with hub.listening(topics) as news:
+        while True:
+            news.clear()
+            found = await run_in_threadpool(look)
+            left = until - loop.time()
+            if ended(found) or left <= 0:
+                return found
+            try:
+                async with asyncio.timeout(min(left, LOOK_EVERY)):
+                    await news.wait()
+            except TimeoutError:
+                pass
