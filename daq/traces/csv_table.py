@@ -23,7 +23,11 @@ from daq.traces.naming import trace_id_of
 from daq.traces.recording import software
 
 SIGNALS = ("set_point", "position", "drive", "velocity")
-"""Columns a joint may have, after which comes `_` and its number. Only `position` is needed."""
+"""Columns a joint may have, after which comes `_` and its number. `position` is needed, or `velocity` in its place: a
+position is then the integral of the speed, from 0."""
+
+INTEGRATED = "Positions are integrals of the measured speeds, from 0."
+"""What a trace says whose record has no positions."""
 
 _COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-6])")
 
@@ -100,7 +104,17 @@ def import_csv(path: Path) -> Trace:
             raise TraceError(f"{path}: row 1: column '{name}_{lacking}' is missing; joint {having[0]} has one")
         if having:
             signals[name] = table[:, [header.index(f"{name}_{joint}") for joint in joints]]
-    return Trace(_record(path, beside), joints, table[:, 0], **signals)
+    record = _record(path, beside)
+    if "position" not in signals:
+        signals["position"] = _travelled(table[:, 0], signals["velocity"])
+        record = record.model_copy(update={"notes": f"{record.notes} {INTEGRATED}".strip()})
+    return Trace(record, joints, table[:, 0], **signals)
+
+
+def _travelled(time: Floats, velocity: Floats) -> Floats:
+    """Positions (k, j) from 0 for speeds (k, j), by the trapezoidal rule."""
+    steps = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time)[:, None]
+    return np.concatenate([np.zeros((1, velocity.shape[1])), np.cumsum(steps, axis=0)])
 
 
 def _record(path: Path, beside: Beside) -> TraceRecord:
@@ -136,7 +150,8 @@ def _identity(path: Path) -> str:
 
 
 def _joints(path: Path, header: list[str], beside: Beside) -> tuple[int, ...]:
-    found = sorted(int(name.removeprefix("position_")) for name in header if name.startswith("position_"))
+    measured = "position_" if any(name.startswith("position_") for name in header) else "velocity_"
+    found = sorted(int(name.removeprefix(measured)) for name in header if name.startswith(measured))
     wanted = beside.joints or tuple(found)
     for joint in wanted:
         if joint not in found:

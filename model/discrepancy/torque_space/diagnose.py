@@ -119,6 +119,8 @@ class _Workflow:
                 return False
             before, after = self._judged(self.now, chosen.fit)
             fell, left = (judging.mean_squares(self.data.stretches, f.residual) for f in (self.now, chosen.fit))
+            if not judging.beyond_noise(fell, left, self.floor):
+                continue
             removed = judging.share_removed(fell, left, before, after)
             holds = removed >= self.options.least_share
             self.steps.append(self._step(turn, chosen, before, after, removed, holds=holds))

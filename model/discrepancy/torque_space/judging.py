@@ -22,6 +22,8 @@ FOLDS = 4
 """Of the fitted records themselves, where none are held out."""
 AFFECTED = 0.01
 """Share by which a joint's mean square must have fallen in the fit to count as one on which the effect acts."""
+MORE_THAN_NOISE = 1.1
+"""Times the noise that a residual must be for anything to be missing."""
 BOUNDED = 3.0
 """Standard deviations, in sizes of the parameter, beyond which the data do not bound it."""
 NORMAL_95 = 1.959964
@@ -74,6 +76,12 @@ def share_removed(fitted_before: Floats, fitted_after: Floats, before: Floats, a
     if not affected.any():
         return 0.0
     return float(1 - np.mean(after[affected] / before[affected]))
+
+
+def beyond_noise(before: Floats, after: Floats, floor: Floats) -> bool:
+    """Whether a joint on which the fit fell had more than the noise of its readings to explain."""
+    with np.errstate(invalid="ignore"):
+        return bool(((after < (1 - AFFECTED) * before) & (before > (MORE_THAN_NOISE * floor) ** 2)).any())
 
 
 def found_values(chosen: Fitted, data: Data) -> dict[str, FoundValue]:

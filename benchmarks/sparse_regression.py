@@ -1,0 +1,307 @@
+"""Sparse regression in the manner of SINDy, naming effects from traces: the rival of `daq diagnose`.
+
+    python -m benchmarks sparse_regression TRACE…            effects, best first, for each trace
+    python -m benchmarks sparse_regression --cases FOLDER    with the truth, for FOLDER/SEED/fit.mcap of that secret
+
+Brunton, Proctor and Kutz (2016) with a library of physics instead of polynomials, which is the most that such a
+regression can be given here: the rigid bodies and motors of the model are taken off first (inverse dynamics on smoothed
+derivatives), tolerances of the model may answer with the deviations that the machine file expects of them, and every
+effect that the diagnosis knows has its own terms, those that need a shape at several shapes. pysindy's sequentially
+thresholded least squares then keeps few terms; an effect ranks by the threshold up to which one of its terms survives.
+A wrong gain and lost set points are regressed where they act, on the recorded drive.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import numpy as np
+import pysindy
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from benchmarks.figures import Figure, show
+from daq.contracts.machine import BoardPid
+from daq.contracts.trace import Trace
+from daq.traces.reader import read_trace
+from model.fitting.options import HELD_BY_DEFAULT
+from model.machine_model import layout as at
+from model.machine_model.model import Model, base_model
+from model.simulation.torque_space import TorqueBalance, torque_balance
+
+Floats = NDArray[np.float64]
+Place = tuple[str, int | None]
+"""An effect, and the joint (from 1) it is on; None for the whole machine."""
+
+WINDOW = 0.26
+"""s of the local polynomials that give speeds and accelerations; shorter ones let noise through."""
+THRESHOLDS = np.geomspace(1.0, 0.01, 16)
+"""Of normalised coefficients, as shares of the target's deviation."""
+RIDGE = 0.05
+"""Share of a term's own square: terms that are nearly alike must share what they explain instead of cancelling."""
+STRIBECK_SPEEDS = (0.05, 0.15, 0.4)
+STICTION_SPEED = 0.015
+RIPPLES = (4, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48, 60)
+FREQUENCIES = np.arange(0.2, 6.05, 0.2)
+LIMITS = (0.9, 0.75, 0.6, 0.45)
+LEAST_GAIN_ERROR = 0.02
+"""Relative residual of the controller's law from which it is the controller that is wrong."""
+
+
+def ranked_effects(trace: Trace, model: Model) -> list[Place]:
+    """Effects, the most likely first.
+
+    Args:
+        trace: position and drive of the modelled joints, evenly sampled; set points, where they are to be judged.
+        model: what the arm is taken to be.
+    """
+    scores: dict[Place, float] = {}
+    for place, score in (*_controller_scores(trace, model), *_torque_scores(trace, model)):
+        scores[place] = max(scores.get(place, 0.0), score)
+    return sorted(scores, key=lambda place: -scores[place])
+
+
+def _torque_scores(trace: Trace, model: Model) -> Iterator[tuple[Place, float]]:
+    base = torque_balance(model, trace, WINDOW)
+    assert base.residual is not None
+    target = base.residual
+    nuisances, scale = _tolerances(trace, model, target)
+    terms = list(_terms(trace, model, base, target))
+    keep = slice(10, len(target) - 10)
+    size = target[keep].std(axis=0)
+    y = _stacked(target / size, keep)
+    basis = _stacked_columns([n / size for n in nuisances], keep)
+    library = _stacked_columns([column / size for _, column in terms], keep)
+    solve = _answered(basis, scale)
+    y, library = y - solve(y), library - solve(library)
+    norms = np.linalg.norm(library, axis=0)
+    used = norms > 1e-6 * np.sqrt(len(y))
+    places = [place for (place, _), u in zip(terms, used, strict=True) if u]
+    normalised = library[:, used] / norms[used] * np.sqrt(len(y))
+    yield from _survivors(normalised, y, places)
+
+
+def _survivors(library: Floats, y: Floats, places: list[Place]) -> Iterator[tuple[Place, float]]:
+    """Each place with the highest threshold that one of its terms survives, and its coefficient for ties."""
+    triangle = np.asarray(np.linalg.qr(np.column_stack([library, y]), mode="r"))  # the same least squares, fewer rows
+    count, library, y = len(y), triangle[:, :-1], triangle[:, -1]
+    for threshold in THRESHOLDS:
+        optimizer = pysindy.STLSQ(threshold=float(threshold), alpha=RIDGE * count, max_iter=30)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # "all coefficients eliminated" is an answer here
+            optimizer.fit(library, y[:, None])
+        coefficients = np.abs(np.asarray(optimizer.coef_).ravel())
+        for k in np.flatnonzero(coefficients > 0):
+            yield places[k], float(threshold + 1e-3 * coefficients[k])
+
+
+def _stacked(signal: Floats, keep: slice) -> Floats:
+    return np.asarray(signal[keep].T.ravel())
+
+
+def _stacked_columns(signals: list[Floats], keep: slice) -> Floats:
+    return np.stack([_stacked(s, keep) for s in signals], axis=1)
+
+
+def _answered(basis: Floats, scale: float) -> Callable[[Floats], Floats]:
+    """What the tolerances would take of a signal: ridge regression, coefficients in expected deviations."""
+    inverse = np.linalg.inv(basis.T @ basis + scale * np.eye(basis.shape[1]))
+    return lambda signal: basis @ (inverse @ (basis.T @ signal))
+
+
+def _tolerances(trace: Trace, model: Model, target: Floats) -> tuple[list[Floats], float]:
+    """Change of the residual for each tolerance parameter moved by its expected deviation."""
+    columns = []
+    for p in model.parameters:
+        if p.deviation is None or any(fnmatchcase(p.name, h) for h in HELD_BY_DEFAULT) or p.name == "controller.delay":
+            continue
+        step = p.deviation if p.value + p.deviation <= p.high else -p.deviation
+        moved = torque_balance(model.with_values({p.name: p.value + step}), trace, WINDOW).residual
+        assert moved is not None
+        columns.append(moved - target)
+    return columns, 1.0
+
+
+def _terms(trace: Trace, model: Model, base: TorqueBalance, target: Floats) -> Iterator[tuple[Place, Floats]]:
+    yield from _own_terms(trace, model, base)
+    for name, values in (
+        ("payload", {"mass": 0.1}),
+        ("base_tilt", {"about_x": 0.02}),
+        ("base_tilt", {"about_y": 0.02}),
+    ):
+        yield (name, None), _moved(model.with_effect(name, (), values), trace, target)
+    for joint in model.machine.modelled_joints:
+        for name, values in (("link_mass", {"added": 0.1}), ("centre_of_mass", {"shift": 0.01}),
+                             ("back_emf_error", {"relative": 0.05})):  # fmt: skip
+            yield (name, joint), _moved(model.with_effect(name, (joint,), values), trace, target)
+        yield from _sensor_terms(trace, model, joint, target)
+
+
+def _moved(model: Model, trace: Trace, target: Floats) -> Floats:
+    residual = torque_balance(model, trace, WINDOW).residual
+    assert residual is not None
+    return residual - target
+
+
+def _sensor_terms(trace: Trace, model: Model, joint: int, target: Floats) -> Iterator[tuple[Place, Floats]]:
+    calibration = model.machine.joint(joint).sensor
+    if calibration is None:
+        return
+    column, range_, zero = trace.column(joint), calibration.range.value, calibration.at_zero.value
+    part = (trace.position[:, column] - zero) / range_
+    errors = [("potentiometer_gain", 0.01 * range_ * (part - 0.5)), ("potentiometer_offset", 0.01 + 0.0 * part)]
+    errors += [("potentiometer_nonlinearity", 0.002 * range_ * np.sin(k * np.pi * part)) for k in (1, 2, 3, 4)]
+    for name, error in errors:
+        position = trace.position.copy()
+        position[:, column] -= error
+        residual = torque_balance(model, replace(trace, position=position), WINDOW).residual
+        assert residual is not None
+        yield (name, joint), residual - target
+
+
+def _own_terms(trace: Trace, model: Model, base: TorqueBalance) -> Iterator[tuple[Place, Floats]]:
+    """Terms that act as a torque at one joint."""
+    assert base.motor is not None
+    assert trace.drive is not None
+    step = float(np.median(np.diff(base.time)))
+    joints = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
+    for j, joint in enumerate(model.machine.modelled_joints):
+        v, q, motor = base.velocity[:, j], base.position[:, j], base.motor[:, j]
+        volts = trace.drive[:, trace.column(joint)]
+        sign = np.tanh(v / max(0.02 * float(np.quantile(np.abs(v), 0.95)), 1e-6))
+        load = np.abs(base.required[:, j])
+        own: list[tuple[str, Floats]] = [
+            ("viscous_friction", v), ("coulomb_friction", sign), ("direction_dependent_friction", sign**2),
+            ("load_dependent_friction", sign * load), ("gear_loss", sign * np.abs(motor)),
+            ("stiction", sign * np.exp(-np.abs(v) / STICTION_SPEED)), ("spring_torque", q),
+            ("dead_zone", np.sign(volts)), ("resistance_drift", motor * np.cumsum(motor**2)),
+            ("input_delay", np.gradient(_smooth(volts, step), step)),
+            ("motor_inductance", np.gradient(_smooth(motor, step), step)),
+            ("joint_compliance", _second(base.required[:, j], step)),
+            ("backlash", _second(np.tanh(base.required[:, j] / (0.05 * base.required[:, j].std())), step)),
+        ]  # fmt: skip
+        own += [("stribeck_friction", sign * np.exp(-np.abs(v) / speed)) for speed in STRIBECK_SPEEDS]
+        own += [("torque_ripple", wave(n * q)) for n in RIPPLES for wave in (np.sin, np.cos)]
+        own += [
+            ("periodic_disturbance", wave(2 * np.pi * f * base.time)) for f in FREQUENCIES for wave in (np.sin, np.cos)
+        ]
+        largest = float(np.abs(volts).max())
+        own += [("supply_limit", np.sign(volts) * np.maximum(np.abs(volts) - s * largest, 0.0)) for s in LIMITS]
+        for name, signal in own:
+            column = np.zeros_like(base.velocity)
+            column[:, j] = _smooth(signal, step) if name in ("dead_zone", "supply_limit") else signal
+            if np.abs(column).max() > 0 and joints[j, at.TORQUE_CONSTANT] != 0:
+                yield (name, joint), column
+
+
+def _smooth(signal: Floats, step: float) -> Floats:
+    return np.asarray(savgol_filter(signal, max(5, round(WINDOW / step)) | 1, 3))
+
+
+def _second(signal: Floats, step: float) -> Floats:
+    return np.asarray(savgol_filter(signal, max(5, round(WINDOW / step)) | 1, 3, deriv=2, delta=step))
+
+
+def _controller_scores(trace: Trace, model: Model) -> Iterator[tuple[Place, float]]:
+    """The recorded drive against the controller's law of the recorded set points and positions."""
+    controller = model.machine.controller
+    if trace.set_point is None or trace.drive is None or not isinstance(controller, BoardPid):
+        return
+    for joint in model.machine.modelled_joints:
+        c = trace.column(joint)
+        error = trace.set_point[:, c] - trace.position[:, c]
+        volts = trace.drive[:, c]
+        within = np.abs(volts) < 0.95 * np.abs(volts).max()
+        change = np.diff(trace.set_point[:, c], prepend=trace.set_point[0, c])
+        gain = _nominal_gain(trace, model, joint)
+        y = (volts - gain * error)[within]
+        library = np.stack([gain * error, -gain * change], axis=1)[within]
+        if y.std() < LEAST_GAIN_ERROR * volts.std():
+            continue
+        norms = np.linalg.norm(library, axis=0) / np.sqrt(len(y)) + 1e-12
+        coefficients = np.linalg.lstsq(library / norms, y, rcond=None)[0] / max(volts[within].std(), 1e-12)
+        for name, coefficient in zip(("wrong_gain", "lost_set_points"), coefficients, strict=True):
+            yield (name, joint), float(10 * abs(coefficient))
+
+
+def _nominal_gain(trace: Trace, model: Model, joint: int) -> float:
+    """Volts a rad of the joint's proportional gain, as the machine or the record states it."""
+    controller, machine_joint = model.machine.controller, model.machine.joint(joint)
+    assert isinstance(controller, BoardPid)
+    assert machine_joint.sensor is not None
+    recorded = (trace.record.gains or {}).get(joint)
+    gain = recorded[0] if recorded else controller.gains[joint - 1][0]
+    counts = 2**machine_joint.sensor.bits / machine_joint.sensor.range.value
+    volts = machine_joint.dc_motor.scale.counts_to_volts(1.0)
+    return float(gain * controller.dac_counts_per_adc_count.value * counts * volts)
+
+
+def _truths(folder: Path) -> list[tuple[Path, str, set[int]]]:
+    """Tuning cases with exactly one known effect: trace, name, joints."""
+    found = []
+    for path in sorted(folder.glob("*/fit.mcap"), key=lambda p: int(p.parent.name)):
+        told = subprocess.run(
+            [sys.executable, "-m", "mock_controller.reveal", path.parent.name],
+            capture_output=True,
+            check=True,
+            text=True,
+        )
+        effects = json.loads(told.stdout)["effects"]
+        if len(effects) == 1 and effects[0]["known_as"] != "unknown_effect":
+            found.append((path, effects[0]["known_as"], set(effects[0]["joints"])))
+    return found
+
+
+def main(arguments: list[str]) -> int:
+    """The exit code."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks sparse_regression")
+    parser.add_argument("traces", nargs="*", type=Path)
+    parser.add_argument("--cases", type=Path, help="folder of SEED/fit.mcap; the truth is asked of the mock's own side")
+    parser.add_argument("--quick", action="store_true", help="every fifth case")
+    options = parser.parse_args(arguments)
+    for path in options.traces:
+        trace = read_trace(path)
+        assert trace.record.machine is not None
+        print(path, *(_spoken(p) for p in ranked_effects(trace, base_model(trace.record.machine))[:5]), sep="\n  ")
+    if options.cases is None:
+        return 0
+    first = three = joint_right = 0
+    cases = _truths(options.cases)[:: 5 if options.quick else 1]
+    begun = time.process_time()
+    for path, name, joints in cases:
+        trace = read_trace(path)
+        assert trace.record.machine is not None
+        ranked = ranked_effects(trace, base_model(trace.record.machine))
+        names = list(dict.fromkeys(n for n, _ in ranked))
+        first += names[:1] == [name]
+        three += name in names[:3]
+        joint_right += bool(ranked) and (not joints or ranked[0][1] in joints)
+        print(f"{path.parent.name:>5} {name:<30} {', '.join(_spoken(p) for p in ranked[:3])}", flush=True)
+    n = max(1, len(cases))
+    seconds = (time.process_time() - begun) / n
+    figures = [
+        Figure("named right", f"{first} of {len(cases)}"),
+        Figure("the right name among the first three", f"{three} of {len(cases)}"),
+        Figure("joint right", f"{joint_right} of {len(cases)}"),
+        Figure("processor time a case", f"{seconds:.1f} s"),
+    ]
+    return show(
+        "Sparse regression naming hidden effects", "python -m benchmarks sparse_regression --cases FOLDER", figures
+    )
+
+
+def _spoken(place: Place) -> str:
+    return place[0] + ("" if place[1] is None else f" {place[1]}")
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

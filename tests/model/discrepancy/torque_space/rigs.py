@@ -1,0 +1,318 @@
+"""Rigs that hide an effect: their equations of motion are written out here and integrated by scipy.
+
+Nothing of this is shared with the models that are diagnosed: friction is a smooth function of speed, a transmission two
+masses and a spring, the six-joint arm a cloud of points whose accelerations are differences of their places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from daq.contracts.machine import Machine
+from daq.contracts.trace import Trace, TraceRecord
+
+Floats = NDArray[np.float64]
+Wanted = Callable[[float], tuple[float, float, float]]
+
+
+def quantity(value: float, unit: str, **more: Any) -> dict[str, Any]:
+    """A number of a machine file."""
+    return {"value": value, "unit": unit, "source": "test", **more}
+
+
+def trace_of(
+    name: str, time: Floats, position: Floats, drive: Floats, unit: Any, velocity: Floats | None = None
+) -> Trace:
+    """A trace (k, n) as an import would give it."""
+    record = TraceRecord(
+        trace_id=name, created=datetime(2024, 1, 1, tzinfo=UTC), software="test", source="imported", drive_unit=unit
+    )
+    joints = tuple(range(1, position.shape[1] + 1))
+    return Trace(record, joints, time, position, drive=drive, velocity=velocity)
+
+
+def waves(seed: int, rates: tuple[float, ...], size: float) -> Wanted:
+    """A sum of sines with drawn phases: position, speed and acceleration at a time."""
+    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(rates))
+    amplitudes = size / np.arange(1, len(rates) + 1)
+    angular = 2 * np.pi * np.array(rates)
+
+    def wanted(t: float) -> tuple[float, float, float]:
+        s, c = np.sin(angular * t + phases), np.cos(angular * t + phases)
+        return (
+            float(amplitudes @ s), float((amplitudes * angular) @ c), float(-(amplitudes * angular**2) @ s)
+        )  # fmt: skip
+
+    return wanted
+
+
+# ---- a sliding servo axis whose controller nobody knows; the force of its drive is recorded
+
+SLIDE = {"mass": 12.0, "viscous": 0.0, "coulomb": 0.0, "stribeck": 0.0, "stribeck_speed": 0.05, "spring": 0.0,
+         "ripple": 0.0, "cycles": 300.0, "hum": 0.0, "hertz": 1.7, "loss": 0.0}  # fmt: skip
+ENCODER = 5e-6
+
+
+def slide_machine() -> Machine:
+    """One prismatic joint along the horizontal, 0.6 m of travel."""
+    return Machine.model_validate({
+        "version": 1, "name": "slide", "title": "Sliding axis", "gravity": [0.0, -9.81, 0.0], "modelled_joints": [1],
+        "controller": {"kind": "none"},
+        "joints": [{
+            "name": "slide", "kind": "prismatic",
+            "geometry": {"a": quantity(0.0, "m"), "alpha": quantity(0.0, "rad"), "d": quantity(0.0, "m"),
+                         "theta": quantity(0.0, "rad")},
+            "link": {"shape": "body", "mass": quantity(12.0, "kg", low=0.1, deviation=0.6),
+                     "centre": [quantity(0.0, "m")] * 3, "inertia": [quantity(0.0, "kg·m²")] * 6},
+            "drive": {"kind": "gain", "gain": quantity(1.0, "N/N")},
+        }],
+    })  # fmt: skip
+
+
+def slide_trace(seed: int, hidden: Mapping[str, float], duration: float = 16.0) -> Trace:
+    """The axis along a sum of sines at 500 Hz; a stiff controller forms the force, which is recorded with noise."""
+    p = {**SLIDE, **hidden}
+    wanted = waves(seed, (0.21, 0.5, 1.1, 2.3), 0.12)
+
+    def force(t: float, q: float, v: float) -> float:
+        w, dw, ddw = wanted(t)
+        return float(12.0 * ddw + 8000.0 * (w - q) + 500.0 * (dw - v))
+
+    def motion(t: float, y: Floats) -> list[float]:
+        q, v = y
+        u = force(t, q, v)
+        way = np.tanh(v / 5e-4)
+        rub = p["viscous"] * v + (p["coulomb"] + p["stribeck"] * np.exp(-abs(v) / p["stribeck_speed"])) * way
+        rub += p["loss"] * abs(u) * way
+        other = -p["spring"] * (q - 0.02) + p["ripple"] * np.sin(p["cycles"] * q)
+        other += p["hum"] * np.sin(2 * np.pi * p["hertz"] * t + 0.4)
+        return [v, (u - rub + other) / p["mass"]]
+
+    time = np.arange(0.0, duration, 0.002)
+    start = wanted(0.0)
+    found = solve_ivp(
+        motion, (0.0, duration), start[:2], t_eval=time, method="LSODA", rtol=1e-7, atol=1e-9, max_step=0.01
+    )
+    noise = np.random.default_rng(seed + 100)
+    drive = np.array([force(t, q, v) for t, q, v in zip(time, *found.y, strict=True)])
+    read = ENCODER * np.round(found.y[0] / ENCODER + noise.normal(0.0, 0.5, len(time)))
+    return trace_of(f"slide{seed}", time, read[:, None], (drive + noise.normal(0.0, 0.3, len(time)))[:, None], "N")
+
+
+# ---- a DC motor on a bench: volts in, speed out
+
+BENCH = {"resistance": 2.0, "constant": 0.05, "back_emf": 0.05, "inertia": 2e-4, "viscous": 1e-5, "coulomb": 0.0,
+         "dead_zone": 0.0, "delay": 0.0, "limit": 1e9}  # fmt: skip
+
+
+def bench_machine() -> Machine:
+    """A motor with a flywheel; the sensor measures speed."""
+    return Machine.model_validate({
+        "version": 1, "name": "bench", "title": "Motor bench", "gravity": [0.0, 0.0, -9.81], "modelled_joints": [1],
+        "controller": {"kind": "none"},
+        "joints": [{
+            "name": "shaft", "kind": "revolute",
+            "geometry": {"a": quantity(0.0, "m"), "alpha": quantity(0.0, "rad"), "d": quantity(0.0, "m"),
+                         "theta": quantity(0.0, "rad")},
+            "link": {"shape": "body", "mass": quantity(0.1, "kg"), "centre": [quantity(0.0, "m")] * 3,
+                     "inertia": [quantity(0.0, "kg·m²")] * 6},
+            "drive": {"kind": "dc_motor", "resistance": quantity(2.0, "Ω"), "inductance": quantity(1e-3, "H"),
+                      "torque_constant": quantity(0.05, "N·m/A"),
+                      "back_emf_constant": quantity(0.05, "V·s/rad", deviation=0.001),
+                      "rotor_inertia": quantity(2e-4, "kg·m²", low=0.0, deviation=1e-5),
+                      "gear_ratio": quantity(1.0, "1"), "amplifier_gain": quantity(1.0, "1"),
+                      "dac_full_scale": quantity(12.0, "V")},
+            "friction": {"viscous_motor_side": quantity(1e-5, "N·m·s/rad", low=0.0, deviation=1e-5)},
+            "sensor": {"bits": 16, "range": quantity(800.0, "rad"), "at_zero": quantity(-400.0, "rad"),
+                       "measures": "velocity"},
+        }],
+    })  # fmt: skip
+
+
+def bench_trace(seed: int, hidden: Mapping[str, float], duration: float = 20.0) -> Trace:
+    """Speed (with noise) at 200 Hz of a motor driven by a sum of sines of up to ±10 V. There is no position."""
+    p = {**BENCH, **hidden}
+    wanted = waves(seed, (0.15, 0.4, 0.9, 2.1), 5.0)
+
+    def volts(t: float) -> float:
+        asked = wanted(t - p["delay"])[0]
+        return float(np.clip(np.sign(asked) * max(abs(asked) - p["dead_zone"], 0.0), -p["limit"], p["limit"]))
+
+    def motion(t: float, y: Floats) -> list[float]:
+        torque = p["constant"] * (volts(t) - p["back_emf"] * y[0]) / p["resistance"]
+        return [(torque - p["viscous"] * y[0] - p["coulomb"] * np.tanh(y[0] / 0.5)) / p["inertia"]]
+
+    time = np.arange(0.0, duration, 0.005)
+    found = solve_ivp(motion, (0.0, duration), [0.0], t_eval=time, method="LSODA", rtol=1e-7, atol=1e-7, max_step=0.01)
+    noise = np.random.default_rng(seed + 100)
+    speed = found.y[0] + noise.normal(0.0, 0.2, len(time))
+    drive = np.array([wanted(t)[0] for t in time])
+    return trace_of(f"bench{seed}", time, np.zeros((len(time), 1)), drive[:, None], "V", speed[:, None])
+
+
+# ---- an arm on a spring: a motor behind a transmission that gives or has play, in the plane of gravity
+
+GEARED = {"link": 0.05, "rotor": 0.04, "weight": 1.2, "stiffness": 0.0, "damping": 0.15, "gap": 0.0, "coulomb": 0.0}
+
+
+def geared_machine() -> Machine:
+    """A revolute joint with a rotor behind a gear, and a link that hangs at zero."""
+    mass, centre = 0.6116, 0.2
+    return Machine.model_validate({
+        "version": 1, "name": "geared", "title": "Geared arm", "gravity": [9.81, 0.0, 0.0], "modelled_joints": [1],
+        "controller": {"kind": "none"},
+        "joints": [{
+            "name": "arm", "kind": "revolute",
+            "geometry": {"a": quantity(centre, "m"), "alpha": quantity(0.0, "rad"), "d": quantity(0.0, "m"),
+                         "theta": quantity(0.0, "rad")},
+            "link": {"shape": "body", "mass": quantity(mass, "kg", low=0.01, deviation=0.03),
+                     "centre": [quantity(0.0, "m")] * 3,
+                     "inertia": [quantity(0.0, "kg·m²")] * 2
+                     + [quantity(0.05 - mass * centre**2, "kg·m²", low=0.0, deviation=0.002)]
+                     + [quantity(0.0, "kg·m²")] * 3},
+            "drive": {"kind": "gain", "gain": quantity(1.0, "N·m/N·m"),
+                      "inertia": quantity(0.04, "kg·m²", low=0.0, deviation=0.002)},
+        }],
+    })  # fmt: skip
+
+
+def geared_trace(seed: int, hidden: Mapping[str, float], duration: float = 16.0) -> Trace:
+    """The link's angle at 500 Hz under a recorded torque that a controller forms of the rotor's angle."""
+    p = {**GEARED, **hidden}
+    wanted = waves(seed, (0.3, 0.8, 1.9, 3.1), 0.5)
+    stiff = p["stiffness"] or 4000.0
+
+    def torque(t: float, q: float, v: float) -> float:
+        w, dw, ddw = wanted(t)
+        return float(0.09 * ddw + 1.2 * np.sin(w) + 15.0 * (w - q) + 1.5 * (dw - v))
+
+    def motion(t: float, y: Floats) -> list[float]:
+        q, v, m, r = y
+        twist = m - q
+        stretched = np.sign(twist) * max(abs(twist) - 0.5 * p["gap"], 0.0)
+        through = stiff * stretched + (p["damping"] * (r - v) if stretched or not p["gap"] else 0.0)
+        u = torque(t, m, r)
+        rub = p["coulomb"] * np.tanh(v / 2e-3)
+        return [v, (through - p["weight"] * np.sin(q) - rub) / p["link"], r, (u - through) / p["rotor"]]
+
+    time = np.arange(0.0, duration, 0.002)
+    w, dw, _ = wanted(0.0)
+    found = solve_ivp(motion, (0.0, duration), [w, dw, w, dw], t_eval=time, method="LSODA", rtol=1e-7, atol=1e-9,
+                      max_step=0.005)  # fmt: skip
+    noise = np.random.default_rng(seed + 100)
+    drive = np.array([torque(t, m, r) for t, m, r in zip(time, found.y[2], found.y[3], strict=True)])
+    read = 2e-5 * np.round(found.y[0] / 2e-5 + noise.normal(0.0, 0.5, len(time)))
+    return trace_of(f"geared{seed}", time, read[:, None], (drive + noise.normal(0.0, 0.01, len(time)))[:, None], "N·m")
+
+
+# ---- a six-joint arm: every link a few points of mass
+
+SIX = ((0.0, np.pi / 2, 0.4), (0.45, 0.0, 0.0), (0.1, np.pi / 2, 0.0), (0.0, -np.pi / 2, 0.4), (0.0, np.pi / 2, 0.0),
+       (0.05, 0.0, 0.1))  # fmt: skip
+"""a, α, d of each link (m, rad, m)."""
+MASSES = (8.0, 6.0, 4.0, 2.5, 1.5, 0.6)
+ROTORS = (0.8, 0.8, 0.4, 0.1, 0.1, 0.05)
+POINTS = np.array([[0.06, 0.0, 0.03], [-0.06, 0.05, 0.0], [0.0, -0.05, 0.05], [0.02, 0.02, -0.08]])
+"""Places of four equal points of a link about its centre, m."""
+
+
+def _centre(link: int) -> Floats:
+    a, _, d = SIX[link]
+    return np.array([-0.5 * a, -0.2 * d, 0.01])
+
+
+def six_machine(deviation: float = 0.04) -> Machine:
+    """The arm as a machine file; masses and rotors stated to a few per cent."""
+    spread = POINTS - POINTS.mean(axis=0)
+    moments = []
+    for mass in MASSES:
+        tensor = sum(0.25 * mass * (s @ s * np.eye(3) - np.outer(s, s)) for s in spread)
+        moments.append([tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]])
+    joints = []
+    for k, (a, alpha, d) in enumerate(SIX):
+        centre = _centre(k) + POINTS.mean(axis=0)
+        joints.append({
+            "name": f"axis {k + 1}", "kind": "revolute",
+            "geometry": {"a": quantity(a, "m"), "alpha": quantity(alpha, "rad"), "d": quantity(d, "m"),
+                         "theta": quantity(0.0, "rad")},
+            "link": {"shape": "body", "mass": quantity(MASSES[k], "kg", low=0.0, deviation=deviation * MASSES[k]),
+                     "centre": [quantity(float(c), "m") for c in centre],
+                     "inertia": [quantity(float(v), "kg·m²") for v in moments[k]]},
+            "drive": {"kind": "gain", "gain": quantity(1.0, "N·m/N·m"),
+                      "inertia": quantity(ROTORS[k], "kg·m²", low=0.0, deviation=deviation * ROTORS[k])},
+            "friction": {"viscous": quantity(2.0, "N·m·s/rad", low=0.0, deviation=1.0),
+                         "coulomb": quantity(3.0, "N·m", low=0.0, deviation=1.5)},
+        })  # fmt: skip
+    return Machine.model_validate({
+        "version": 1, "name": "six", "title": "Six-joint arm", "gravity": [0.0, 0.0, -9.81],
+        "modelled_joints": [1, 2, 3, 4, 5, 6], "controller": {"kind": "none"}, "joints": joints,
+    })  # fmt: skip
+
+
+def _frames(q: Floats) -> list[tuple[Floats, Floats]]:
+    """Rotation (k, 3, 3) and origin (k, 3) of every frame, the base's first, for angles (k, 6)."""
+    count = len(q)
+    R, o = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
+    found = [(R, o)]
+    for j, (a, alpha, d) in enumerate(SIX):
+        c, s = np.cos(q[:, j]), np.sin(q[:, j])
+        ca, sa = np.cos(alpha), np.sin(alpha)
+        zero, one = np.zeros(count), np.ones(count)
+        turn = np.stack([
+            np.stack([c, -s * ca, s * sa], -1), np.stack([s, c * ca, -c * sa], -1),
+            np.stack([zero, one * sa, one * ca], -1),
+        ], 1)  # fmt: skip
+        o = o + np.einsum("kij,kj->ki", R, np.stack([a * c, a * s, one * d], -1))
+        R = R @ turn
+        found.append((R, o))
+    return found
+
+
+def six_trace(seed: int, hidden: Mapping[str, float], duration: float = 20.0) -> Trace:
+    """Torques of a prescribed motion by the principle of virtual work on points, at 200 Hz, with noise.
+
+    hidden: payload (kg) at the end; coulomb_J, viscous_J, stribeck_J on joint J; loss_J.
+    """
+    time = np.arange(0.0, duration, 0.005)
+    rng = np.random.default_rng(seed)
+    rates = np.array([0.1, 0.25, 0.45, 0.8])
+    phases, sizes = rng.uniform(0, 2 * np.pi, (6, 4)), np.array([0.7, 0.45, 0.6, 0.8, 0.8, 1.0])
+
+    def place(t: Floats) -> Floats:
+        waves_of = np.sin(2 * np.pi * rates * t[:, None, None] + phases) / np.arange(1, len(rates) + 1)
+        return np.asarray(sizes * waves_of.sum(axis=2))
+
+    h = 1e-4
+    q = place(time)
+    speed = (place(time + h) - place(time - h)) / (2 * h)
+    change = (place(time + h) - 2 * q + place(time - h)) / h**2
+    now, before, after = _frames(q), _frames(place(time - h)), _frames(place(time + h))
+    torque = np.zeros_like(q)
+    bodies = [(k, 0.25 * m, _centre(k) + point) for k, m in enumerate(MASSES) for point in POINTS]
+    bodies.append((5, hidden.get("payload", 0.0), np.zeros(3)))
+    for link, mass, point in bodies:
+        places = [f[link + 1][1] + f[link + 1][0] @ point for f in (before, now, after)]
+        force = mass * ((places[2] - 2 * places[1] + places[0]) / h**2 + np.array([0.0, 0.0, 9.81]))
+        for j in range(link + 1):
+            R, o = now[j]
+            torque[:, j] += np.einsum("ki,ki->k", np.cross(R[:, :, 2], places[1] - o), force)
+    for j in range(6):
+        v = speed[:, j]
+        needed = torque[:, j] + ROTORS[j] * change[:, j]
+        rub = (2.0 + hidden.get(f"viscous_{j + 1}", 0.0)) * v
+        way = np.tanh(v / 0.004)
+        rub += (
+            3.0 + hidden.get(f"coulomb_{j + 1}", 0.0) + hidden.get(f"stribeck_{j + 1}", 0.0) * np.exp(-abs(v) / 0.1)
+        ) * way
+        loss = hidden.get(f"loss_{j + 1}", 0.0)
+        asked = needed + rub
+        torque[:, j] = asked / (1 - loss * way * np.sign(asked))
+    torque += rng.normal(0.0, 0.5, torque.shape)
+    read = 1e-5 * np.round(q / 1e-5 + rng.normal(0.0, 0.5, q.shape))
+    return trace_of(f"six{seed}", time, read, torque, "N·m")

@@ -1,0 +1,53 @@
+"""docs/one-joint-rig.md: the rig's CSV files, its machine file, and what the diagnosis says of them."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq.contracts.machine import load_machine
+from daq.traces.csv_table import import_csv
+from model.discrepancy.workflow import diagnose
+from model.machine_model.model import base_model
+
+ROOT = Path(__file__).parents[4]
+
+
+def written(folder: Path) -> list[Path]:
+    """The records of the pretended bench."""
+    spec = importlib.util.spec_from_file_location("motor_bench_rig", ROOT / "examples" / "motor_bench_rig.py")
+    assert spec is not None
+    assert spec.loader is not None
+    rig = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(rig)
+    return list(rig.write(folder))
+
+
+def test_the_guide_shows_the_example_machine() -> None:
+    shown = re.findall(r"```toml\n(.*?)```", (ROOT / "docs" / "one-joint-rig.md").read_text("utf-8"), re.DOTALL)
+    assert shown[0] == (ROOT / "examples" / "motor_bench.toml").read_text("utf-8")
+    assert len(shown[0].splitlines()) <= 20
+
+
+def test_a_record_of_speeds_alone_has_their_integral_as_position(tmp_path: Path) -> None:
+    trace = import_csv(written(tmp_path)[0])
+    assert trace.velocity is not None
+    assert trace.position[0, 0] == 0.0
+    assert trace.position[-1, 0] == pytest.approx(np.trapezoid(trace.velocity[:, 0], trace.time), abs=1e-6)
+    assert "integrals" in trace.record.notes
+
+
+def test_the_example_names_the_friction_that_the_rig_hides(tmp_path: Path) -> None:
+    first, second = (import_csv(path) for path in written(tmp_path))
+    model = base_model(load_machine(str(ROOT / "examples" / "motor_bench.toml")))
+    found = diagnose(model, [first], [second])
+    assert found.verdict == "named"
+    assert [(s.effect, s.joints) for s in found.steps if s.adopted] == [("coulomb_friction", (1,))]
+    value = found.steps[0].parameters["joint1.coulomb_friction.torque"]
+    assert value.value == pytest.approx(0.008, rel=0.03)
+    before, after = found.steps[0].rmse_holdout[0].before, found.steps[0].rmse_holdout[0].after
+    assert after < 0.2 * before
