@@ -20,7 +20,7 @@ from model.machine_model.model import Model
 NOTICEABLE = 0.98
 """Share to which an error must fall for the fall to be worth telling."""
 ALL = 0.95
-"""Share of the evidence by which a rival without any is behind."""
+"""Share of the evidence from which a rival that far behind has next to none."""
 CLEAR = 0.1
 """Share of a disagreement from which an observation is taken before those that come after it in an effect's list."""
 
@@ -137,7 +137,7 @@ def _taken_off(model: Model, samples: Samples, joint: int) -> str:
 def _beaten(rival: Candidate, evidence: float, margin: float) -> str:
     """How far the next best is behind."""
     if margin >= ALL * evidence:
-        return "no other candidate explains any of it"
+        return "no other candidate explains a twentieth of it"
     return f"{_named(rival)} would explain {margin:.0f} less of {evidence:.0f}"
 
 

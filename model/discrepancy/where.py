@@ -32,8 +32,8 @@ WINDOW = 0.3
 """s of one cell of the map."""
 CHANCE = 0.01
 """Probability that noise alone makes any cell of the map significant."""
-QUIET, QUIET_OF_NOISE = 0.25, 0.75
-"""Share of the windows that count as quiet, and the mean square below which they lie where there is noise alone."""
+MEDIAN_OF_NOISE = 0.9
+"""Median of a window's mean square where there is noise alone: a little below its mean."""
 MOST_NOISE = 1.5
 """Times the stated variance that noise may have."""
 LEAST = 0.3
@@ -71,8 +71,8 @@ def located(
 
     Args:
         residuals: per record (m, n) measured − simulated, in the unit of the measurement.
-        deviations: (n,) standard deviation of such a residual when nothing is wrong. Where even the quietest quarter of
-            a joint's windows has more, up to 1.5 times the variance, that counts as the noise.
+        deviations: (n,) standard deviation of such a residual when nothing is wrong. Where even the quieter half of a
+            joint's windows has more, up to 1.5 times the variance, that counts as the noise.
         traces: the same records as traces, where α(t) is wanted; needs the recorded drive (about 0.5 s).
 
     Raises:
@@ -99,14 +99,14 @@ def located(
 
 
 def _quietened(weighted: Sequence[Floats], records: Sequence[Record]) -> list[Floats]:
-    """Weighted residuals in terms of the noise that the record's quietest windows show, between what is stated and
+    """Weighted residuals in terms of the noise that the record's quieter half shows, between what is stated and
     `MOST_NOISE` times its variance: a sensor a little noisier than stated is no disagreement."""
     squares = [
         np.mean(signal[window] ** 2, axis=0)
         for signal, record in zip(weighted, records, strict=True)
         for run in record.runs for window in _windows(run, record.inputs.period)
     ]  # fmt: skip
-    quiet = np.quantile(np.array(squares), QUIET, axis=0) / QUIET_OF_NOISE
+    quiet = np.median(np.array(squares), axis=0) / MEDIAN_OF_NOISE
     return [signal / np.sqrt(np.clip(quiet, 1.0, MOST_NOISE)) for signal in weighted]
 
 

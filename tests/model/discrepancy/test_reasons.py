@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 
 from daq.contracts.effects import effect_names
@@ -11,7 +12,7 @@ from model.discrepancy.answer import Candidate, FoundValue, RemainingShape, Wher
 from model.discrepancy.reasons import nothing, reason, undecided, unexplained
 from model.discrepancy.reasons_table import TELLING
 from model.effects.library import effect
-from model.fitting.records import records_of
+from model.fitting.records import records_of, resolution
 from model.machine_model.model import Model
 from tests.model.discrepancy.motions import trace_of
 from tests.model.fitting import imagined
@@ -118,6 +119,31 @@ def test_a_reason_names_the_rival_and_the_other_joints(arm: Model) -> None:
     assert "(and likewise joint " in text
     assert "Coulomb friction, 4 N·m (3.8 to 4.2)" in text
     assert text.endswith("; stiction on joints 1 and 2 would explain 300 less of 900")
+
+
+def test_a_rival_without_evidence_and_a_faint_mark_are_said_as_such(arm: Model) -> None:
+    records = records_of([trace_of(arm, 8.0)], arm.machine, "position")
+    strange = arm.with_effect("coulomb_friction", (2,), {"torque": 1e-3})
+    found = {"joint2.coulomb_friction.torque": FoundValue(value=1e-3, low=0.0, high=0.01, unit="N·m")}
+    rival = Candidate(effect="stiction", joints=(2,), evidence=-3.0)
+    text = reason(
+        "coulomb_friction", (2,), found, 30.0, 33.0, model=strange, before=arm, records=records, runner_up=rival
+    )
+    assert "whose mark is faint" in text
+    assert text.endswith("; no other candidate explains a twentieth of it")
+
+
+def test_a_caller_that_simulates_better_is_believed(arm: Model) -> None:
+    records = records_of([trace_of(arm, 8.0)], arm.machine, "position")
+    strange = arm.with_effect("coulomb_friction", (2,), {"torque": 1.0})
+    found = {"joint2.coulomb_friction.torque": FoundValue(value=1.0, low=0.9, high=1.1, unit="N·m")}
+
+    def left(model: Model) -> list[np.ndarray]:
+        return [np.full_like(records[0].measured, 0.1 if model is strange else 0.2)]
+
+    text = reason("coulomb_friction", (2,), found, 30.0, 3.0, model=strange, before=arm, records=records, left=left)
+    factor = 0.2 / resolution(arm.machine.joint(2).sensor)  # type: ignore[arg-type]
+    assert f"takes its rms error from {factor:.2g} to {factor / 2:.2g} ADC counts" in text
 
 
 def test_other_answers_have_their_reasons() -> None:

@@ -64,15 +64,24 @@ def test_a_direction_is_kept_through_a_rest(arm: Model, records: tuple[Record, .
 def test_noise_is_significant_as_often_as_it_should(arm: Model, records: tuple[Record, ...]) -> None:
     deviations = noise_floor(records, arm.machine, "position")
     named, peaks = 0, []
-    for seed in range(40):
+    for seed in range(30):
         residual = alike(records[0].measured.shape, seed) * deviations
         found = located(arm, records, [residual], deviations)
         named += found.joint is not None
         peaks.append(max(c.significance for c in found.cells))
-    assert named <= 4
+    assert named <= 3
     limit = chance_significance(len(found.cells), 0.05)
     assert np.mean(np.array(peaks) > limit) <= 0.2
     assert np.median(peaks) > 2.0  # nor is it so careful that it would see nothing
+
+
+def test_a_sensor_a_little_noisier_than_stated_is_no_disagreement(arm: Model, records: tuple[Record, ...]) -> None:
+    deviations = noise_floor(records, arm.machine, "position")
+    named = [
+        located(arm, records, [1.15 * alike(records[0].measured.shape, seed) * deviations], deviations).joint
+        for seed in range(10)
+    ]
+    assert sum(joint is not None for joint in named) <= 2
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
@@ -120,7 +129,7 @@ def test_a_dependence_is_the_most_significant_of_its_joint(
 def test_nothing_depends_on_anything_in_noise(arm: Model, records: tuple[Record, ...]) -> None:
     deviations = noise_floor(records, arm.machine, "position")
     beyond = []
-    for seed in range(30):
+    for seed in range(15):
         residual = alike(records[0].measured.shape, seed, 0.8) * deviations
         beyond += [d.significance for d in located(arm, records, [residual], deviations).dependences]
     assert np.mean(np.array(beyond) > 3.0) < 0.03
@@ -130,7 +139,7 @@ def test_means_in_bins_come_with_the_deviation_of_alike_samples() -> None:
     quantity = np.tile(np.repeat([0.25, 0.75], 50), 10)
     means = [
         binned(alike((1000, 1), s, 0.8)[:, 0], quantity, np.array([0, 0.5, 1.0]), [slice(0, 1000)], 0.3)
-        for s in range(200)
+        for s in range(100)
     ]
     scores = np.array([m.mean / m.deviation for m in means])
     assert 0.8 < scores.std() < 1.25
