@@ -10,7 +10,8 @@ from model.trial.score import Score
 
 _AS_IT_STANDS = (
     "seed", "kind", "load", "detectable", "verdict", "named_right", "merged_right", "in_answer", "in_first",
-    "joint_right", "at_least_one", "alarm", "honest", "excess_removed", "seconds", "robot_seconds",
+    "joint_right", "at_least_one", "alarm", "honest", "excess_removed",
+    "excess_removed_whole", "seconds", "robot_seconds",
 )  # fmt: skip
 _MADE: dict[str, Callable[[Score], str]] = {
     "hidden": lambda score: " + ".join(score.effects),

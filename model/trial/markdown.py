@@ -23,6 +23,7 @@ def as_markdown(table: TrialTable) -> str:
             ["over detectable single cases", "cases", "median", "10th percentile", "95th percentile", "largest"],
             [
                 ["held-out excess variance removed (%)", *_quantiles(table.excess_removed, 100.0)],
+                ["the same, of the model as it was given (%)", *_quantiles(table.excess_removed_whole, 100.0)],
                 ["time of a diagnosis (s)", *_quantiles(table.seconds, 1.0)],
             ],
         ),

@@ -71,6 +71,9 @@ class Score(_Scored):
     alarm: bool | None = None
     honest: bool | None = None
     excess_removed: float | None = None
+    """Of the held-out excess that was there once the tolerance parameters were fitted: what the effects brought."""
+    excess_removed_whole: float | None = None
+    """Of that of the model as it was given: what the whole diagnosis brought."""
     covered: tuple[Covered, ...] = ()
     seconds: float
     robot_seconds: float
@@ -95,6 +98,7 @@ def score(truth: Truth, seen: Detectability, answer: Diagnosis, machine: Machine
             **common,
             honest=not named and answer.verdict in ("unknown-effect", "ambiguous"),
             excess_removed=excess_removed(answer),
+            excess_removed_whole=excess_removed_whole(answer),
         )
     return Score(
         **common,
@@ -105,6 +109,7 @@ def score(truth: Truth, seen: Detectability, answer: Diagnosis, machine: Machine
         at_least_one=bool(set(names) & set(named)),
         joint_right=_joint_right(truth.effects[0], answer) if len(truth.effects) == 1 else None,
         excess_removed=excess_removed(answer),
+        excess_removed_whole=excess_removed_whole(answer),
         covered=_covered(truth, answer, machine) if _same_names(names, named) else (),
     )
 
@@ -170,9 +175,17 @@ def excess_removed(answer: Diagnosis) -> float | None:
     adopted = [step for step in answer.steps if step.adopted and step.rmse_holdout]
     if not adopted:
         return None
-    before = _excess(adopted[0].rmse_holdout, after=False)
-    after = _excess(adopted[-1].rmse_holdout, after=True)
-    return None if before < LEAST_EXCESS else 1.0 - after / before
+    return _removed(adopted[0].rmse_holdout, adopted[-1].rmse_holdout)
+
+
+def excess_removed_whole(answer: Diagnosis) -> float | None:
+    """The same from the model as it was given to the one that came out, tolerance parameters fitted."""
+    return _removed(answer.rmse_holdout, answer.rmse_holdout)
+
+
+def _removed(before: tuple[SignalError, ...], after: tuple[SignalError, ...]) -> float | None:
+    excess = _excess(before, after=False)
+    return None if excess < LEAST_EXCESS else 1.0 - _excess(after, after=True) / excess
 
 
 def _excess(errors: tuple[SignalError, ...], *, after: bool) -> float:
@@ -221,8 +234,8 @@ def _answered_joints(effect: HiddenEffect, steps: tuple[Step, ...]) -> set[int]:
     """Joints of the steps that name the effect; else of the first step, which may say where without saying what."""
     same = [step for step in steps if step.effect == effect.known_as and (step.adopted or step.group)]
     if same:
-        alike = (c for step in same for c in step.group if c.effect == effect.known_as)
-        return {joint for found in (*same, *alike) for joint in found.joints}
+        alike = [c.joints for step in same for c in step.group if c.effect == effect.known_as]
+        return {joint for joints in (*(step.joints for step in same), *alike) for joint in joints}
     first = steps[0]
     if first.joints or first.effect is not None:
         return set(first.joints)

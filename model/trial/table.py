@@ -56,6 +56,7 @@ class TrialTable(_Told):
     kinds: dict[str, int]
     lines: tuple[Line, ...]
     excess_removed: Quantiles
+    excess_removed_whole: Quantiles
     seconds: Quantiles
     by_effect: tuple[EffectLine, ...]
     by_open_effect: tuple[EffectLine, ...]
@@ -102,6 +103,7 @@ def trial_table(scores: Iterable[Score], not_acquired: int = 0) -> TrialTable:
         kinds=dict(Counter(s.kind for s in every)),
         lines=lines,
         excess_removed=quantiles(s.excess_removed for s in single),
+        excess_removed_whole=quantiles(s.excess_removed_whole for s in single),
         seconds=quantiles(s.seconds for s in single),
         by_effect=_effects([s for s in every if s.kind == "single"], lambda s: s.named_right),
         by_open_effect=_effects([s for s in every if s.kind == "open_set"], lambda s: s.honest),

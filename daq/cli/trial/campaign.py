@@ -137,7 +137,7 @@ class Campaign:
             while True:
                 given = self._answer(seed, traces, recorded["held_out"])
                 seconds += given.seconds
-                more = self._further(seed, given, len(traces), spent)
+                more = self._further(seed, given.read(), len(traces), spent)
                 if more is None:
                     break
                 traces.append(more.file)
@@ -155,11 +155,10 @@ class Campaign:
         model = base_model(self._machine(seed))
         return diagnose_sealed(traces, self.folder.path / "traces" / held_out, model, self.diagnoser)
 
-    def _further(self, seed: int, given: SealedAnswer, count: int, spent: float) -> Recorded | None:
+    def _further(self, seed: int, answer: Diagnosis, count: int, spent: float) -> Recorded | None:
         """The experiment that the answer asks for, run, where that is allowed and there is robot time left."""
         if not self.folder.asked.acquire:
             return None
-        answer = Diagnosis.model_validate_json(given.text)
         asked = answer.next_experiment
         if answer.verdict == "named" or asked is None or spent + asked.duration > ROBOT_TIME:
             return None
@@ -175,6 +174,6 @@ class Campaign:
             text = (self.folder.path / "answers" / sealed["answer"]).read_bytes()
             if sha256(text).hexdigest() != sealed["sha256"]:
                 raise TrialStageError(f"answer {sealed['answer']}: is not the one that was sealed")
-            answer = Diagnosis.model_validate_json(text)
+            answer = SealedAnswer(text, sealed["seconds"]).read()
             found = score(parse_truth(reveal(seed)), seen, answer, self._machine(seed))
         return found.model_dump(mode="json")

@@ -13,7 +13,10 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
+from pydantic import ValidationError
+
 from daq.cli.trial.mock_side import TrialStageError
+from model.discrepancy.answer import Diagnosis
 from model.machine_model.model import Model
 from model.machine_model.model_file import save_model
 
@@ -36,6 +39,15 @@ class SealedAnswer:
     def digest(self) -> str:
         """SHA-256 of the answer as it was given."""
         return sha256(self.text).hexdigest()
+
+    def read(self) -> Diagnosis:
+        """The answer. Raises TrialStageError for what is none."""
+        try:
+            return Diagnosis.model_validate_json(self.text)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(str(part) for part in first["loc"])
+            raise TrialStageError(f"what the diagnosis gave is no answer: {where}: {first['msg']}") from error
 
 
 def diagnose_sealed(

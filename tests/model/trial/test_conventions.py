@@ -35,6 +35,7 @@ SIZES: dict[str, tuple[int | None, dict[str, float]]] = {
     "dead_zone": (1, {"width": 2.0}),
     "supply_limit": (2, {"reduction": 12.0}),
     "torque_ripple": (3, {"amplitude": 0.9, "periods": 20.0, "phase": 0.0}),
+    "gear_loss": (2, {"loss": 0.4}),
     "backlash": (2, {"play": 0.03, "stiffness": 2e4, "damping": 10.0}),
     "joint_compliance": (2, {"compliance": 1.5e-3, "damping": 4.0}),
     "link_mass": (3, {"mass": 1.5}),

@@ -145,6 +145,13 @@ def test_excess_removed_is_from_the_first_step_to_the_last_in_variance_above_the
     assert judged(BACKLASH, answer("named", step("backlash", 2))).excess_removed is None
 
 
+def test_excess_removed_in_all_is_that_of_the_whole_answer() -> None:
+    given = answer("named", step("backlash", 2, holdout=(3.0, 1.0)))
+    whole = given.model_copy(update={"rmse_holdout": step(None, holdout=(11.0, 3.0)).rmse_holdout})
+    assert judged(BACKLASH, given).excess_removed_whole is None
+    assert judged(BACKLASH, whole).excess_removed_whole == pytest.approx(1.0 - 8.0 / 120.0)
+
+
 @pytest.mark.parametrize(("low", "high", "inside"), [(0.009, 0.011, True), (0.0101, 0.02, False)])
 def test_intervals_are_held_against_the_truth_in_the_model_s_convention(low: float, high: float, inside: bool) -> None:
     parameters = {
