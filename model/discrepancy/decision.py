@@ -23,10 +23,10 @@ class Decision:
     group: tuple[Refitted, ...]
 
 
-def decide(ranking: Ranking, thresholds: Thresholds) -> Decision:
-    """Nothing significant, one name, or a group."""
+def decide(ranking: Ranking, thresholds: Thresholds, collected: float = 0.0) -> Decision:
+    """Nothing significant, one name, or a group; `collected`: evidence of the effects that were added before."""
     fits = ranking.fitted
-    if not fits or fits[0].evidence < thresholds.significant:
+    if not fits or fits[0].evidence < thresholds.significant + thresholds.echo * collected:
         return Decision("nothing", fits[0] if fits else None, 0.0, ())
     best = fits[0]
     rivals = [f for f in fits[1:] if not same_answer(f, best)]

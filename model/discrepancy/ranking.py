@@ -32,7 +32,12 @@ def ranked(
 ) -> Ranking:  # fmt: skip
     """All candidates against the current point. `excluded`: effects that need not be tried."""
     point = current.point
-    every = [c for c in candidates(point.model, options.effects, options.joints) if c.name not in excluded]
+    free = {u.name for u in point.unknowns if u.deviation is None}
+    every = [
+        c
+        for c in candidates(point.model, options.effects, options.joints)
+        if c.name not in excluded and not {p.name for p in c.main} <= free  # what has been added is free already
+    ]
     progress(0.0, "probing the known effects")
     probes = probed(observation, point, [c for c in every if c.name not in FLEXIBLE])
     _stop_if(cancel)

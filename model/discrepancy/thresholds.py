@@ -11,6 +11,8 @@ class Thresholds:
 
     Args:
         significant: evidence from which an effect counts as found.
+        echo: share of the evidence already collected that a further effect must bring besides: where the law of an
+            effect that has been added is not exactly the arm's, what is left of it is no effect of its own.
         margin: evidence over the next answer from which one name is given, instead of a group.
         unexplained: misfit (mean square of the weighted residual) above which something is missing that none of the
             known effects is.
@@ -21,6 +23,7 @@ class Thresholds:
     """
 
     significant: float = 12.0
+    echo: float = 0.05
     margin: float = 4.0
     unexplained: float = 1.12
     least_share: float = 0.8

@@ -30,6 +30,7 @@ from model.discrepancy.holdout import HeldOut, errors, excess_removed, held_out
 from model.discrepancy.observation import Observation, Signals, observed
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.ranking import Ranking, ranked
+from model.discrepancy.reasons_samples import Left
 from model.discrepancy.refitting import Judged, Refitted, judge
 from model.discrepancy.remaining import shapes
 from model.discrepancy.search import Point, point_at, searched, with_new_tangents
@@ -93,7 +94,8 @@ def diagnose(
         share = 0.1 + 0.8 * number / options.most_steps
         joints = _to_search(case, current, number)
         turn = _ranked_in(case, current, joints, share, progress, cancel) if joints else Ranking((), ())
-        step, following = _turn(case, current, turn, decide(turn, case.thresholds))
+        collected = sum(s.evidence for s in steps[len(findings) :] if s.adopted)
+        step, following = _turn(case, current, turn, decide(turn, case.thresholds, collected))
         if step is not None:
             steps.append(step)
         verdict = _verdict(case, steps, step, first, following, number + 1)
@@ -211,8 +213,8 @@ def _rejected(case: _Case, before: Point, best: Refitted) -> str | None:
     rise, deviation = case.held.rise(before, best.judged.point)
     if rise > case.thresholds.worse * deviation:
         return (
-            f"the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} variances of a "
-            "reading"
+            f"the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} variances of "
+            "a reading"
         )
     return None
 
@@ -235,7 +237,7 @@ def _verdict(
     return "unknown-effect" if unexplained else "nothing-significant"
 
 
-def _left(observation: Observation, point: Point) -> reasons.Left:
+def _left(observation: Observation, point: Point) -> Left:
     """Measured − simulated of any model with the noise and the starts of a point: an effect is taken out, all else
     stays."""
     kept = [k for k, u in enumerate(point.unknowns) if u.name not in point.model.by_name]
