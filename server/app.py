@@ -23,10 +23,18 @@ Angles are in rad, times in s, joints are numbered from 1. Errors are applicatio
 
 
 def make_app(services: Services, gate: Gate) -> FastAPI:
-    """The application over services that are not yet started."""
+    """The application over services that are not yet started, behind its gate."""
+    app = bare_app(services)
+    app.add_middleware(gate.middleware)
+    return app
+
+
+def bare_app(services: Services | None) -> FastAPI:
+    """The routes; without services it can only be asked for its OpenAPI description."""
 
     @asynccontextmanager
     async def life(app: FastAPI) -> AsyncIterator[None]:
+        assert services is not None
         app.state.services = services
         for one in services.robots():
             one.hub.open(lambda robot=one.robot: robot.experiment)  # type: ignore[misc]
@@ -53,7 +61,6 @@ def make_app(services: Services, gate: Gate) -> FastAPI:
         api.include_router(part.router)
     app.include_router(api)
     app.include_router(system.plain)
-    app.add_middleware(gate.middleware)
     return app
 
 

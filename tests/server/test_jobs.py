@@ -12,6 +12,9 @@ import pytest
 from server.jobs.mailbox import PROGRESS
 from tests.server.service import Service
 
+pytestmark = pytest.mark.timeout(600)
+"""The first job of a worker imports, and may compile, the simulation."""
+
 SHORT = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.2}, "settle": 0.1, "hold": 0.1}
 
 

@@ -1,0 +1,18 @@
+"""`python -m server.openapi`: the description of the API, from which the types of the page are generated."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+from server.app import bare_app
+
+
+def main() -> None:
+    """One JSON document on standard output."""
+    json.dump(bare_app(None).openapi(), sys.stdout, indent=1, ensure_ascii=False)
+    sys.stdout.write("\n")
+
+
+if __name__ == "__main__":
+    main()
