@@ -88,6 +88,8 @@ def running_service(
             httpx.Client(base_url=f"{url}/api/v1/robots/ma2000", timeout=START_WITHIN, headers=headers) as robot,
         ):
             yield Service(process, url, folder, client, robot)
+            if process.poll() is None:
+                robot.post("/disconnect")  # waits longer for the owner of the port than the end of the service does
     finally:
         process.terminate()
         try:

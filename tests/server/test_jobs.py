@@ -5,17 +5,35 @@ from __future__ import annotations
 import json
 import os
 import signal
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from server.jobs.mailbox import PROGRESS
-from tests.server.service import Service
+from tests.server.service import Service, running_service
 
 pytestmark = pytest.mark.timeout(600)
 """The first job of a worker imports, and may compile, the simulation."""
 
 SHORT = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.2}, "settle": 0.1, "hold": 0.1}
+
+
+@pytest.fixture(scope="module")
+def shared_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    """A service of these tests' own, whose worker process is there before each of them."""
+    with running_service(tmp_path_factory.mktemp("jobs")) as service:
+        service.until_connected()
+        warm_up(service)
+        yield service
+
+
+def warm_up(service: Service) -> None:
+    """One job, so that there is a worker."""
+    ended = service.end_of(service.robot.post("/experiments", json={"spec": SHORT}).json()["id"])
+    job = _submitted(service, {"kind": "compare", "traces": [ended["trace"]], "models": ["machine"]})
+    assert _ended(service, job["id"])["state"] == "done"
 
 
 @pytest.fixture
@@ -91,7 +109,14 @@ def test_a_job_that_is_not_possible_is_refused(service: Service, request_: dict[
     assert answer.headers["Content-Type"] == "application/problem+json"
 
 
-def test_a_killed_worker_interrupts_its_job_and_the_next_one_runs(service: Service, trace: str) -> None:
+def test_a_killed_worker_interrupts_its_job_and_the_next_one_runs(tmp_path: Path) -> None:
+    with running_service(tmp_path) as service:
+        service.until_connected()
+        ended = service.end_of(service.robot.post("/experiments", json={"spec": SHORT}).json()["id"])
+        _kill_the_worker_of_a_job(service, ended["trace"])
+
+
+def _kill_the_worker_of_a_job(service: Service, trace: str) -> None:
     long = _submitted(service, {"kind": "fit", "traces": [trace], "starts": 20, "seed": 1})
     following = _submitted(service, {"kind": "compare", "traces": [trace], "models": ["machine"]})
     _until(service, long["id"], "running")
