@@ -7,7 +7,7 @@ import re
 import pytest
 
 from model.comparison.compare import Comparison
-from model.discrepancy.answer import Diagnosis
+from model.discrepancy.answer import Diagnosis, SignalError
 from model.reports.diagnosis_report import diagnosis_page, diagnosis_report
 from model.reports.page import Table, html
 from tests.model.discrepancy.answers import EFFECT, an_answer
@@ -50,10 +50,14 @@ def test_the_page_tells_the_whole_story_in_order(answer: tuple[Diagnosis, Compar
 
 @pytest.mark.usefixtures("undrawn")
 def test_errors_stand_beside_the_noise_and_say_how_much_is_gone(answer: tuple[Diagnosis, Comparison]) -> None:
-    blocks = next(s for s in diagnosis_report(*answer).sections if s.title == "What adding it did").blocks
+    step = answer[0].steps[0]
+    still = SignalError(joint=1, unit="rad", before=1.2e-3, after=1.1e-3, floor=1e-3)
+    gone = SignalError(joint=2, unit="rad", before=10e-3, after=1.5e-3, floor=1e-3)
+    told = answer[0].model_copy(update={"steps": (step.model_copy(update={"rmse_holdout": (still, gone)}),)})
+    blocks = next(s for s in diagnosis_report(told).sections if s.title == "What adding it did").blocks
     table = next(b for b in blocks if isinstance(b, Table) and b.head[0] == "traces")
     by_joint = {(row[0].text, row[1].text): row[-1].text for row in table.rows}
-    assert int(by_joint["held out", "2"].removesuffix(" %")) > 90
+    assert by_joint["held out", "2"] == "99 %"
     assert by_joint["held out", "1"] == "–"
 
 
