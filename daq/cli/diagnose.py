@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq.cli.context import Invocation, JsonOption, console, invocation, print_json
+from daq.cli.context import Invocation, JsonOption, YesOption, console, invocation, print_json
 from daq.cli.model_input import (
     MODEL_HELP,
     EffectFileOption,
@@ -26,13 +26,11 @@ if TYPE_CHECKING:
 
     from daq.contracts.trace import Trace
     from model.discrepancy.answer import Diagnosis
+    from model.discrepancy.next_experiment import Asker
     from model.discrepancy.options import DiagnosisOptions
     from model.machine_model.model import Model
 
 app = typer.Typer(add_completion=False)
-
-REPORT_SHARE = 0.05
-"""Of the progress, for simulating what the report draws."""
 
 
 def _model_file(path: Path | None) -> Path | None:
@@ -64,9 +62,16 @@ def diagnose(
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     effect_file: EffectFileOption = None,
+    acquire: Annotated[
+        bool, typer.Option("--acquire", help="Run the experiment that tells what is left, and diagnose again.")
+    ] = False,
+    budget: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Robot time for --acquire, s.")] = 60.0,
+    yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
     """Find where a model and traces disagree, name the effect that is missing, add it, and show the gap shrink."""
+    from daq.cli.diagnose_acquire import acquired
+    from daq.cli.diagnose_asking import asker
     from daq.cli.diagnosis_text import answer_text
     from daq.cli.model_progress import shown_progress
     from model.discrepancy.workflow import diagnose as run_diagnosis
@@ -77,10 +82,16 @@ def diagnose(
     fitted_to = read_traces(call, folder, traces)
     held = read_traces(call, folder, holdout) if holdout else []
     begin = _beginning(call, fitted_to, model, load)
-    with shown_progress("diagnosing") as tell:
-        share = 1.0 if report is None else 1.0 - REPORT_SHARE
-        found = run_diagnosis(begin, fitted_to, held, options, lambda f, text: tell(share * f, text))
-        page = None if report is None else _written(found, fitted_to, held, report)
+
+    def once(traces: Sequence[Trace], ask: Asker) -> Diagnosis:
+        with shown_progress("diagnosing") as tell:
+            return run_diagnosis(begin, traces, held, options, tell, ask=ask)
+
+    if acquire:
+        found, fitted_to = acquired(call, begin.machine, fitted_to, folder, budget, yes, once)
+    else:
+        found = once(fitted_to, asker(begin.machine))
+    page = None if report is None else _written(found, fitted_to, held, report)
     if out is not None:
         from model.machine_model.model_file import save_model
 

@@ -151,7 +151,21 @@ class NextExperiment(_Part):
     """s"""
     separates: tuple[str, ...]
     predicted_separation: float
-    """Standard deviations between the two candidates that are hardest to tell apart, tolerance parameters refitted."""
+    """Standard deviations between the two candidates that are hardest to tell apart, tolerance parameters refitted; 0
+    where there are no candidates to separate."""
+    reason: str
+
+
+class Acquired(_Part):
+    """An experiment that was asked for and run in the course of the diagnosis."""
+
+    experiment: str
+    trace: str
+    file: str
+    outcome: str
+    """How the run ended: `complete`, or as `daq run` says; only complete runs are used."""
+    duration: float
+    """s of robot time."""
     reason: str
 
 
@@ -168,6 +182,8 @@ class Diagnosis(_Part):
     """The same on the held-out traces."""
     remaining: tuple[RemainingShape, ...] = ()
     next_experiment: NextExperiment | None = None
+    acquired: tuple[Acquired, ...] = ()
+    """Experiments that were asked for and run, in order; their traces are among `traces`."""
     model_before: Model
     model_after: Model
     traces: tuple[str, ...]

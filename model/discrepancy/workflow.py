@@ -27,6 +27,7 @@ from model.discrepancy.controller_check import ControllerFinding, check_controll
 from model.discrepancy.decision import Decision, decide, explained_share
 from model.discrepancy.distortion import sum_of_contributions
 from model.discrepancy.holdout import HeldOut, errors, excess_removed, held_out
+from model.discrepancy.next_experiment import Asked, Asker, rivals_of
 from model.discrepancy.observation import Observation, Signals, observed
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.ranking import Ranking, ranked
@@ -59,12 +60,13 @@ class _Case:
 
 def diagnose(
     model: Model, traces: Sequence[Trace], holdout: Sequence[Trace] = (), options: DiagnosisOptions | None = None,
-    progress: Progress = silent, cancel: Cancel | None = None,
+    progress: Progress = silent, cancel: Cancel | None = None, ask: Asker | None = None,
 ) -> Diagnosis:  # fmt: skip
     """Where a model and traces disagree, which effects are missing, and what adding them brings.
 
     On a machine with a controller its loop is simulated from the recorded set points; without one, or where the traces
-    have no set points, the recorded drive is balanced against the motion in torques.
+    have no set points, the recorded drive is balanced against the motion in torques. `ask` says what may be run next
+    on a machine with a controller; without it, nothing is proposed.
 
     Raises:
         TraceError, SpecError: for traces or options that cannot give an answer; one line says why.
@@ -89,21 +91,25 @@ def diagnose(
     steps = [_controller_step(model, observation, f) for f in findings]
     current, verdict = judge(observation, point), None
     first = current
+    rivals: tuple[Refitted, ...] = ()
     while verdict is None:
         number = len(steps) - len(findings)
         share = 0.1 + 0.8 * number / options.most_steps
         joints = _to_search(case, current, number)
         turn = _ranked_in(case, current, joints, share, progress, cancel) if joints else Ranking((), ())
         collected = sum(s.evidence for s in steps[len(findings) :] if s.adopted)
-        step, following = _turn(case, current, turn, decide(turn, case.thresholds, collected))
+        decision = decide(turn, case.thresholds, collected)
+        step, following = _turn(case, current, turn, decision)
         if step is not None:
             steps.append(step)
+            rivals = rivals_of(turn, decision) or rivals
         verdict = _verdict(case, steps, step, first, following, number + 1)
         current = following
     progress(0.95, "writing the answer")
     remaining: tuple[RemainingShape, ...] = ()
     if verdict == "unknown-effect":
         remaining = _remaining(case, current.point)
+    asked = Asked(None) if ask is None else ask.after(verdict, current.point, rivals, traces)
     answer = Diagnosis(
         verdict=verdict, summary=_summary(verdict, steps, remaining), steps=tuple(steps), remaining=remaining,
         model_before=model, model_after=_adopted(model, current.point, case.names),
@@ -111,7 +117,7 @@ def diagnose(
         rmse_fit=errors(observation, model, given.residuals, current.point.residuals),
         rmse_holdout=_held_errors(case, given, current.point),
         seconds=time.perf_counter() - begun, robot_seconds=float(sum(t.time[-1] - t.time[0] for t in traces)),
-        notes=_notes(case),
+        notes=_notes(case) + (() if asked.note is None else (asked.note,)), next_experiment=asked.experiment,
     )  # fmt: skip
     progress(1.0, "done")
     return answer
@@ -211,7 +217,8 @@ def _rejected(case: _Case, before: Point, best: Refitted) -> str | None:
     if case.held is None:
         return None
     rise, deviation = case.held.rise(before, best.judged.point)
-    if rise > case.thresholds.worse * deviation:
+    bearable = case.thresholds.worse * deviation if best.evidence >= case.thresholds.convincing else 0.0
+    if rise > bearable:
         return (
             f"the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} variances of "
             "a reading"
@@ -359,5 +366,3 @@ def _notes(case: _Case) -> tuple[str, ...]:
     if case.held is None:
         found.append("no held-out trace was given: nothing here has been shown on data it was not fitted to")
     return tuple(found)
-
-

@@ -60,7 +60,9 @@ def test_json_is_the_answer_and_files_are_written(
 ) -> None:
     asked: dict[str, object] = {}
 
-    def imagined(model: object, traces: object, holdout: object, options: object, progress: object) -> Diagnosis:
+    def imagined(
+        model: object, traces: object, holdout: object, options: object, progress: object, ask: object
+    ) -> Diagnosis:
         asked.update(model=model, traces=traces, holdout=holdout, options=options)
         return answer
 

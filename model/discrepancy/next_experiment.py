@@ -1,0 +1,222 @@
+"""Which experiment to make next: the one on which the remaining candidates would differ most, for its robot time.
+
+Two candidates are as far apart as the one that is wrong would misfit a record of the other, after its parameters have
+moved as far as the traces made so far and their priors allow: d′² = min over Δ of |δ − TΔ|² + Δᵀ S Δ, with δ the
+difference of their readings in deviations of one reading, T the derivatives on the new experiment and S the information
+there is already. Either may be the wrong one; the smaller of the two d′ counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.trace import Trace
+from model.discrepancy.answer import NextExperiment, Verdict
+from model.discrepancy.decision import Decision, same_answer
+from model.discrepancy.next_experiment_reason import most_informative, separating
+from model.discrepancy.next_experiment_signals import Imagined, Planner, imagined, known_so_far, shared, shown, tangents
+from model.discrepancy.ranking import Ranking, describe
+from model.discrepancy.refitting import Refitted
+from model.discrepancy.search import Point
+
+Floats = NDArray[np.float64]
+Pair = tuple[int, int]
+
+LEAST = 3.0
+"""Deviations below which a pair counts as not told apart: the evidence moves by 9, more than the margin of a name."""
+SURE = 20.0
+"""Margin of evidence below which a name is asked about as well."""
+ENOUGH = 10.0
+"""Deviations beyond which more is of no use: a shorter experiment is better."""
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One of the library: what is said of it, and whether it is made for effects of every kind."""
+
+    name: str
+    description: str
+    spec: ExperimentSpec
+    general: bool = False
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The experiment to make next, or None; `note` says why there is none, or what it will not tell apart."""
+
+    experiment: NextExperiment | None
+    note: str | None = None
+
+
+@dataclass(frozen=True)
+class Asker:
+    """What may be asked for. budget: s of robot time that are left; None for no limit."""
+
+    experiments: tuple[Experiment, ...]
+    plan: Planner
+    budget: float | None = None
+
+    def after(self, verdict: Verdict, current: Point, rivals: Sequence[Refitted], traces: Sequence[Trace]) -> Asked:
+        """What to make next: what separates the rivals of a name or a group; else what tells most of the arm."""
+        if verdict in ("named", "ambiguous"):
+            return best_experiment(rivals, self.experiments, self.plan, self.budget) if rivals else Asked(None)
+        done = [t.record.spec for t in traces if t.record.spec is not None]
+        return most_information(current, self.experiments, self.plan, done, self.budget)
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """An experiment with its pairs' separations, and what of each difference could not be hidden, (N,)."""
+
+    experiment: Experiment
+    there: Imagined
+    separations: dict[Pair, float]
+    left: dict[Pair, Floats]
+
+
+def rivals_of(ranking: Ranking, decision: Decision) -> tuple[Refitted, ...]:
+    """Candidates of a turn that another experiment should tell apart: a group, and what comes close to a name."""
+    best = decision.best
+    if best is None or decision.kind == "nothing":
+        return ()
+    close = [
+        f
+        for f in ranking.fitted
+        if f is not best and not same_answer(f, best) and best.evidence - f.evidence < SURE and f.evidence > 0
+    ]
+    return (best, *close) if close else ()
+
+
+def best_experiment(
+    rivals: Sequence[Refitted], experiments: Sequence[Experiment], plan: Planner, budget: float | None = None
+) -> Asked:
+    """The experiment on which the rivals that are hardest to tell apart differ most for its robot time; pairs that no
+    experiment tells apart are named in the note."""
+    names = [describe(r.candidate.name, r.candidate.joints) for r in rivals]
+    points = [r.judged.point for r in rivals]
+    judged = [j for e in experiments if (j := _judged(points, e, plan, budget)) is not None]
+    if not judged:
+        return Asked(None, f"no experiment within the limits{_within(budget)} is left that could tell {_or(names)}")
+    pairs = list(combinations(range(len(rivals)), 2))
+    best = {pair: max(j.separations[pair] for j in judged) for pair in pairs}
+    hopeless = [pair for pair in pairs if best[pair] < LEAST]
+    told = [pair for pair in pairs if pair not in hopeless]
+    note = _hopeless(hopeless, best, names, budget)
+    if not told:
+        return Asked(None, note)
+    chosen = max(judged, key=lambda j: _worth(min(j.separations[p] for p in told), j.there.duration))
+    hardest = min(told, key=lambda p: chosen.separations[p])
+    separation = chosen.separations[hardest]
+    members = sorted({k for pair in told for k in pair})
+    reason = separating(
+        chosen.experiment.description, names[hardest[0]], names[hardest[1]], separation, points[hardest[0]].model,
+        chosen.there.observation, chosen.left[hardest], rivals[hardest[0]].candidate.joints,
+    )  # fmt: skip
+    return Asked(_next(chosen.experiment, chosen.there, tuple(names[k] for k in members), separation, reason), note)
+
+
+def most_information(
+    point: Point, experiments: Sequence[Experiment], plan: Planner, done: Sequence[ExperimentSpec],
+    budget: float | None = None,
+) -> Asked:  # fmt: skip
+    """Of the experiments for effects of every kind that were not made yet, the one that tells most of the arm; of the
+    others, if those take too long. None when one of them was made."""
+    if any(_same_motion(e.spec, s) for e in experiments if e.general for s in done):
+        return Asked(None)
+    new = [e for e in experiments if not any(_same_motion(e.spec, s) for s in done)]
+    for general in (True, False):
+        found = [j for e in new if e.general is general and (j := _information(point, e, plan, budget)) is not None]
+        if found:
+            experiment, there, nats = max(found, key=lambda f: f[2])
+            return Asked(_next(experiment, there, (), 0.0, most_informative(experiment.description, nats)))
+    return Asked(None)
+
+
+def _judged(points: Sequence[Point], experiment: Experiment, plan: Planner, budget: float | None) -> _Judged | None:
+    there = _possible(points[0], experiment, plan, budget)
+    if there is None:
+        return None
+    signals = [shown(there, p) for p in points]
+    if not all(np.isfinite(s).all() for s in signals):
+        return None
+    try:
+        first = tangents(there, points[0])
+        known = (*shared(points[0]), *there.starts), first
+        every = [first, *(tangents(there, p, known) for p in points[1:])]
+    except SpecError:
+        return None
+    information = [known_so_far(there, p) for p in points]
+    separations, left = {}, {}
+    for a, b in combinations(range(len(points)), 2):
+        delta = signals[a] - signals[b]
+        sides = [_unhidden(delta, every[k], information[k]) for k in (a, b)]
+        separations[a, b], left[a, b] = min(sides, key=lambda side: side[0])
+    return _Judged(experiment, there, separations, left)
+
+
+def _unhidden(delta: Floats, derivatives: Floats, information: Floats) -> tuple[float, Floats]:
+    """d′ of a difference, and what is left of it once the parameters have moved."""
+    shared_part = derivatives @ delta
+    moved = np.linalg.solve(information + derivatives @ derivatives.T, shared_part)
+    square = float(delta @ delta - shared_part @ moved)
+    return float(np.sqrt(max(square, 0.0))), delta - moved @ derivatives
+
+
+def _information(
+    point: Point, experiment: Experiment, plan: Planner, budget: float | None
+) -> tuple[Experiment, Imagined, float] | None:
+    there = _possible(point, experiment, plan, budget)
+    if there is None:
+        return None
+    try:
+        new = tangents(there, point)
+    except SpecError:
+        return None
+    known = known_so_far(there, point)
+    nats = 0.5 * (np.linalg.slogdet(known + new @ new.T)[1] - np.linalg.slogdet(known)[1])
+    return experiment, there, float(nats)
+
+
+def _possible(point: Point, experiment: Experiment, plan: Planner, budget: float | None) -> Imagined | None:
+    there = imagined(point.model, experiment.spec, plan)
+    return None if there is None or (budget is not None and there.duration > budget) else there
+
+
+def _worth(separation: float, duration: float) -> tuple[bool, float]:
+    """Experiments that tell come first; of them the one with the most separation, up to enough, a second."""
+    return separation >= LEAST, min(separation, ENOUGH) ** 2 / duration
+
+
+def _same_motion(one: ExperimentSpec, other: ExperimentSpec) -> bool:
+    return (one.trajectory, one.joints, one.start) == (other.trajectory, other.joints, other.start)
+
+
+def _next(
+    experiment: Experiment, there: Imagined, separates: tuple[str, ...], separation: float, reason: str
+) -> NextExperiment:
+    return NextExperiment(
+        name=experiment.name, spec=experiment.spec, duration=there.duration, separates=separates,
+        predicted_separation=separation, reason=reason,
+    )  # fmt: skip
+
+
+def _hopeless(pairs: Sequence[Pair], best: dict[Pair, float], names: Sequence[str], budget: float | None) -> str | None:
+    if not pairs:
+        return None
+    told = "; ".join(f"{names[a]} and {names[b]} ({best[a, b]:.1f} at most)" for a, b in pairs)
+    return f"no experiment within the limits{_within(budget)} separates by {LEAST:g} standard deviations: {told}"
+
+
+def _within(budget: float | None) -> str:
+    return "" if budget is None else f" and {budget:.0f} s"
+
+
+def _or(names: Sequence[str]) -> str:
+    return " from ".join(names)
