@@ -95,6 +95,17 @@ def test_a_second_owner_of_the_port_is_told_so(tmp_path: Path) -> None:
         mock.close()
 
 
+def test_disconnected_the_robot_says_so_and_can_be_connected_again(tmp_path: Path) -> None:
+    with running_service(tmp_path) as service:
+        service.until_connected()
+        assert service.robot.post("/disconnect").status_code == 200
+        status = service.status()
+        assert (status["connection"], status["arm"], status["sample"]) == ("disconnected", "disconnected", None)
+        answer = service.robot.get("/gains")
+        assert (answer.status_code, answer.json()["type"]) == (503, "docs/service.md#not-reached")
+        assert service.until_connected()["connection"] == "connected"
+
+
 def _owner_of(service: int) -> int:
     """The process that owns the port."""
     threads = Path(f"/proc/{service}/task").iterdir()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import httpx
-
 from tests.server.service import Service
 
 
@@ -106,12 +104,3 @@ def test_an_experiment_waits_while_a_client_has_the_control(service: Service) ->
     assert waiting_for == "a client has the control of the robot"
     service.robot.delete("/control", headers=mine)
     assert service.end_of(made["id"])["state"] == "done"
-
-
-def test_disconnected_the_robot_says_so_and_the_port_is_free_for_others(service: Service) -> None:
-    assert service.robot.post("/disconnect").status_code == 200
-    status = service.status()
-    assert (status["connection"], status["arm"], status["sample"]) == ("disconnected", "disconnected", None)
-    answer: httpx.Response = service.robot.get("/gains")
-    assert answer.status_code == 503
-    assert service.until_connected()["connection"] == "connected"

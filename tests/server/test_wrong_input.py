@@ -22,7 +22,7 @@ NOBODY = "000000000000"
         ({"joints": []}, "spec.joints"),
         ({"joints": [7]}, "spec.joints.0"),
         ({"gains": {"1": [21, 0, 0]}}, "spec.gains.1.0"),
-        ({"gains": {"1": [1, 0]}}, "spec.gains.1"),
+        ({"gains": {"1": [1, 0]}}, "spec.gains.1.2"),
         ({"repeats": 0}, "spec.repeats"),
         ({"name": "../../etc/passwd"}, "spec.name"),
         ({"name": "a; rm -rf /"}, "spec.name"),
