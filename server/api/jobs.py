@@ -98,7 +98,12 @@ def get_job_result(job: Identity, one: RobotPart, found: ServicesPart, _: Viewer
     return JobResult(id=job, kind=found.jobs.get(one.robot.name, job).request.kind, data=data)
 
 
-@router.get("/jobs/{job}/report.html", tags=["jobs"], response_class=FileResponse)
+@router.get(
+    "/jobs/{job}/report.html",
+    tags=["jobs"],
+    response_class=FileResponse,
+    responses={200: {"content": {"text/html": {}}}},
+)
 def get_job_report(job: Identity, one: RobotPart, _: Viewer) -> FileResponse:
     """The job's report: one page that stands by itself."""
     path = one.jobs.result_file(job, REPORT)
