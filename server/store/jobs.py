@@ -47,9 +47,7 @@ class JobStore:
     def __init__(self, store: Store) -> None:
         self._store = store
 
-    def submit(
-        self, robot: str, request: JobRequest, now: datetime, by: str, key: str | None
-    ) -> tuple[Job, bool]:
+    def submit(self, robot: str, request: JobRequest, now: datetime, by: str, key: str | None) -> tuple[Job, bool]:
         """A new job, queued, and True; or the one that the same key made before, and False. Raises a 409."""
         digest = hashlib.sha256(request.model_dump_json().encode()).hexdigest()
         with self._store.writing() as session:
