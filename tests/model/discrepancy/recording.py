@@ -1,0 +1,48 @@
+"""Experiments on the mock, through its wire and into trace files, as a diagnosis gets them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from urllib.parse import urlencode
+
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.machine import Machine
+from daq.contracts.sample import SampleRow
+from daq.contracts.trace import Trace, TraceEvent
+from daq.driver import Controller
+from daq.runner import Arrangement, Consent, Outside, run_experiment
+from daq.runner.arm_control import ArmControl
+from daq.traces.reader import read_trace
+
+
+class Unheard:
+    """Nobody listens to the runs."""
+
+    def progress(self, fraction: float, text: str) -> None:
+        """How far the run is."""
+
+    def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
+        """A recorded control period."""
+
+    def happened(self, event: TraceEvent) -> None:
+        """An event."""
+
+
+def recorded(
+    specs: Sequence[ExperimentSpec], machine: Machine, seed: int, folder: Path, modification: str | None
+) -> list[Trace]:
+    """Traces of experiments, one after the other on one mock in lock-step, read from their files."""
+    options = {"lock_step": "1", "seed": str(seed)}
+    if modification is not None:
+        options["modify"] = modification
+    traces = []
+    with Controller.connect(f"mock://?{urlencode(options)}") as controller:
+        for spec in specs:
+            run = Arrangement(
+                controller, ArmControl(controller), spec, machine, machine.limits, folder, Unheard(), Outside()
+            )
+            result = run_experiment(run, Consent())
+            assert result.outcome == "complete", result.reason
+            traces.append(read_trace(result.trace))
+    return traces

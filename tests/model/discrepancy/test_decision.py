@@ -1,0 +1,56 @@
+"""What a ranking allows to be said."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from model.discrepancy.decision import decide, explained_share
+from model.discrepancy.ranking import Ranking
+from model.discrepancy.thresholds import Thresholds
+
+LINES = Thresholds(significant=12.0, margin=4.0, echo=0.05)
+
+
+def ranking(*fits: tuple[str, int, float]) -> Ranking:
+    """Candidates by name, joint and evidence, in the given order."""
+    made: list[Any] = [
+        SimpleNamespace(candidate=SimpleNamespace(name=name, joints=(joint,)), evidence=evidence)
+        for name, joint, evidence in fits
+    ]
+    return Ranking(cast(Any, tuple(made)), ())
+
+
+def test_nothing_where_nothing_is_significant() -> None:
+    assert decide(Ranking((), ()), LINES).kind == "nothing"
+    assert decide(ranking(("backlash", 2, 11.0)), LINES).kind == "nothing"
+
+
+def test_one_name_where_it_leads() -> None:
+    said = decide(ranking(("backlash", 2, 90.0), ("joint_compliance", 2, 40.0), ("stiction", 2, 2.0)), LINES)
+    assert said.kind == "named"
+    assert said.margin == pytest.approx(50.0)
+    assert said.group == ()
+
+
+def test_a_group_where_the_lead_is_small() -> None:
+    said = decide(ranking(("backlash", 2, 90.0), ("joint_compliance", 2, 87.0), ("stiction", 2, 2.0)), LINES)
+    assert said.kind == "group"
+    assert [f.candidate.name for f in said.group] == ["backlash", "joint_compliance"]
+
+
+def test_the_margin_of_a_lone_candidate_is_its_evidence() -> None:
+    assert decide(ranking(("backlash", 2, 30.0)), LINES).margin == pytest.approx(30.0)
+
+
+def test_an_echo_of_what_was_found_is_no_effect() -> None:
+    small = ranking(("dead_zone", 3, 30.0))
+    assert decide(small, LINES).kind == "named"
+    assert decide(small, LINES, collected=1000.0).kind == "nothing"
+
+
+def test_share_of_the_excess() -> None:
+    assert explained_share(3.0, 1.5) == pytest.approx(0.75)
+    assert explained_share(0.98, 0.97) == 1.0

@@ -1,0 +1,56 @@
+"""The whole workflow on effects hidden in the mock: recorded through the wire into trace files, named from these alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from daq.contracts.machine import load_machine
+from daq.trajectories.presets import preset
+from model.discrepancy.answer import Diagnosis
+from model.discrepancy.workflow import diagnose
+from model.machine_model.model import base_model
+from tests.model.discrepancy.recording import recorded
+
+HIDDEN = {
+    "motor_inductance": ("motor_inductance:joint=2,inductance=0.06", 2),
+    "coulomb_friction": ("coulomb_friction:joint=3,torque=1.2", 3),
+    "wrong_gain": ("wrong_gain:joint=1,factor=1.15", 1),
+}
+
+
+def diagnosed(folder: Path, modification: str | None) -> Diagnosis:
+    """What is said of the 55 s set and a held-out trace of an arm with that effect."""
+    machine = load_machine("ma2000")
+    specs = [preset("diagnostic").spec, preset("held-out").spec]
+    fitted, held = recorded(specs, machine, seed=7, folder=folder, modification=modification)
+    return diagnose(base_model(machine), [fitted], [held])
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+@pytest.mark.timeout(400)
+def test_a_hidden_effect_is_named_at_its_joint_and_the_gap_shrinks(name: str, tmp_path: Path) -> None:
+    modification, joint = HIDDEN[name]
+    answer = diagnosed(tmp_path, modification)
+    assert answer.verdict == "named", answer.summary
+    assert [(s.effect, s.joints) for s in answer.steps if s.adopted] == [(name, (joint,))]
+    gap = {e.joint: e for e in answer.rmse_holdout}[joint]
+    assert gap.after < gap.before
+    assert gap.after < 1.35 * gap.floor
+    assert name in {u.name for u in answer.model_after.effects}
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_play_in_a_gear_is_what_is_named_first(tmp_path: Path) -> None:
+    answer = diagnosed(tmp_path, "backlash:joint=2,play=0.012,stiffness=20000,damping=10")
+    assert (answer.steps[0].effect, answer.steps[0].joints) == ("backlash", (2,))
+    assert answer.steps[0].adopted
+
+
+@pytest.mark.timeout(400)
+def test_a_sound_arm_is_called_sound(tmp_path: Path) -> None:
+    answer = diagnosed(tmp_path, None)
+    assert answer.verdict == "nothing-significant", answer.summary
+    assert not [s for s in answer.steps if s.adopted]

@@ -1,0 +1,55 @@
+"""Least squares with kept derivatives, and the projection of what tolerance parameters explain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from model.discrepancy.observation import Observation, observed
+from model.discrepancy.probing import projection
+from model.discrepancy.search import Point, _corrected, point_at, searched, with_new_tangents
+from tests.model.fitting import imagined
+
+TRUTH = {"joint2.viscous_friction.coefficient": 2.2e-4, "load.mass": 1.4, "joint1.motor.back_emf_constant": 0.0352}
+
+
+@pytest.fixture(scope="module")
+def case() -> tuple[Observation, Point]:
+    """A record of an arm whose numbers differ from the model's, and the model as it was given."""
+    record = imagined.trace(imagined.arm().with_values(TRUTH), seconds=8.0)
+    observation, model, unknowns = observed(imagined.arm(), [record])
+    values = np.array([u.start for u in unknowns])
+    return observation, point_at(observation, model, unknowns, values, observation.quiet)
+
+
+def test_a_search_ends_at_the_noise(case: tuple[Observation, Point]) -> None:
+    observation, given = case
+    found = searched(observation, given, 6)
+    found = searched(observation, with_new_tangents(observation, found), 4)
+    names = [u.name for u in given.unknowns]
+    values = given.values.copy()
+    for name, value in TRUTH.items():
+        values[names.index(name)] = value
+    truth = point_at(observation, given.model, given.unknowns, values, given.noise, given.tangents)
+    assert given.misfit > 2.0
+    assert found.cost < truth.cost + 5.0, "the arm's own numbers explain the record no better"
+
+
+def test_a_corrected_derivative_repeats_the_step(case: tuple[Observation, Point]) -> None:
+    observation, given = case
+    values = given.values + 0.3 * np.array([0.0 if u.deviation is None else u.deviation for u in given.unknowns])
+    tried = point_at(observation, given.model, given.unknowns, values, given.noise, given.tangents)
+    moved = tried.values - given.values
+    assert np.allclose(moved @ _corrected(given, tried), given.weighted - tried.weighted, atol=1e-8)
+
+
+def test_what_a_tolerance_parameter_explains_is_projected_away(case: tuple[Observation, Point]) -> None:
+    _, given = case
+    clear = projection(given)
+    row = [u.name for u in given.unknowns].index("joint2.viscous_friction.coefficient")
+    deviation = given.unknowns[row].deviation
+    assert deviation is not None
+    response = (given.tangents[row] * deviation)[None]
+    _, squares = clear.gains(response)
+    assert squares[0] < 1.0 + 1e-6, "a move by one deviation cannot cost more than its prior"
+    assert squares[0] < 0.05 * float(response[0] @ response[0])
