@@ -36,8 +36,8 @@ Signals = tuple[Floats, ...]
 SMOOTHING = 3
 """Samples over which the residual is averaged before what is left counts as noise."""
 STEP = 4e-3
-"""s; longest step of integration. Readings are right to 0.003 counts (root mean square; 0.04 with backlash), a hundredth
-of the noise, at less than half the time of 1 ms."""
+"""s; longest step of integration. Readings are right to 0.003 counts (root mean square; 0.04 with backlash), a
+hundredth of the noise, at less than half the time of 1 ms."""
 BEND_SHARE = 0.45
 """Standard deviation of each term of a potentiometer's curve, as a share of the stated linearity."""
 BATCH = 64

@@ -1,4 +1,4 @@
-"""The whole workflow on effects hidden in the mock: recorded through the wire into trace files, named from these alone."""
+"""The whole workflow on effects hidden in the mock: recorded through the wire, named from the trace files alone."""
 
 from __future__ import annotations
 
