@@ -23,7 +23,7 @@ from server.jobs.models import Models
 from server.live.history import History
 from server.live.hub import Hub
 from server.metrics import Metrics
-from server.owner.messages import Answer, ArmReport, Finish, Opened, Report
+from server.owner.messages import Answer, ArmReport, Opened, Report
 from server.problems import ProblemError, conflict, not_found
 from server.queue.desk import QueueDesk, QueueParts
 from server.robot.control import ControlDesk
@@ -207,7 +207,9 @@ class Services:
 
     def _lapsed(self, robot: Robot, holder: str) -> None:
         """A client went silent: the arm holds."""
-        robot.tell(Finish())
+        one = self._robots.get(robot.name)
+        if one is not None:
+            one.teaching.hold()
         self.tell(robot.name, "control", f"the control of {holder} has lapsed: the arm holds", actor=holder)
 
     def _take_in(self, catalogue: Catalogue) -> None:

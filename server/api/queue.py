@@ -121,8 +121,9 @@ def renew_control(one: RobotPart, _: Operator, lease: LeaseHeader = None) -> Con
 
 @router.delete("/control", tags=["control"], status_code=204)
 def give_control_back(one: RobotPart, found: ServicesPart, who: Operator, lease: LeaseHeader = None) -> Response:
-    """Gives the control back; what this client was moving holds."""
+    """Gives the control back; what this client was moving holds. A program that still runs is stopped."""
     one.control.give_back(lease or "")
+    one.teaching.hold()
     one.teaching.finish()
     found.tell(one.robot.name, "control", f"{who.name} gave the control back", actor=who.name)
     one.queue.wake()

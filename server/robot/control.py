@@ -58,9 +58,12 @@ class ControlDesk:
                 left = self._lease.expires - now
                 line = f"{self._lease.name} has the control, for {left:.0f} s more unless it is renewed"
                 raise conflict("control-held", line, "ask for it again when it is given back")
-            self._lease = Lease(secrets.token_urlsafe(24), name, now + LEASE_TIME, moves_real_arm)
+            silent, self._lease = self._lease, Lease(secrets.token_urlsafe(24), name, now + LEASE_TIME, moves_real_arm)
             self._changed.notify_all()
-            return self._told(self._lease, now)
+            told = self._told(self._lease, now)
+        if silent is not None:  # it lapsed in this very moment, and nobody has said so yet
+            self._lapsed(silent.name)
+        return told
 
     def renew(self, secret: str) -> ControlLease:
         """The heartbeat. Raises a 409 when the lease has lapsed, or is another's."""

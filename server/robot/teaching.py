@@ -14,7 +14,7 @@ from daq.contracts.service.robot import Activity
 from daq.contracts.service.teaching import TaughtPath, TeachingLine, TeachingStatus
 from daq.teaching import Program
 from daq.teaching.jog import top_speed
-from server.owner.messages import Answer, Finish, JogBegin, JogDrive, LeadBegin, Report, RunProgram, Told
+from server.owner.messages import Answer, Finish, HaltRun, JogBegin, JogDrive, LeadBegin, Report, RunProgram, Told
 from server.problems import conflict
 from server.robot.robot import ANSWER_WITHIN, Robot
 
@@ -69,6 +69,13 @@ class TeachingDesk:
             self._robot.tell(Finish())
             if not self._changed.wait_for(lambda: self._under_way is not under_way, ANSWER_WITHIN):
                 raise ReachError(f"{under_way[0]} did not end within {ANSWER_WITHIN:g} s: stop the robot")
+
+    def hold(self) -> None:
+        """Whoever had the control is gone: jogging and leading end in good order, a program by a stop. No waiting."""
+        with self._changed:
+            under_way = self._under_way
+        if under_way is not None:
+            self._robot.tell(Finish() if under_way[0] in ("jog", "lead") else HaltRun())
 
     def status(self) -> TeachingStatus:
         """Now."""
