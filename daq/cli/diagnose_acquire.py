@@ -30,7 +30,8 @@ def acquired(
     when a run does not come to its end. Raises what `daq run` raises, AcquisitionFailedError among them.
     """
     _check_same_machine(call, machine)
-    every, runs, left = list(traces), list[Acquired](), budget
+    runs: list[Acquired] = []
+    every, left = list(traces), budget
     found = diagnose(every, asker(machine, left))
     while (asked := found.next_experiment) is not None and asked.duration <= left:
         console().print(f"ask     {asked.name}, {asked.duration:.0f} s of {left:.0f} s: {asked.reason}", markup=False)

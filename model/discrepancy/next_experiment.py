@@ -9,7 +9,7 @@ there is already. Either may be the wrong one; the smaller of the two d′ count
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -21,10 +21,21 @@ from daq.contracts.trace import Trace
 from model.discrepancy.answer import NextExperiment, Verdict
 from model.discrepancy.decision import Decision, same_answer
 from model.discrepancy.next_experiment_reason import most_informative, separating
-from model.discrepancy.next_experiment_signals import Imagined, Planner, imagined, known_so_far, shared, shown, tangents
+from model.discrepancy.next_experiment_signals import (
+    Imagined,
+    Planner,
+    bounded,
+    imagined,
+    known_so_far,
+    names_of,
+    shown,
+    tangents,
+    values_of,
+)
+from model.discrepancy.observation import Observation
 from model.discrepancy.ranking import Ranking, describe
-from model.discrepancy.refitting import Refitted
-from model.discrepancy.search import Point
+from model.discrepancy.refitting import Refitted, judge
+from model.discrepancy.search import Point, searched, with_new_tangents
 
 Floats = NDArray[np.float64]
 Pair = tuple[int, int]
@@ -33,6 +44,10 @@ LEAST = 3.0
 """Deviations below which a pair counts as not told apart: the evidence moves by 9, more than the margin of a name."""
 SURE = 20.0
 """Margin of evidence below which a name is asked about as well."""
+MOST_RIVALS = 4
+"""The best of a group; every further one costs its simulations on every experiment."""
+SETTLING = 5
+"""Steps of a rival's fit at most, twice."""
 ENOUGH = 10.0
 """Deviations beyond which more is of no use: a shorter experiment is better."""
 
@@ -63,10 +78,16 @@ class Asker:
     plan: Planner
     budget: float | None = None
 
-    def after(self, verdict: Verdict, current: Point, rivals: Sequence[Refitted], traces: Sequence[Trace]) -> Asked:
+    def after(
+        self, verdict: Verdict, observation: Observation, current: Point, rivals: Sequence[Refitted],
+        traces: Sequence[Trace],
+    ) -> Asked:  # fmt: skip
         """What to make next: what separates the rivals of a name or a group; else what tells most of the arm."""
         if verdict in ("named", "ambiguous"):
-            return best_experiment(rivals, self.experiments, self.plan, self.budget) if rivals else Asked(None)
+            if not rivals:
+                return Asked(None)
+            ended = settled(observation, rivals)
+            return best_experiment(ended, self.experiments, self.plan, self.budget)
         done = [t.record.spec for t in traces if t.record.spec is not None]
         return most_information(current, self.experiments, self.plan, done, self.budget)
 
@@ -94,6 +115,18 @@ def rivals_of(ranking: Ranking, decision: Decision) -> tuple[Refitted, ...]:
     return (best, *close) if close else ()
 
 
+def settled(observation: Observation, rivals: Sequence[Refitted]) -> list[Refitted]:
+    """Rivals with their fits taken to the end, from derivatives computed there: a difference that a fit would still
+    take away separates nothing."""
+    found = []
+    for rival in rivals[:MOST_RIVALS]:
+        point = rival.judged.point
+        for _ in range(2):
+            point = searched(observation, with_new_tangents(observation, point), SETTLING)
+        found.append(replace(rival, judged=judge(observation, with_new_tangents(observation, point))))
+    return found
+
+
 def best_experiment(
     rivals: Sequence[Refitted], experiments: Sequence[Experiment], plan: Planner, budget: float | None = None
 ) -> Asked:
@@ -101,7 +134,7 @@ def best_experiment(
     experiment tells apart are named in the note."""
     names = [describe(r.candidate.name, r.candidate.joints) for r in rivals]
     points = [r.judged.point for r in rivals]
-    judged = [j for e in experiments if (j := _judged(points, e, plan, budget)) is not None]
+    judged = [j for e in experiments if (j := _judged(rivals, e, plan, budget)) is not None]
     if not judged:
         return Asked(None, f"no experiment within the limits{_within(budget)} is left that could tell {_or(names)}")
     pairs = list(combinations(range(len(rivals)), 2))
@@ -139,34 +172,51 @@ def most_information(
     return Asked(None)
 
 
-def _judged(points: Sequence[Point], experiment: Experiment, plan: Planner, budget: float | None) -> _Judged | None:
+def _judged(rivals: Sequence[Refitted], experiment: Experiment, plan: Planner, budget: float | None) -> _Judged | None:
+    points = [r.judged.point for r in rivals]
     there = _possible(points[0], experiment, plan, budget)
     if there is None:
         return None
     signals = [shown(there, p) for p in points]
     if not all(np.isfinite(s).all() for s in signals):
         return None
+    separations, left = {}, {}
     try:
-        first = tangents(there, points[0])
-        known = (*shared(points[0]), *there.starts), first
-        every = [first, *(tangents(there, p, known) for p in points[1:])]
+        first = _named(there, points[0], tangents(there, points[0], {}))
+        for a, b in combinations(range(len(rivals)), 2):
+            sides = [_unhidden(there, rivals[wrong], signals[true], first) for wrong, true in ((a, b), (b, a))]
+            separations[a, b], left[a, b] = min(sides, key=lambda side: side[0])
     except SpecError:
         return None
-    information = [known_so_far(there, p) for p in points]
-    separations, left = {}, {}
-    for a, b in combinations(range(len(points)), 2):
-        delta = signals[a] - signals[b]
-        sides = [_unhidden(delta, every[k], information[k]) for k in (a, b)]
-        separations[a, b], left[a, b] = min(sides, key=lambda side: side[0])
     return _Judged(experiment, there, separations, left)
 
 
-def _unhidden(delta: Floats, derivatives: Floats, information: Floats) -> tuple[float, Floats]:
-    """d′ of a difference, and what is left of it once the parameters have moved."""
-    shared_part = derivatives @ delta
-    moved = np.linalg.solve(information + derivatives @ derivatives.T, shared_part)
-    square = float(delta @ delta - shared_part @ moved)
-    return float(np.sqrt(max(square, 0.0))), delta - moved @ derivatives
+def _named(there: Imagined, point: Point, derivatives: Floats) -> dict[str, Floats]:
+    return dict(zip(names_of(there, point), derivatives, strict=True))
+
+
+def _unhidden(there: Imagined, wrong: Refitted, target: Floats, known: dict[str, Floats]) -> tuple[float, Floats]:
+    """d′ of a rival that is wrong from what would be shown, and what of the difference is left once its parameters have
+    moved. They move twice: what an effect does is not in proportion to its parameters.
+
+    Raises SpecError when the simulation does not stay finite.
+    """
+    point, information = wrong.judged.point, known_so_far(there, wrong.judged.point)
+    begun = values_of(there, point)
+    derivatives = tangents(there, point, known)
+    delta = target - shown(there, point)
+    moved = begun + np.linalg.solve(information + derivatives @ derivatives.T, derivatives @ delta)
+    moved = bounded(there, point, moved)
+    own = {p.name for p in wrong.candidate.free}
+    kept = {name: row for name, row in _named(there, point, derivatives).items() if name not in own}
+    derivatives = tangents(there, point, kept, moved)
+    delta, distance = target - shown(there, point, moved), moved - begun
+    if not np.isfinite(delta).all():
+        raise SpecError("the simulation does not stay finite: the loop is unstable")
+    gradient = derivatives @ delta - information @ distance
+    step = np.linalg.solve(information + derivatives @ derivatives.T, gradient)
+    square = float(delta @ delta + distance @ information @ distance - gradient @ step)
+    return float(np.sqrt(max(square, 0.0))), delta - step @ derivatives
 
 
 def _information(
@@ -176,7 +226,7 @@ def _information(
     if there is None:
         return None
     try:
-        new = tangents(there, point)
+        new = tangents(there, point, {})
     except SpecError:
         return None
     known = known_so_far(there, point)

@@ -6,7 +6,7 @@ far as that allows, and its posture at the start is unknown anew.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,26 +58,45 @@ def imagined(model: Model, spec: ExperimentSpec, plan: Planner) -> Imagined | No
     return Imagined(observation, tuple(u for u in unknowns if u.trace is not None), (drawn * counts,))
 
 
-def shown(there: Imagined, point: Point) -> Floats:
-    """What a point's model would show, (N,) in deviations of a reading. Not finite where its simulation is not."""
-    unknowns, values = _unknowns(there, point)
-    vector, initials = there.observation.state(point.model, unknowns, values)
+def values_of(there: Imagined, point: Point) -> Floats:
+    """(p,) of a point's shared unknowns and of the starts, in the order of all derivatives here."""
+    return _unknowns(there, point)[1]
+
+
+def bounded(there: Imagined, point: Point, values: Floats) -> Floats:
+    """The values within their unknowns' bounds."""
+    unknowns, _ = _unknowns(there, point)
+    return np.clip(values, [u.low for u in unknowns], [u.high for u in unknowns])
+
+
+def shown(there: Imagined, point: Point, values: Floats | None = None) -> Floats:
+    """What a point's model would show, (N,) in deviations of a reading; with other values (p,) than the point's, if
+    given. Not finite where its simulation is not."""
+    unknowns, own = _unknowns(there, point)
+    vector, initials = there.observation.state(point.model, unknowns, own if values is None else values)
     readings = there.observation.readings(point.model, vector[None], [i[None] for i in initials], there.noise)
     return there.observation.weighted([r[0] for r in readings])
 
 
-def tangents(there: Imagined, point: Point, known: tuple[Sequence[Unknown], Floats] | None = None) -> Floats:
-    """Derivatives (p, N) of what a point's model would show by its shared unknowns and the starts. `known`: those of
-    another point's, taken over by name: derivatives by the tolerance parameters change little.
+def tangents(there: Imagined, point: Point, known: Mapping[str, Floats], values: Floats | None = None) -> Floats:
+    """Derivatives (p, N) of what a point's model would show by its shared unknowns and the starts, at other values than
+    the point's, if given. `known`: rows that are taken over by name: those by the tolerance parameters change little.
 
     Raises SpecError when the simulation does not stay finite.
     """
-    unknowns, values = _unknowns(there, point)
-    rows = {} if known is None else {u.name: row for u, row in zip(*known, strict=True)}
+    unknowns, own = _unknowns(there, point)
+    at = own if values is None else values
+    rows = dict(known)
     missing = [k for k, u in enumerate(unknowns) if u.name not in rows]
-    new = there.observation.tangents(point.model, unknowns, values, there.noise, missing) if missing else np.zeros(0)
-    own = {unknowns[k].name: row for k, row in zip(missing, new, strict=True)}
-    return np.stack([rows[u.name] if u.name in rows else own[u.name] for u in unknowns])
+    if missing:
+        new = there.observation.tangents(point.model, unknowns, at, there.noise, missing)
+        rows |= {unknowns[k].name: row for k, row in zip(missing, new, strict=True)}
+    return np.stack([rows[u.name] for u in unknowns])
+
+
+def names_of(there: Imagined, point: Point) -> tuple[str, ...]:
+    """Names of the rows of those derivatives."""
+    return tuple(u.name for u in _unknowns(there, point)[0])
 
 
 def shared(point: Point) -> tuple[Unknown, ...]:

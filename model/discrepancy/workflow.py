@@ -109,7 +109,7 @@ def diagnose(
     remaining: tuple[RemainingShape, ...] = ()
     if verdict == "unknown-effect":
         remaining = _remaining(case, current.point)
-    asked = Asked(None) if ask is None else ask.after(verdict, current.point, rivals, traces)
+    asked = Asked(None) if ask is None else ask.after(verdict, observation, current.point, rivals, traces)
     answer = Diagnosis(
         verdict=verdict, summary=_summary(verdict, steps, remaining), steps=tuple(steps), remaining=remaining,
         model_before=model, model_after=_adopted(model, current.point, case.names),
