@@ -1,0 +1,108 @@
+"""`daq diagnose --acquire`: what is asked for is run and used, and the loop ends where it should."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from daq.acquisition.messages import Finished
+from daq.cli.context import Invocation
+from daq.cli.diagnose_acquire import acquired
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.machine import load_machine
+from daq.contracts.trace import Outcome, Trace
+from daq.traces.reader import read_trace
+from model.discrepancy.answer import Diagnosis, NextExperiment
+from model.discrepancy.next_experiment import Asker
+from model.machine_model.model import base_model
+from tests.daq.cli.invoke import CommandLine
+
+PORT = "mock://?lock_step=1&seed=3"
+
+
+@pytest.fixture
+def ramp(daq: CommandLine, tmp_path: Path) -> Path:
+    """A trace of the source's ramp, made through the mock."""
+    said = daq("--port", PORT, "run", "preset", "ramp", "--folder", tmp_path, "--json")
+    assert said.code == 0, said.err
+    return Path(json.loads(said.out)["trace"])
+
+
+def test_what_is_asked_for_is_run_within_the_budget_and_used(daq: CommandLine, ramp: Path, tmp_path: Path) -> None:
+    said = daq(
+        "--port", PORT, "diagnose", ramp, "--acquire", "--budget", "12", "--effects", "coulomb", "--joints", "2",
+        "--folder", tmp_path, "--json",
+    )  # fmt: skip
+    assert said.code == 0, said.err
+    found = Diagnosis.model_validate(json.loads(said.out))
+    assert len(found.acquired) == 1
+    run = found.acquired[0]
+    assert run.outcome == "complete"
+    assert 5.0 < run.duration <= 12.0
+    assert run.trace == read_trace(Path(run.file)).record.trace_id
+    assert found.traces == (read_trace(ramp).record.trace_id, run.trace)
+    assert f"ask     {run.experiment}, " in said.err
+
+
+class Answers:
+    """A diagnosis that always asks for the same, and remembers what it was given."""
+
+    def __init__(self, duration: float) -> None:
+        self.duration = duration
+        self.given: list[tuple[int, float | None]] = []
+
+    def __call__(self, traces: list[Trace], ask: Asker) -> Diagnosis:
+        self.given.append((len(traces), ask.budget))
+        model = base_model(load_machine("ma2000"))
+        asked = NextExperiment(
+            name="ramp", spec=ExperimentSpec(name="ramp"), duration=self.duration, separates=("a", "b"),
+            predicted_separation=4.0, reason="a ramp: a and b would differ",
+        )  # fmt: skip
+        return Diagnosis(
+            verdict="ambiguous", summary="a or b", steps=(), model_before=model, model_after=model, traces=(),
+            next_experiment=asked, seconds=0.0, robot_seconds=0.0,
+        )  # fmt: skip
+
+
+@pytest.fixture
+def outcomes(ramp: Path, monkeypatch: pytest.MonkeyPatch) -> list[Outcome]:
+    """How the runs to come end; every one gives the same trace."""
+    ends: list[Outcome] = []
+
+    def run(*_: object) -> Finished:
+        samples = len(read_trace(ramp))
+        return Finished(trace=ramp, outcome=ends.pop(0), reason="", samples=samples, missing=0, counters={})
+
+    monkeypatch.setattr("daq.cli.diagnose_acquire.acquire", run)
+    return ends
+
+
+def test_the_robot_time_that_is_left_bounds_what_is_asked(outcomes: list[Outcome], ramp: Path) -> None:
+    trace = read_trace(ramp)
+    duration = float(trace.time[-1] - trace.time[0])
+    outcomes += ["complete"] * 9
+    answers = Answers(duration)
+    call = Invocation(port_option=PORT)
+    found, every = acquired(call, load_machine("ma2000"), [trace], None, 2.5 * duration, False, answers)
+    assert len(found.acquired) == 2
+    assert len(every) == 3
+    assert [count for count, _ in answers.given] == [1, 2, 3]
+    assert [left for _, left in answers.given] == pytest.approx([2.5 * duration, 1.5 * duration, 0.5 * duration])
+
+
+def test_a_run_that_is_stopped_ends_it_and_is_not_used(outcomes: list[Outcome], ramp: Path) -> None:
+    outcomes += ["stopped"]
+    answers = Answers(3.0)
+    call = Invocation(port_option=PORT)
+    found, every = acquired(call, load_machine("ma2000"), [read_trace(ramp)], None, 60.0, False, answers)
+    assert [run.outcome for run in found.acquired] == ["stopped"]
+    assert len(every) == len(answers.given) == 1
+
+
+def test_another_machine_than_the_configured_one_is_refused(ramp: Path) -> None:
+    machine = load_machine("ma2000").model_copy(update={"name": "bench"})
+    with pytest.raises(SpecError, match="bench, the configured robot is ma2000"):
+        acquired(Invocation(port_option=PORT), machine, [read_trace(ramp)], None, 60.0, False, Answers(3.0))
