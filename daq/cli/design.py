@@ -128,10 +128,10 @@ def planned(spec: ExperimentSpec, machine: Machine) -> NDArray[np.float64]:
 
 
 def _fitted(model: str, parameters: str | None) -> FitResult | None:
-    """What a fit already knows, where the model is one and the parameters are those it found."""
-    from model.fitting.result import load_result
+    """What a fit of motion already knows, where the model is of one and the parameters are those it found."""
+    from model.fitting.result import is_result, load_result
 
-    if not model.endswith(".json") or parameters is not None:
+    if not model.endswith(".json") or parameters is not None or not is_result(Path(model)):
         return None
     return load_result(Path(model))
 

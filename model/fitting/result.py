@@ -98,6 +98,15 @@ class FitResult(_Part):
             raise SpecError(f"{path}: cannot be written: {error.strerror}") from error
 
 
+def is_result(path: Path) -> bool:
+    """Whether a file is a fit's result rather than a model alone, as far as can be told without reading it as one."""
+    try:
+        data = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(data, dict) and "identifiability" in data
+
+
 def load_result(path: Path) -> FitResult:
     """A saved fit. Raises SpecError for no such file, another kind of file, or one of a newer version."""
     try:
