@@ -47,11 +47,12 @@ class TorqueProblem:
         expected, slopes = expected_accelerations(model, record.motion, names)
         masses, changes = masses_along(model, record.motion.position, names)
         missing = record.acceleration - expected
-        residual = np.einsum("kij,kj->ki", masses, missing)[record.kept]
+        residual = record.low_passed(np.einsum("kij,kj->ki", masses, missing))[record.kept]
         if not names:
             return Evaluation(residual, None)
-        jacobian = np.einsum("pkij,kj->pki", changes, missing) - np.einsum("kij,pkj->pki", masses, slopes)
-        return Evaluation(residual, np.ascontiguousarray(jacobian[:, record.kept]))
+        jacobian = np.einsum("pkij,kj->kpi", changes, missing) - np.einsum("kij,pkj->kpi", masses, slopes)
+        jacobian = record.low_passed(jacobian)[record.kept]
+        return Evaluation(residual, np.ascontiguousarray(jacobian.transpose(1, 0, 2)))
 
     def with_records(self, records: Sequence[RecordedMotion]) -> TorqueProblem:
         """The same unknowns on other records."""

@@ -29,13 +29,29 @@ EDGE = 0.1
 class RecordedMotion:
     """Low-passed motion; acceleration and torque (k, n) go with it, and `kept` (k,) are the samples to use.
 
-    torque: of the drive at standstill, N·m (N): n K_T/R times the volts, so back-EMF counts with what resists.
+    torque: of the drive at standstill, low-passed, N·m (N): n K_T/R times the volts, so back-EMF counts with what
+    resists. The motion's own drive is as it was recorded.
     """
 
     motion: MeasuredMotion
     acceleration: Floats
     torque: Floats
     kept: slice
+    cutoff: float
+
+    def low_passed(self, torque: Floats) -> Floats:
+        """Torques (k, …) as the recorded one is: without what the motion's low-pass has taken from it.
+
+        A torque with corners, such as Coulomb friction worked out from a smooth motion, keeps them; the low-passed
+        torque of the drive has lost them. So all of it is low-passed together.
+        """
+        return low_passed(torque, self.cutoff, self.motion.period)
+
+
+def low_passed(signal: Floats, cutoff: float, period: float) -> Floats:
+    """A signal (k, …) less what is above `cutoff` (Hz), forwards and backwards, so without delay."""
+    numerator, denominator = butter(ORDER, 2 * cutoff * period)
+    return np.ascontiguousarray(filtfilt(numerator, denominator, signal, axis=0))
 
 
 def recorded_motion(model: Model, trace: Trace, cutoff: float = CUTOFF) -> RecordedMotion:
@@ -57,20 +73,26 @@ def recorded_motion(model: Model, trace: Trace, cutoff: float = CUTOFF) -> Recor
         raise SpecError(f"cutoff {cutoff:g} Hz: must lie between 0 and {0.4 / period:g} Hz at this sampling")
     columns = [trace.column(j) for j in inputs.joints]
     time = np.arange(trace.time[0], trace.time[-1], period)
-    numerator, denominator = butter(ORDER, 2 * cutoff * period)
+
+    def even(signal: Floats) -> Floats:
+        return np.stack([np.interp(time, trace.time, signal[:, c]) for c in columns], axis=1)
 
     def smooth(signal: Floats) -> Floats:
-        even = np.stack([np.interp(time, trace.time, signal[:, c]) for c in columns], axis=1)
-        return np.asarray(filtfilt(numerator, denominator, even, axis=0))
+        return low_passed(even(signal), cutoff, period)
 
     position = smooth(trace.position)
     speed = np.gradient(position, period, axis=0) if trace.velocity is None else smooth(trace.velocity)
-    drive = smooth(trace.drive)
+    drive = even(trace.drive)
     joints = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
-    torque = drive * joints[:, at.GEAR] * joints[:, at.TORQUE_CONSTANT] / joints[:, at.RESISTANCE]
+    torque = (
+        low_passed(drive, cutoff, period)
+        * joints[:, at.GEAR]
+        * joints[:, at.TORQUE_CONSTANT]
+        / joints[:, at.RESISTANCE]
+    )
     edge = int(EDGE / period)
     motion = MeasuredMotion(time, position, speed, _contact(model, position), drive, period, WIDTHS[0])
-    return RecordedMotion(motion, np.gradient(speed, period, axis=0), torque, slice(edge, len(time) - edge))
+    return RecordedMotion(motion, np.gradient(speed, period, axis=0), torque, slice(edge, len(time) - edge), cutoff)
 
 
 def _contact(model: Model, position: Floats) -> Floats:
