@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from daq.cli.design import planned
@@ -24,11 +23,6 @@ def asker(machine: Machine, budget: float | None = None) -> Asker:
     from model.discrepancy.next_experiment import Asker
 
     return Asker(tuple(library()), lambda spec: planned(spec, machine), budget)
-
-
-def with_budget(given: Asker, budget: float) -> Asker:
-    """The same with so many seconds of robot time left."""
-    return replace(given, budget=budget)
 
 
 def library() -> list[Experiment]:
