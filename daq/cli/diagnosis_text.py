@@ -71,7 +71,7 @@ def _step(step: Step) -> list[str]:
 
 def _candidates(candidates: Sequence[Candidate]) -> list[str]:
     ranked = sorted(candidates, key=lambda c: -c.evidence)
-    lines = []
+    lines: list[str] = []
     for c in ranked[:RANKED]:
         misfit = "" if c.misfit is None else f"   misfit {c.misfit:.2f}"
         kind = "" if c.refitted else "   probed"
@@ -82,7 +82,7 @@ def _candidates(candidates: Sequence[Candidate]) -> list[str]:
 
 
 def _shown(step: Step) -> list[str]:
-    lines = []
+    lines: list[str] = []
     for label, errors in (("fitted to", step.rmse_fit), ("held out", step.rmse_holdout)):
         if errors:
             lines += _filled("shown" if not lines else "", f"rms error on traces {label}, before → after (noise)")
