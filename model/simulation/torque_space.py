@@ -52,7 +52,9 @@ class TorqueBalance:
 
 
 def torque_balance(model: Model, trace: Trace, window: float = WINDOW) -> TorqueBalance:
-    """Inverse dynamics of a trace by a model.
+    """Inverse dynamics of a trace by a model: bodies, motors, viscous and Coulomb friction.
+
+    Other effects stay in the residual, where a regression is to find them; `model.torque_space` knows them all.
 
     Args:
         window: s over which a polynomial of third order is fitted to position (or to the measured velocity).
