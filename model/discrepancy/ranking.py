@@ -10,7 +10,7 @@ from model.discrepancy.candidates import FLEXIBLE, TONES, candidates
 from model.discrepancy.observation import Observation
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.probing import Probed, probed
-from model.discrepancy.refitting import Judged, Refitted, polished, refitted
+from model.discrepancy.refitting import Judged, Refitted, polished, refitted, settled
 from model.discrepancy.thresholds import Thresholds
 from model.discrepancy.tones import proposed_tones
 
@@ -59,8 +59,20 @@ def ranked(
     fits.sort(key=lambda r: -r.evidence)
     _stop_if(cancel)
     head = [polished(observation, current, r) for r in fits[: options.polished] if r.evidence > 0]
+    head = _told_apart(observation, current, head, thresholds)
     fits = sorted([*head, *fits[len(head) :]], key=lambda r: -r.evidence)
     return Ranking(_one_a_name(fits), tuple(probes))
+
+
+def _told_apart(
+    observation: Observation, current: Judged, head: Sequence[Refitted], thresholds: Thresholds
+) -> list[Refitted]:
+    """The best fits, those of them that are close taken to their ends; a clear lead needs none of that."""
+    best = max((r.evidence for r in head), default=0.0)
+    close = [r for r in head if r.evidence > best - thresholds.close]
+    if best < thresholds.significant or len(close) < 2:
+        return list(head)
+    return [settled(observation, current, r) if any(r is c for c in close) else r for r in head]
 
 
 def describe(name: str, joints: Sequence[int]) -> str:

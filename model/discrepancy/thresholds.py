@@ -20,6 +20,7 @@ class Thresholds:
         worse: rise of the held-out sum of squares, in its own standard deviations, at which a step is rejected.
         convincing: evidence below which the held-out error must fall, however little; above it, it must not rise beyond
             its scatter, for a trace held out need not excite the effect.
+        close: evidence within which rivals are fitted to their ends before they are compared.
         quiet_joint: misfit of a joint up to which, once an effect has been added, nothing more is looked for there.
         interesting: gain of a probe from which a candidate is worth a fit.
     """
@@ -31,6 +32,7 @@ class Thresholds:
     least_share: float = 0.8
     worse: float = 2.0
     convincing: float = 100.0
+    close: float = 40.0
     quiet_joint: float = 1.08
     interesting: float = 12.0
 
