@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.trace import Trace
+from model.discrepancy import search
 from model.discrepancy.answer import NextExperiment, Verdict
 from model.discrepancy.decision import Decision, same_answer
 from model.discrepancy.next_experiment_reason import most_informative, separating
@@ -35,7 +36,7 @@ from model.discrepancy.next_experiment_signals import (
 from model.discrepancy.observation import Observation
 from model.discrepancy.ranking import Ranking, describe
 from model.discrepancy.refitting import Refitted, judge
-from model.discrepancy.search import Point, searched, with_new_tangents
+from model.discrepancy.search import Point, with_new_tangents
 
 Floats = NDArray[np.float64]
 Pair = tuple[int, int]
@@ -120,9 +121,7 @@ def settled(observation: Observation, rivals: Sequence[Refitted]) -> list[Refitt
     take away separates nothing."""
     found = []
     for rival in rivals[:MOST_RIVALS]:
-        point = rival.judged.point
-        for _ in range(2):
-            point = searched(observation, with_new_tangents(observation, point), SETTLING)
+        point = search.settled(observation, rival.judged.point, SETTLING)
         found.append(replace(rival, judged=judge(observation, with_new_tangents(observation, point))))
     return found
 

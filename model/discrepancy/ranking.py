@@ -10,7 +10,7 @@ from model.discrepancy.candidates import FLEXIBLE, TONES, candidates
 from model.discrepancy.observation import Observation
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.probing import Probed, probed
-from model.discrepancy.refitting import Judged, Refitted, polished, refitted, settled
+from model.discrepancy.refitting import Judged, Refitted, finished, polished, refitted
 from model.discrepancy.thresholds import Thresholds
 from model.discrepancy.tones import proposed_tones
 
@@ -72,7 +72,7 @@ def _told_apart(
     close = [r for r in head if r.evidence > best - thresholds.close]
     if best < thresholds.significant or len(close) < 2:
         return list(head)
-    return [settled(observation, current, r) if any(r is c for c in close) else r for r in head]
+    return [finished(observation, current, r) if any(r is c for c in close) else r for r in head]
 
 
 def describe(name: str, joints: Sequence[int]) -> str:

@@ -18,7 +18,7 @@ from model.discrepancy.candidates import TONES, Candidate
 from model.discrepancy.noise_model import NoiseModel, noise_model
 from model.discrepancy.observation import Observation
 from model.discrepancy.probing import Probed
-from model.discrepancy.search import Point, point_at, searched, with_new_tangents
+from model.discrepancy.search import Point, point_at, searched, settled
 from model.discrepancy.tones import MOST_TONES
 from model.fitting.unknowns import Unknown
 
@@ -96,13 +96,10 @@ def polished(observation: Observation, before: Judged, found: Refitted) -> Refit
     return better if better.judged.point.cost < found.judged.point.cost else found
 
 
-def settled(observation: Observation, before: Judged, found: Refitted) -> Refitted:
-    """The same taken to its end, all derivatives computed there, twice: what two close rivals still differ by then is
-    not the state of their fits."""
-    point = found.judged.point
+def finished(observation: Observation, before: Judged, found: Refitted) -> Refitted:
+    """The same taken to its end, all derivatives computed there."""
     try:
-        for _ in range(2):
-            point = searched(observation, with_new_tangents(observation, point), POLISHING)
+        point = settled(observation, found.judged.point, POLISHING)
     except SpecError:
         return found
     better = _with_evidence(observation, before, found.candidate, point, found.promised)

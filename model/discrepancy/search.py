@@ -119,6 +119,14 @@ def with_new_tangents(observation: Observation, point: Point) -> Point:
     return replace(point, tangents=tangents)
 
 
+def settled(observation: Observation, point: Point, steps: int) -> Point:
+    """The point to which searches with derivatives computed where they begin lead, twice: what two close rivals still
+    differ by then is not the state of their fits."""
+    for _ in range(2):
+        point = searched(observation, with_new_tangents(observation, point), steps)
+    return point
+
+
 def _step(observation: Observation, point: Point) -> tuple[Point, bool]:
     """A step, and whether it descends; if not, the same point with derivatives that know better."""
     low, high = (np.array([getattr(u, side) for u in point.unknowns]) for side in ("low", "high"))

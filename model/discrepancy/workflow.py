@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,11 +39,12 @@ from model.discrepancy.search import Point, point_at, searched, with_new_tangent
 from model.discrepancy.thresholds import THRESHOLDS, Thresholds
 from model.discrepancy.torque_space.diagnose import diagnose_torques
 from model.discrepancy.where import located
+from model.fitting.fit import INTERVAL
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
 
 FIRST_STEPS, LAST_STEPS = 6, 4
-INTERVAL = 1.959964
+"""Of a search before and after its derivatives are computed anew."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +186,7 @@ def _turn(
     where = _where(case, current.point)
     values = found_values(best)
     held_errors = _held_errors(case, current.point, best.judged.point)
-    listed = tuple(_listed(r) for r in ranking.fitted) + _only_probed(ranking)
+    listed = tuple(_listed(r) for r in ranking.fitted) + _only_probed(ranking, observation.samples)
     reason = reasons.reason(
         best.candidate.name, best.candidate.joints, values, best.evidence, decision.margin,
         model=_with_point(model, best.judged.point), before=_with_point(current.point.model, current.point),
@@ -297,7 +299,7 @@ def _listed(found: Refitted) -> Candidate:
     )  # fmt: skip
 
 
-def _only_probed(ranking: Ranking) -> tuple[Candidate, ...]:
+def _only_probed(ranking: Ranking, samples: int) -> tuple[Candidate, ...]:
     """Candidates that were not worth a fit, by what their probe promised less the price of their parameters."""
     fitted = {(r.candidate.name, r.candidate.joints) for r in ranking.fitted}
     left = []
@@ -305,7 +307,7 @@ def _only_probed(ranking: Ranking) -> tuple[Candidate, ...]:
         key = probe.candidate.name, probe.candidate.joints
         if key not in fitted:
             fitted.add(key)
-            price = 9.0 * len(probe.candidate.free)
+            price = len(probe.candidate.free) * math.log(samples)
             left.append(Candidate(effect=key[0], joints=key[1], evidence=probe.gain - price))
     return tuple(left)
 

@@ -4,25 +4,16 @@ from __future__ import annotations
 
 import json
 import os
-import pty
 import signal
 import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from daq.traces.reader import read_trace
 from tests.daq.cli.invoke import CommandLine
+from tests.daq.cli.person import at_a_terminal
 
-DAQ = [sys.executable, "-c", "from daq.cli import main; main()"]
-TAKE_THE_TERMINAL = """
-import fcntl, os, sys, termios
-fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-os.execv(sys.executable, [sys.executable, *sys.argv[2:]])
-"""
 LONG = ["run", "ramp", "--hold", "600", "--folder", "traces"]
 
 
@@ -69,50 +60,9 @@ def test_an_experiment_from_a_file(daq: CommandLine) -> None:
     daq("run", "spec", "two.toml", "--dry-run").complains(2, "experiment two.toml", "greater than 0", "-1")
 
 
-class Terminal:
-    """A person's terminal with `daq` running in it."""
-
-    def __init__(self, process: subprocess.Popen[bytes], master: int) -> None:
-        self.process = process
-        self._master = master
-        self.seen = b""
-
-    def type(self, keys: bytes) -> None:
-        os.write(self._master, keys)
-
-    def until(self, words: bytes) -> None:
-        while words not in self.seen:
-            self.seen += os.read(self._master, 4096)
-
-    def end(self) -> int:
-        try:
-            while piece := os.read(self._master, 4096):
-                self.seen += piece
-        except OSError:  # the terminal's other side has been closed: that is how the end looks on Linux
-            pass
-        return self.process.wait(30)
-
-
-@contextmanager
-def terminal(words: list[str]) -> Iterator[Terminal]:
-    """`daq` as the foreground of a terminal of its own; the mock runs in real time behind a pseudo-terminal."""
-    master, slave = pty.openpty()
-    process = subprocess.Popen(
-        [sys.executable, "-c", TAKE_THE_TERMINAL, *DAQ, "--port", "mock://?pty=1&seed=3", *words],
-        stdin=slave, stdout=slave, stderr=slave, start_new_session=True,
-    )  # fmt: skip
-    os.close(slave)
-    try:
-        yield Terminal(process, master)
-    finally:
-        process.kill()
-        process.wait()
-        os.close(master)
-
-
 @pytest.mark.parametrize("keys", [b"\x03\x03", b"\x1a"], ids=["Ctrl-C twice", "Ctrl-Z"])
 def test_keys_that_stop_the_arm(keys: bytes) -> None:
-    with terminal(LONG) as person:
+    with at_a_terminal(["--port", "mock://?pty=1&seed=3", *LONG]) as person:
         person.until(b"ramp starts")
         person.type(keys)
         code = person.end()
@@ -124,7 +74,7 @@ def test_keys_that_stop_the_arm(keys: bytes) -> None:
 
 
 def test_stop_from_another_terminal(daq: CommandLine) -> None:
-    with terminal(LONG) as person:
+    with at_a_terminal(["--port", "mock://?pty=1&seed=3", *LONG]) as person:
         person.until(b"ramp starts")
         said = daq("stop", "--json")
         code = person.end()
@@ -136,7 +86,7 @@ def test_stop_from_another_terminal(daq: CommandLine) -> None:
 
 
 def test_a_command_line_that_is_killed_leaves_an_interrupted_trace() -> None:
-    with terminal(LONG) as person:
+    with at_a_terminal(["--port", "mock://?pty=1&seed=3", *LONG]) as person:
         person.until(b"ramp starts")
         children = Path(f"/proc/{person.process.pid}/task/{person.process.pid}/children").read_text().split()
         (acquisition,) = [os.pidfd_open(int(child)) for child in children]
