@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from daq.contracts.errors import TraceError
 from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
@@ -75,6 +76,7 @@ def diagnose(
         CancelledError: when asked to end.
     """
     options, cancel, begun = options or DiagnosisOptions(), cancel or Never(), time.perf_counter()
+    _refuse_shared(traces, holdout)
     if isinstance(model.machine.controller, NoController) or any(t.set_point is None for t in traces):
         return diagnose_torques(model, traces, holdout, options, progress, cancel)
     progress(0.0, "checking the controller's own numbers")
@@ -123,6 +125,15 @@ def diagnose(
     )  # fmt: skip
     progress(1.0, "done")
     return answer
+
+
+def _refuse_shared(traces: Sequence[Trace], holdout: Sequence[Trace]) -> None:
+    """Raises TraceError for a trace that would be fitted to and held out at once."""
+    for trace in holdout:
+        if any(trace.record.trace_id == other.record.trace_id for other in traces):
+            raise TraceError(
+                f"trace {trace.record.trace_id}: is both fitted to and held out; what is held out must be another trace"
+            )
 
 
 def _used(trace: Trace, findings: Sequence[ControllerFinding]) -> Trace:

@@ -1,0 +1,15 @@
+"""What a diagnosis refuses, in one line."""
+
+from __future__ import annotations
+
+import pytest
+
+from daq.contracts.errors import TraceError
+from model.discrepancy.workflow import diagnose
+from tests.model.fitting import imagined
+
+
+def test_a_trace_is_not_fitted_to_and_held_out_at_once() -> None:
+    record = imagined.trace(imagined.arm())
+    with pytest.raises(TraceError, match="both fitted to and held out"):
+        diagnose(imagined.arm(), [record], [record])
