@@ -28,6 +28,14 @@ class ExperimentRequest(Wire):
     priority: Priority = 0
 
 
+class ExperimentPreset(Wire):
+    """An experiment that has a name, and one line that says what it is for."""
+
+    name: str
+    description: str
+    spec: ExperimentSpec
+
+
 class ExperimentChange(Wire):
     """A new priority of an experiment that still waits."""
 
