@@ -1,0 +1,161 @@
+"""Clients of a service, in a process of their own: WebSockets that watch, and plain GETs at a steady rate."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import multiprocessing
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from urllib.parse import urlsplit
+
+import websockets
+
+CONNECTIONS = 8
+"""Kept open for the GETs; one that waits for its answer is not used for the next."""
+SUBSCRIBED = ["samples", "robot", "queue", "jobs", "events"]
+
+
+@dataclass
+class Seen:
+    """What the clients met. Times in s."""
+
+    latencies: list[float] = field(default_factory=list)
+    """Of every GET, from the moment it was due to go out: one that waits for a free connection is late."""
+    own_lateness: list[float] = field(default_factory=list)
+    """Of the clients' own clock, which shares the cores with all that is measured."""
+    refused: int = 0
+    watchers: int = 0
+    samples: int = 0
+    samples_missed: int = 0
+    ended_early: int = 0
+
+
+@dataclass
+class _HttpLine:
+    """One connection that stays open: as little client as possible, since it shares the cores with the service."""
+
+    reader: asyncio.StreamReader
+    writer: asyncio.StreamWriter
+
+    async def get(self, host: str, path: str) -> int:
+        """The status of the answer, when all of it has come."""
+        self.writer.write(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+        head = (await self.reader.readuntil(b"\r\n\r\n")).decode("latin-1").lower()
+        length = head.partition("content-length:")[2].partition("\r\n")[0]
+        if length.strip():
+            await self.reader.readexactly(int(length))
+        return int(head.split(" ", 2)[1])
+
+
+async def _get_steadily(host: str, paths: Sequence[str], rate: float, seen: Seen, over: asyncio.Event) -> None:
+    name, _, port = host.partition(":")
+    free: asyncio.Queue[_HttpLine] = asyncio.Queue()
+    for _ in range(CONNECTIONS):
+        free.put_nowait(_HttpLine(*await asyncio.open_connection(name, int(port))))
+
+    async def get(path: str, due: float) -> None:
+        line = await free.get()
+        status = await line.get(host, path)
+        seen.latencies.append(time.monotonic() - due)
+        seen.refused += status != 200
+        free.put_nowait(line)
+
+    begun, number = time.monotonic(), 0
+    async with asyncio.TaskGroup() as under_way:
+        while not over.is_set():
+            due = begun + number / rate
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(max(0.0, due - time.monotonic())):
+                    await over.wait()
+            now = time.monotonic()
+            seen.own_lateness.append(now - due)
+            under_way.create_task(get(paths[number % len(paths)], now))
+            number += 1
+    while not free.empty():
+        free.get_nowait().writer.close()
+
+
+async def _watch(url: str, seen: Seen) -> None:
+    last: int | None = None
+    async with websockets.connect(url, compression=None, open_timeout=60) as socket:
+        await socket.send(json.dumps({"subscribe": SUBSCRIBED, "history": 60}))
+        seen.watchers += 1
+        async for frame in socket:
+            for message in json.loads(frame)["messages"]:
+                if message["topic"] != "sample":
+                    continue
+                seen.samples += 1
+                if last is not None:
+                    seen.samples_missed += message["tick"] - last - 1
+                last = message["tick"]
+    seen.ended_early += 1
+
+
+async def _all(url: str, live: str, watchers: int, paths: Sequence[str], rate: float, parent: Connection) -> Seen:
+    seen, over = Seen(), asyncio.Event()
+    loop = asyncio.get_running_loop()
+
+    def told() -> None:
+        if parent.recv() == "end":
+            loop.remove_reader(parent.fileno())
+            over.set()
+        else:
+            seen.latencies.clear()
+            seen.own_lateness.clear()
+
+    async with asyncio.TaskGroup() as clients:
+        watching = [clients.create_task(_watch(live, seen)) for _ in range(watchers)]
+        while seen.watchers < watchers:
+            await asyncio.sleep(0.05)
+        loop.add_reader(parent.fileno(), told)
+        parent.send("ready")
+        await _get_steadily(urlsplit(url).netloc, paths, rate, seen, over)
+        for task in watching:
+            task.cancel()
+    return seen
+
+
+def _run(url: str, live: str, watchers: int, paths: Sequence[str], rate: float, parent: Connection) -> None:
+    parent.send(asyncio.run(_all(url, live, watchers, paths, rate, parent)))
+
+
+@dataclass
+class Clients:
+    """Clients under way."""
+
+    _pipe: Connection
+    process: int
+    seen: Seen = field(default_factory=Seen)
+    """Complete when the block has ended."""
+
+    def begin_anew(self) -> None:
+        """Forgets the GETs so far: those while everything started."""
+        self._pipe.send("anew")
+
+
+@contextlib.contextmanager
+def clients(url: str, watchers: int, paths: Sequence[str], rate: float, live: str = "") -> Iterator[Clients]:
+    """`watchers` WebSockets at `live` (a path), and `rate` GETs a second of `paths` in turn, as long as the block."""
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(
+        target=_run, args=(url, url.replace("http", "ws", 1) + live, watchers, tuple(paths), rate, theirs)
+    )
+    process.start()
+    theirs.close()
+    made = Clients(ours, process.pid or 0)
+    try:
+        ours.recv()
+        yield made
+        ours.send("end")
+        made.seen = ours.recv()
+    finally:
+        process.join(20)
+        if process.is_alive():
+            process.kill()
+            process.join()
+        ours.close()

@@ -1,0 +1,294 @@
+"""One arm shared by 50 watchers, 100 requests a second and a fit: ticks lost, jitter added, stops, plain GETs.
+
+    python -m benchmarks service_load
+
+The mock behind a pseudo-terminal at 115200 baud, the service, its worker process that fits, and all clients share this
+machine's cores. First an experiment is recorded while nobody watches, then another one under the whole load; the
+second's jitter, less the first's, is what the load adds. Then experiments are stopped by REST at random moments, under
+the same load; the moments of a stop are the mock's own record, on the clock that all processes of a machine share.
+At last an application of FastAPI that does nothing is asked as often, by the same clients, with nothing beside it: the
+floor of a plain GET.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import http.client
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from benchmarks.figures import Figure, at_most, quantile, show
+from benchmarks.mock_control import MockControl
+from benchmarks.mock_process import started_mock
+from benchmarks.service_clients import Clients, Seen, clients
+from benchmarks.service_process import ROBOT, RunningService, dice, ramp, started_service, sway
+from daq.traces.reader import read_trace
+
+BAUD = 115200
+WATCHERS = 50
+RATE = 100.0
+API = f"/api/v1/robots/{ROBOT}"
+PATHS = (API, f"{API}/queue", f"{API}/experiments?limit=20", f"{API}/traces?limit=20", "/healthz")
+JITTER_TARGET_MS = 5.0
+FROZEN_TARGET_MS = 30.0
+USED_TARGET_MS = 55.0
+GET_TARGET_MS = 25.0
+LONGEST_WAIT_S = 5.0
+FIT = {"kind": "fit", "method": "nelder_mead", "starts": 20}
+EMPTY_APP = """
+import sys, uvicorn
+from fastapi import FastAPI
+app = FastAPI()
+@app.get("/")
+def nothing() -> dict[str, str]:
+    return {"status": "ok"}
+uvicorn.run(app, host="127.0.0.1", port=0, log_level="info", access_log=False)
+"""
+
+
+@dataclass
+class Measured:
+    """What one run of everything gave. Times in s."""
+
+    endings: list[str] = field(default_factory=list)
+    """Of experiments that were not carried out to their end."""
+    idle: list[float] = field(default_factory=list)
+    """Jitter of the samples that nobody watched."""
+    loaded: list[float] = field(default_factory=list)
+    lost: tuple[int, int] = (0, 0)
+    """Ticks lost, of how many, under load."""
+    frozen: list[float] = field(default_factory=list)
+    used: list[float] = field(default_factory=list)
+    unconfirmed: int = 0
+    fitting: int = 0
+    """How many of the stops found the fit still running."""
+    busy: dict[str, float] = field(default_factory=dict)
+    """Share of one core that each process took while the second experiment was recorded."""
+    seen: Seen = field(default_factory=Seen)
+    floor: Seen = field(default_factory=Seen)
+
+
+def jitter(path: Path) -> tuple[list[float], int]:
+    """By how much each sample came later after its tick than the quickest one (s), and how many ticks were lost."""
+    trace = read_trace(path)
+    assert trace.tick is not None
+    assert trace.host_time is not None
+    after = trace.host_time - (trace.record.period or 0.02) * trace.tick
+    return (after - after.min()).tolist(), trace.missing
+
+
+def record(service: RunningService, seconds: float, found: Measured) -> tuple[list[float], int]:
+    """Records an experiment of some length; one that ends before its end is noted, and measured as far as it came."""
+    ended = service.ended("experiments", service.submit(sway(seconds)))
+    if ended["state"] != "done":
+        found.endings.append(f"{ended['state']}: {ended['reason']}")
+        service.ask("POST", "/reset", json={})
+        service.ask("POST", "/queue/resume", json={})
+    file = service.ask("GET", f"/traces/{ended['trace']}")["entry"]["file"]
+    return jitter(service.folder / "traces" / file)
+
+
+class ProcessorTime:
+    """Processor time of processes by name, from now on."""
+
+    def __init__(self, processes: dict[str, int]) -> None:
+        self._processes = processes
+        self._begun = time.monotonic()
+        self._before = {name: _processor_time(number) for name, number in processes.items()}
+
+    def shares(self) -> dict[str, float]:
+        """Of one core, since the beginning."""
+        seconds = time.monotonic() - self._begun
+        return {
+            name: (_processor_time(number) - self._before[name]) / seconds for name, number in self._processes.items()
+        }
+
+
+def _processor_time(process: int) -> float:
+    """s, of all its threads."""
+    fields = Path(f"/proc/{process}/stat").read_text("utf-8").rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def child(process: int, mark: bytes) -> int:
+    """The child of a process whose command line has this in it. Raises RuntimeError when there is none."""
+    for thread in Path(f"/proc/{process}/task").iterdir():
+        for number in (thread / "children").read_text("utf-8").split():
+            if mark in Path(f"/proc/{number}/cmdline").read_bytes():
+                return int(number)
+    raise RuntimeError(f"process {process} has no child with {mark!r} in its command line")
+
+
+class Stopper:
+    """A client that stops by REST, on a connection that is open already."""
+
+    def __init__(self, url: str) -> None:
+        where = urlsplit(url)
+        self._line = http.client.HTTPConnection(where.hostname or "", where.port, timeout=10)
+        self._line.connect()
+
+    def stop(self) -> tuple[float, bool]:
+        """When it was asked for, and whether the board confirmed it."""
+        at = time.monotonic()
+        self._line.request("POST", f"{API}/stop")
+        return at, bool(json.loads(self._line.getresponse().read())["confirmed"])
+
+    def close(self) -> None:
+        """Hangs up."""
+        self._line.close()
+
+
+def record_of_stop(control: MockControl, number: int) -> tuple[float, float]:
+    """When stop `number` was in the memory and when it was first used (s, monotonic). Raises RuntimeError."""
+    give_up = time.monotonic() + LONGEST_WAIT_S
+    while time.monotonic() < give_up:
+        state = control.ask("state")
+        stop, zero_us = state["stop"], state["clock"]["monotonic_us_at_zero"]
+        if stop["count"] == number and stop["first_used_us"] is not None:
+            return (zero_us + stop["frozen_us"]) * 1e-6, (zero_us + stop["first_used_us"]) * 1e-6
+        time.sleep(0.01)
+    raise RuntimeError(f"stop {number} never had an effect: the mock recorded {stop}")
+
+
+def stop_again_and_again(service: RunningService, control: MockControl, fit: str, times: int, found: Measured) -> None:
+    """Stops experiments while they are recorded, at moments that have nothing to do with the control period."""
+    random, stopper = dice(1991), Stopper(service.url)
+    for _ in range(times):
+        service.until_recording(experiment := service.submit(sway(60.0)))
+        before = control.ask("state")["stop"]["count"]
+        time.sleep(random.uniform(0.0, 0.1))
+        at, confirmed = stopper.stop()
+        frozen, used = record_of_stop(control, before + 1)
+        found.frozen.append(frozen - at)
+        found.used.append(used - at)
+        found.unconfirmed += not confirmed
+        found.fitting += service.ask("GET", f"/jobs/{fit}")["state"] == "running"
+        service.ended("experiments", experiment)
+        service.ask("POST", "/reset", json={})
+        service.ask("POST", "/queue/resume", json={})
+    stopper.close()
+
+
+@contextlib.contextmanager
+def empty_app() -> Iterator[str]:
+    """The address of a FastAPI application that does nothing."""
+    with subprocess.Popen([sys.executable, "-c", EMPTY_APP], stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        try:
+            url = next(line.split(" ")[-5] for line in process.stderr if "running on" in line)
+            yield url
+        finally:
+            process.terminate()
+
+
+def measure(seconds: float, stops: int) -> Measured:
+    """Everything, in one go."""
+    found = Measured()
+    with (
+        tempfile.TemporaryDirectory() as name,
+        started_mock("--pty", "--baud", str(BAUD)) as mock,
+        MockControl(mock.control) as control,
+        started_service(Path(name), f"{mock.url}?baud={BAUD}") as service,
+    ):
+        service.ask("POST", "/connect")
+        found.idle, _ = record(service, seconds, found)
+        short = service.ended("experiments", service.submit(ramp(duration=1.0)))["trace"]
+        service.ended("jobs", service.ask("POST", "/jobs", json={"kind": "compare", "traces": [short],
+                                                                 "models": ["machine"]})["id"])  # fmt: skip
+        with clients(service.url, WATCHERS, PATHS, RATE, f"{API}/live") as load:
+            fit = service.ask("POST", "/jobs", json=FIT | {"traces": [short]})["id"]
+            processes = {
+                "service": service.process.pid,
+                "owner of the port": child(service.process.pid, b"server.owner"),
+                "fit": child(service.process.pid, b"spawn_main"),
+                "mock": mock.number,
+                "clients": load.process,
+            }
+            _under_load(service, control, load, fit, seconds, stops, processes, found)
+        found.seen = load.seen
+        service.ask("POST", f"/jobs/{fit}/cancel")
+        service.ask("POST", "/disconnect")
+    with empty_app() as url, clients(url, 0, ("/",), RATE) as alone:
+        time.sleep(min(seconds, 10.0))
+    found.floor = alone.seen
+    return found
+
+
+def _under_load(
+    service: RunningService,
+    control: MockControl,
+    load: Clients,
+    fit: str,
+    seconds: float,
+    stops: int,
+    processes: dict[str, int],
+    found: Measured,
+) -> None:
+    while service.ask("GET", f"/jobs/{fit}")["state"] == "queued":
+        time.sleep(0.1)
+    load.begin_anew()
+    busy = ProcessorTime(processes)
+    found.loaded, lost = record(service, seconds, found)
+    found.busy = busy.shares()
+    found.lost = (lost, len(found.loaded))
+    stop_again_and_again(service, control, fit, stops, found)
+
+
+def figures_of(found: Measured) -> list[Figure]:
+    """The table."""
+    idle, loaded = (1e3 * quantile(times, 0.99) for times in (found.idle, found.loaded))
+    lost, count = found.lost
+    seen = found.seen
+    gets, floor, late = ([1e3 * one for one in times]
+                         for times in (seen.latencies, found.floor.latencies, seen.own_lateness))  # fmt: skip
+    frozen, used = ([1e3 * one for one in times] for times in (found.frozen, found.used))
+
+    def spread(times: list[float]) -> str:
+        return f"p50 {quantile(times, 0.5):.1f}, max {max(times):.1f} ms"
+
+    busy = ", ".join(f"{name} {100 * share:.0f} %" for name, share in found.busy.items())
+    own = f"the clients' own lateness p99 {quantile(late, 0.99):.1f} ms"
+    return [
+        Figure("recordings not completed", f"{len(found.endings)}", "0", not found.endings, "; ".join(found.endings)),
+        Figure("ticks lost", f"{lost}", "0", lost == 0, f"of {count}"),
+        at_most("tick jitter added, p99", loaded - idle, JITTER_TARGET_MS, "ms",
+                f"p99 {loaded:.2f} ms, alone {idle:.2f} ms"),
+        at_most("stop by REST, frozen in memory, p99", quantile(frozen, 0.99), FROZEN_TARGET_MS, "ms",
+                f"{spread(frozen)}, {len(frozen)} stops"),
+        at_most("stop by REST, first used, p99", quantile(used, 0.99), USED_TARGET_MS, "ms", spread(used)),
+        Figure("stops without confirmation", f"{found.unconfirmed}", "0", found.unconfirmed == 0,
+               f"a fit ran beside {found.fitting} of {len(frozen)}"),
+        at_most("plain GET, p99", quantile(gets, 0.99), GET_TARGET_MS, "ms", f"{spread(gets)}, {len(gets)} requests"),
+        Figure("an empty FastAPI application, alone, p99", f"{quantile(floor, 0.99):.3g} ms", beside=spread(floor)),
+        Figure("requests refused", f"{seen.refused}", "0", seen.refused == 0, own),
+        Figure("processor time, of one core", f"{100 * sum(found.busy.values()):.0f} %", beside=busy),
+        Figure("samples that a watcher did not get", f"{seen.samples_missed}", "0", seen.samples_missed == 0,
+               f"of {seen.samples}, {seen.watchers} watchers, {seen.ended_early} dropped"),
+    ]  # fmt: skip
+
+
+def main() -> int:
+    """The exit code: 1 when a target was missed."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks service_load", description=__doc__)
+    parser.add_argument("--seconds", type=float, default=30.0, help="length of each of the two recordings")
+    parser.add_argument("--stops", type=int, default=60)
+    parser.add_argument("--quick", action="store_true", help="10 s and 10 stops")
+    given = parser.parse_args()
+    seconds, stops = (10.0, 10) if given.quick else (given.seconds, given.stops)
+    found = measure(seconds, stops)
+    title = f"{WATCHERS} watchers, {RATE:g} GETs a second, a fit; 50 Hz at {BAUD} baud"
+    return show(title, "python -m benchmarks service_load", figures_of(found))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,111 @@
+"""A service as a process of its own on a mock outside it: what the measurements of the service share."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+ROBOT = "ma2000"
+ANSWER_WITHIN = 100.0
+END_WITHIN = 15.0
+ENDS = ("done", "failed", "cancelled", "interrupted")
+COMMAND = [sys.executable, "-c", "from daq.cli import main; main()"]
+
+
+@dataclass
+class RunningService:
+    """A service that answers at `url`; `robot` speaks to its robot's part of the API."""
+
+    process: subprocess.Popen[bytes]
+    url: str
+    folder: Path
+    robot: httpx.Client
+
+    def ask(self, method: str, path: str, **request: Any) -> Any:
+        """The answer's JSON. Raises RuntimeError for anything but a 2xx."""
+        answer = self.robot.request(method, path, **request)
+        if not answer.is_success:
+            raise RuntimeError(f"{method} {path}: {answer.status_code} {answer.text}")
+        return answer.json() if answer.content else None
+
+    def submit(self, spec: dict[str, Any]) -> str:
+        """Queues an experiment; its number."""
+        return str(self.ask("POST", "/experiments", json={"spec": spec})["id"])
+
+    def ended(self, kind: str, number: str) -> dict[str, Any]:
+        """Waits for the end of an experiment (`experiments`) or a job (`jobs`)."""
+        while True:
+            found: dict[str, Any] = self.ask("GET", f"/{kind}/{number}", params={"wait": 30})
+            if found["state"] in ENDS:
+                return found
+
+    def until_recording(self, number: str) -> None:
+        """Waits until the record of an experiment has begun. Raises RuntimeError when it ends before."""
+        while True:
+            found = self.ask("GET", f"/experiments/{number}", params={"wait": 0.1})
+            if found["state"] == "running" and " of " in found["progress_text"]:
+                return
+            if found["state"] in ENDS:
+                raise RuntimeError(f"experiment {number} ended {found['state']}: {found['reason']}")
+
+    def kill(self) -> None:
+        """As a power cut does to this one process."""
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait(END_WITHIN)
+
+
+@contextlib.contextmanager
+def started_service(folder: Path, port: str, *options: str) -> Iterator[RunningService]:
+    """`daq serve` with everything it keeps in `folder`; ended with the block."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("DAQ_")}
+    environment |= {"DAQ_RUNTIME_FOLDER": str(folder / "run"), "XDG_CONFIG_HOME": str(folder / "configuration")}
+    with (folder / "service.log").open("ab") as log:
+        process = subprocess.Popen(
+            [*COMMAND, "--port", port, "serve", "--port", "0", *options],
+            cwd=folder,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=log,
+        )
+    assert process.stdout is not None
+    try:
+        url = process.stdout.readline().decode().strip()
+        if not url:
+            raise RuntimeError(f"the service did not start: {(folder / 'service.log').read_text('utf-8')[-500:]}")
+        with httpx.Client(base_url=f"{url}/api/v1/robots/{ROBOT}", timeout=ANSWER_WITHIN) as robot:
+            yield RunningService(process, url, folder, robot)
+    finally:
+        process.terminate()
+        try:
+            process.wait(END_WITHIN)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        process.stdout.close()
+
+
+def ramp(amplitude: float = 0.1, duration: float = 0.5) -> dict[str, Any]:
+    """A short experiment on joints 1 to 3."""
+    trajectory = {"kind": "ramp", "amplitude": amplitude, "duration": duration}
+    return {"trajectory": trajectory, "joints": [1, 2, 3], "settle": 0.1, "hold": 0.1}
+
+
+def sway(seconds: float) -> dict[str, Any]:
+    """An experiment that keeps three joints moving."""
+    trajectory = {"kind": "sine", "amplitude": 0.1, "period": 4.0, "cycles": seconds / 4.0}
+    return {"trajectory": trajectory, "joints": [1, 2, 3], "settle": 0.2, "hold": 0.2}
+
+
+def dice(seed: int) -> random.Random:
+    """Random moments that are the same in every run."""
+    return random.Random(seed)
