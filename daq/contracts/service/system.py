@@ -8,6 +8,11 @@ from daq.contracts.service.base import Wire
 from daq.contracts.service.queue import Role
 
 
+def stop_port_after(port: int) -> int:
+    """Where the stop listener is that belongs to a service at `port`, unless the configuration says otherwise."""
+    return port + 1 if port < 65535 else port - 1
+
+
 class Health(Wire):
     """Whether it answers, and whether it can take experiments. `checks`: one line each; empty where all is well."""
 

@@ -1,0 +1,66 @@
+"""The service as a program sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Self
+
+from daq.client.connection import Connection
+from daq.client.robot import Robot
+from daq.contracts.errors import SpecError
+from daq.contracts.service.robot import RobotSummary
+from daq.contracts.service.system import Me, SystemStatus
+
+
+class Client:
+    """A client of one service. Methods raise ServiceError for what it refuses, ServiceNotReachedError when it is not
+    there. Safe to use from any thread.
+
+    url:      as `daq serve` tells it, such as http://127.0.0.1:8300
+    token:    as `daq token add` shows it; None at loopback
+    stop_url: of the stop listener, where it is not at the port after the service's (behind a proxy)
+    """
+
+    def __init__(self, url: str, token: str | None = None, *, stop_url: str | None = None) -> None:
+        """Connects to nothing yet. Raises SpecError."""
+        self._connection = Connection(url, token)
+        self._stop_url = stop_url
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends all connections."""
+        self._connection.close()
+
+    @property
+    def url(self) -> str:
+        """Of the service."""
+        return self._connection.url
+
+    def me(self) -> Me:
+        """Who the service takes this client for."""
+        return self._connection.get(Me, "me")
+
+    def system(self) -> SystemStatus:
+        """Version, storage, watchers."""
+        return self._connection.get(SystemStatus, "system")
+
+    def robots(self) -> Sequence[RobotSummary]:
+        """The robots of the service."""
+        return self._connection.get(tuple[RobotSummary, ...], "robots")
+
+    def robot(self, name: str | None = None) -> Robot:
+        """One of them, by name; without one, the only one there is. Raises SpecError when there are more."""
+        if name is None:
+            names = [one.robot for one in self.robots()]
+            if len(names) != 1:
+                raise SpecError(f"{self.url} has {len(names)} robots: name one of {', '.join(names)}")
+            name = names[0]
+        return Robot(self._connection, name, self._stop_url)

@@ -1,0 +1,214 @@
+"""Requests to the service and its answers: typed, with problems as errors, and repeated where that changes nothing."""
+
+from __future__ import annotations
+
+import ipaddress
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import httpx
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from daq.client.errors import ServiceError, ServiceNotReachedError
+from daq.contracts.errors import SpecError
+from daq.contracts.service.base import Page
+from daq.contracts.service.problems import ProblemDetails
+
+API = "/api/v1"
+CONNECT_WITHIN = 5.0
+"""s for a connection to be made."""
+ANSWER_WITHIN = 30.0
+"""s for an answer to begin, beyond what the request itself says it may wait."""
+PAUSES = (0.2, 0.5, 1.0)
+"""s before a request that changes nothing is sent a second, third and fourth time."""
+LONGEST_PAUSE = 5.0
+"""s of `Retry-After` that are waited for; a service that asks for more is told about."""
+PART = 65536
+"""Bytes written at once of a file that comes."""
+T = TypeVar("T")
+Query = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Request:
+    """One request. `path` is below the API's; `repeatable` says that sending it twice does what sending it once does;
+    `patience` is in s, beyond ANSWER_WITHIN."""
+
+    method: str
+    path: str
+    body: BaseModel | None = None
+    content: bytes | Iterator[bytes] | None = None
+    query: Query = field(default_factory=dict)
+    headers: Mapping[str, str] = field(default_factory=dict)
+    repeatable: bool = False
+    patience: float = 0.0
+
+
+class Connection:
+    """A service at an address. Safe to use from any thread; `close` ends it."""
+
+    def __init__(
+        self,
+        url: str,
+        token: str | None = None,
+        *,
+        transport: httpx.BaseTransport | None = None,
+        pause: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """`transport` and `pause` are for whoever stands in for the network and its time. Raises SpecError."""
+        self.url = parse_url(url)
+        self.token = token
+        self._pause = pause
+        self._http = httpx.Client(
+            base_url=f"{self.url}{API}",
+            headers={} if token is None else {"Authorization": f"Bearer {token}"},
+            timeout=httpx.Timeout(ANSWER_WITHIN, connect=CONNECT_WITHIN),
+            transport=transport,
+            trust_env=not is_loopback(self.url),  # no proxy can reach this computer's own services
+        )
+
+    def close(self) -> None:
+        """Ends all connections."""
+        self._http.close()
+
+    def ask(self, answer: type[T], request: Request) -> T:
+        """The answer to a request. Raises ServiceError, ServiceNotReachedError."""
+        response = self._sent(request)
+        try:
+            # A newer service may say more than this client knows of.
+            adapter: TypeAdapter[T] = _adapter(cast(Any, answer))
+            return adapter.validate_json(response.content, extra="ignore")
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"])) or "answer"
+            raise ServiceNotReachedError(
+                f"{self.url}: answers, but not as this version's service: {where}: {first['msg']}"
+            ) from error
+
+    def do(self, request: Request) -> None:
+        """A request whose answer says nothing. Raises ServiceError, ServiceNotReachedError."""
+        self._sent(request)
+
+    def get(self, answer: type[T], path: str, *, patience: float = 0.0, **query: Any) -> T:
+        """What an address tells."""
+        return self.ask(answer, Request("GET", path, query=_given(query), repeatable=True, patience=patience))
+
+    def every(self, item: type[T], path: str, **query: Any) -> Iterator[T]:
+        """All items of a list, part by part."""
+        cursor: str | None = None
+        while True:
+            page: Page[T] = self.get(Page[item], path, **query, cursor=cursor)  # type: ignore[valid-type]
+            yield from page.items
+            cursor = page.next
+            if cursor is None:
+                return
+
+    def download(self, path: str, target: Path) -> None:
+        """A file, whole or not at all. Raises OSError when it cannot be written."""
+        part = target.with_name(f".{target.name}.download")
+        try:
+            with self._http.stream("GET", path) as response:
+                if response.is_error:
+                    response.read()
+                    raise ServiceError(_problem(response))
+                with part.open("wb") as stream:
+                    for piece in response.iter_bytes(PART):
+                        stream.write(piece)
+            part.replace(target)
+        except httpx.TransportError as error:
+            raise ServiceNotReachedError(f"{self.url}: not reached: {_reason(error)}") from error
+        finally:
+            part.unlink(missing_ok=True)
+
+    def _sent(self, request: Request) -> httpx.Response:
+        """The answer, repeated as long as that may help. Raises ServiceError, ServiceNotReachedError."""
+        pauses = iter(PAUSES if request.repeatable else ())
+        while True:
+            try:
+                response = self._send(request)
+            except httpx.TransportError as error:
+                if (wait := next(pauses, None)) is None:
+                    raise ServiceNotReachedError(f"{self.url}: not reached: {_reason(error)}") from error
+                self._pause(wait)
+                continue
+            if response.is_success:
+                return response
+            problem = _problem(response)
+            wait = next(pauses, None) if _may_pass(problem) else None
+            if wait is None:
+                raise ServiceError(problem)
+            self._pause(max(wait, min(LONGEST_PAUSE, _retry_after(response))))
+
+    def _send(self, request: Request) -> httpx.Response:
+        content, headers = request.content, dict(request.headers)
+        if request.body is not None:
+            content = request.body.model_dump_json(exclude_none=True).encode()
+            headers["Content-Type"] = "application/json"
+        return self._http.request(
+            request.method,
+            request.path,
+            content=content,
+            params=dict(request.query),
+            headers=headers,
+            timeout=httpx.Timeout(ANSWER_WITHIN + request.patience, connect=CONNECT_WITHIN),
+        )
+
+
+def parse_url(text: str) -> str:
+    """The address of a service, without a slash at its end. Raises SpecError."""
+    try:
+        url = httpx.URL(text)
+    except httpx.InvalidURL as error:
+        raise SpecError(f"server {text!r}: {error}; write http://host:port") from error
+    if url.scheme not in ("http", "https") or not url.host or url.query or url.fragment:
+        raise SpecError(f"server {text!r}: is no address of a service; write http://host:port")
+    if url.userinfo:
+        raise SpecError("server: has a password in it; a service takes a token (DAQ_TOKEN)")
+    return text.rstrip("/")
+
+
+def is_loopback(url: str) -> bool:
+    """Whether an address is of this computer."""
+    host = httpx.URL(url).host
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+@cache
+def _adapter(answer: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(answer)
+
+
+def _given(query: Query) -> Query:
+    return {name: value for name, value in query.items() if value is not None}
+
+
+def _problem(response: httpx.Response) -> ProblemDetails:
+    """What the service says is wrong; of something else that answers, such as a proxy, its status."""
+    try:
+        return ProblemDetails.model_validate_json(response.content)
+    except ValidationError:
+        line = f"{response.request.url}: {response.status_code} {response.reason_phrase}"
+        return ProblemDetails(type="#http", title=response.reason_phrase, status=response.status_code, detail=line)
+
+
+def _may_pass(problem: ProblemDetails) -> bool:
+    """Whether the same request may be answered in a moment."""
+    return problem.status == 429 or (problem.status == 503 and problem.type.endswith("#database"))
+
+
+def _retry_after(response: httpx.Response) -> float:
+    text = response.headers.get("Retry-After", "")
+    return float(text) if text.isdecimal() else 0.0
+
+
+def _reason(error: httpx.TransportError) -> str:
+    if isinstance(error, httpx.TimeoutException):
+        return "no answer in time"
+    return str(error) or type(error).__name__

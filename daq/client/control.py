@@ -1,0 +1,128 @@
+"""The control of the robot: a lease that is renewed as long as it is held, and what may be done with it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import Self, TypeVar
+
+from pydantic import BaseModel
+
+from daq.client.connection import Connection, Request
+from daq.client.errors import ServiceError, ServiceNotReachedError
+from daq.contracts.errors import DaqError
+from daq.contracts.experiment import Gain
+from daq.contracts.service.queue import ControlLease, ControlRequest
+from daq.contracts.service.robot import GripperRequest, JointGains, OutputRequest, ProcessState
+from daq.contracts.service.teaching import JogRequest, LeadRequest, StepRequest, TeachingStatus
+
+HEADER = "Control-Lease"
+T = TypeVar("T")
+JOIN_WITHIN = 10.0
+"""s for the thread of heartbeats to end."""
+
+
+class ControlLostError(DaqError):
+    """The lease has lapsed, or the service is gone: the arm holds."""
+
+    exit_code = 4
+
+
+class HeldControl:
+    """The control while entered; its lease is renewed by a thread of its own. Every motion raises ControlLostError
+    once it is lost."""
+
+    def __init__(self, connection: Connection, robot: str, *, moves_real_arm: bool = False) -> None:
+        self._connection = connection
+        self._path = robot
+        self._moves_real_arm = moves_real_arm
+        self._lease: ControlLease | None = None
+        self._ended = threading.Event()
+        self._lost = ""
+        self._thread = threading.Thread(target=self._renew, name="control-heartbeat", daemon=True)
+
+    def __enter__(self) -> Self:
+        """Takes it. Raises ServiceError when somebody else has it, or a real arm's word is missing."""
+        body = ControlRequest(moves_real_arm=self._moves_real_arm)
+        self._lease = self._connection.ask(ControlLease, Request("POST", f"{self._path}/control", body))
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Gives it back; one that is lost needs no giving back."""
+        self._ended.set()
+        self._thread.join(JOIN_WITHIN)
+        if self._lost:
+            return
+        try:
+            self._connection.do(Request("DELETE", f"{self._path}/control", headers=self._headers()))
+        except (ServiceError, ServiceNotReachedError):
+            if kind is None:
+                raise
+
+    @property
+    def lease(self) -> ControlLease:
+        """The newest one, with its secret. Raises ControlLostError."""
+        if self._lost or self._lease is None:
+            raise ControlLostError(
+                f"the control of the robot is lost: {self._lost or 'it was not taken'}; the arm holds"
+            )
+        return self._lease
+
+    def jog(self, velocities: Mapping[int, float]) -> TeachingStatus:
+        """Drives joints (rad/s) for 0.3 s at most; whoever holds the key repeats it."""
+        return self._teaching("jog", JogRequest(velocities=dict(velocities)))
+
+    def step(
+        self, *, to: Mapping[int, float] | None = None, by: Mapping[int, float] | None = None, speed: float = 0.25
+    ) -> TeachingStatus:
+        """Begins one step to absolute angles, or by relative ones (rad), the fastest joint at `speed` (rad/s)."""
+        given = {name: dict(angles) for name, angles in (("to", to), ("by", by)) if angles is not None}
+        return self._teaching("step", StepRequest(speed=speed, **given))
+
+    def perform(self, program: BaseModel) -> TeachingStatus:
+        """Begins a taught program (`daq.teaching.Program`)."""
+        return self._teaching("program", program)
+
+    def lead(self, joints: Sequence[int]) -> TeachingStatus:
+        """Begins to record a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive."""
+        return self._teaching("lead", LeadRequest(joints=tuple(joints)))
+
+    def finish(self) -> TeachingStatus:
+        """Ends jogging, or leading: its path is in the answer."""
+        return self._teaching("finish", None)
+
+    def set_gains(self, gains: Mapping[int, Gain]) -> JointGains:
+        """Writes gains of the joints named, and reads all back."""
+        return self._put(JointGains, "gains", JointGains(gains=dict(gains)))
+
+    def set_output(self, output: int, *, on: bool) -> ProcessState:
+        """Switches one process output, 0 to 7."""
+        return self._put(ProcessState, f"process/outputs/{output}", OutputRequest(on=on))
+
+    def set_gripper(self, *, closed: bool) -> ProcessState:
+        """Closes or opens the gripper."""
+        return self._put(ProcessState, "gripper", GripperRequest(closed=closed))
+
+    def _teaching(self, what: str, body: BaseModel | None) -> TeachingStatus:
+        request = Request("POST", f"{self._path}/teaching/{what}", body, headers=self._headers())
+        return self._connection.ask(TeachingStatus, request)
+
+    def _put(self, answer: type[T], path: str, body: BaseModel) -> T:
+        return self._connection.ask(answer, Request("PUT", f"{self._path}/{path}", body, headers=self._headers()))
+
+    def _headers(self) -> dict[str, str]:
+        return {HEADER: self.lease.lease}
+
+    def _renew(self) -> None:
+        assert self._lease is not None
+        while not self._ended.wait(self._lease.heartbeat_every):
+            try:
+                request = Request("PUT", f"{self._path}/control", headers=self._headers(), repeatable=True)
+                self._lease = self._connection.ask(ControlLease, request)
+            except (ServiceError, ServiceNotReachedError) as error:
+                self._lost = str(error)
+                return

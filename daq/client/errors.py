@@ -1,0 +1,32 @@
+"""What goes wrong between a client and the service: each error one line, with what to do."""
+
+from __future__ import annotations
+
+from daq.contracts.errors import DaqError, ReachError
+from daq.contracts.service.problems import ProblemDetails
+
+EXIT_WRONG_INPUT, EXIT_NOT_REACHED, EXIT_REFUSED, EXIT_STOPPED, EXIT_FAULT = 2, 3, 4, 6, 1
+_OF_KIND = {"beyond-limits": EXIT_REFUSED, "port-in-use": EXIT_NOT_REACHED, "stopped": EXIT_STOPPED}
+_OF_STATUS = {409: EXIT_REFUSED, 429: EXIT_NOT_REACHED, 500: EXIT_FAULT, 503: EXIT_NOT_REACHED, 507: EXIT_REFUSED}
+
+
+class ServiceError(DaqError):
+    """The service refused a request. `problem` is its application/problem+json, `kind` the end of the problem's type
+    (docs/service.md), `exit_code` what the same refusal ends a local command with."""
+
+    def __init__(self, problem: ProblemDetails) -> None:
+        advice = f"; {problem.advice}" if problem.advice else ""
+        super().__init__(f"{problem.detail}{advice}")
+        self.problem = problem
+        self.kind = problem.type.rpartition("#")[2]
+        of_status = _OF_STATUS.get(problem.status, EXIT_WRONG_INPUT)
+        self.exit_code = _OF_KIND.get(self.kind, of_status)  # type: ignore[misc]
+
+    @property
+    def status(self) -> int:
+        """Of HTTP."""
+        return self.problem.status
+
+
+class ServiceNotReachedError(ReachError):
+    """The service does not answer, or what answers is no such service."""

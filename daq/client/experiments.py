@@ -1,0 +1,151 @@
+"""Experiments, the queue that runs them, and schedules that fill it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from datetime import datetime
+from uuid import uuid4
+
+from daq.client.connection import Connection, Request
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.service.experiments import (
+    Experiment,
+    ExperimentChange,
+    ExperimentRequest,
+    ExperimentState,
+    MotionPreview,
+    Schedule,
+    ScheduleChange,
+    ScheduleRequest,
+)
+from daq.contracts.service.queue import QueueResume, QueueStatus
+
+WAIT = 30.0
+"""s that one question about the end of something waits at the service."""
+ENDS: tuple[ExperimentState, ...] = ("done", "failed", "cancelled", "interrupted")
+
+
+def new_key() -> str:
+    """A key with which a request that is sent twice is carried out once."""
+    return str(uuid4())
+
+
+class Experiments:
+    """What has been, is, and will be run."""
+
+    def __init__(self, connection: Connection, robot: str) -> None:
+        self._connection = connection
+        self._path = f"{robot}/experiments"
+
+    def submit(
+        self, spec: ExperimentSpec, *, at: datetime | None = None, priority: int = 0, key: str | None = None
+    ) -> Experiment:
+        """Puts an experiment into the queue. A lost answer is asked for again under the same `key`: it runs once."""
+        body = ExperimentRequest(spec=spec, at=at, priority=priority)
+        headers = {"Idempotency-Key": key or new_key()}
+        return self._connection.ask(Experiment, Request("POST", self._path, body, headers=headers, repeatable=True))
+
+    def preview(self, spec: ExperimentSpec) -> MotionPreview:
+        """The motion and all that speaks against it; nothing is queued."""
+        body = ExperimentRequest(spec=spec)
+        return self._connection.ask(MotionPreview, Request("POST", f"{self._path}/preview", body, repeatable=True))
+
+    def get(self, experiment: str) -> Experiment:
+        """One of them, as it is now."""
+        return self._connection.get(Experiment, f"{self._path}/{experiment}")
+
+    def list(self, *states: ExperimentState, schedule: str | None = None) -> Iterator[Experiment]:
+        """The newest first; all states where none is named."""
+        return self._connection.every(Experiment, self._path, state=states or None, schedule=schedule)
+
+    def wait(
+        self, experiment: str, seconds: float | None = None, clock: Callable[[], float] = time.monotonic
+    ) -> Experiment:
+        """Waits until it has ended. Raises TimeoutError after `seconds`; it goes on then."""
+        until = None if seconds is None else clock() + seconds
+        while True:
+            left = WAIT if until is None else max(0.0, min(WAIT, until - clock()))
+            path = f"{self._path}/{experiment}"
+            found = self._connection.get(Experiment, path, wait=left, patience=left)
+            if found.state in ENDS:
+                return found
+            if until is not None and clock() >= until:
+                raise TimeoutError(f"experiment {experiment} is {found.state} after {seconds:g} s")
+
+    def cancel(self, experiment: str) -> Experiment:
+        """Takes back what waits; stops the arm where it runs, which needs a reset then."""
+        return self._connection.ask(Experiment, Request("POST", f"{self._path}/{experiment}/cancel"))
+
+    def set_priority(self, experiment: str, priority: int) -> Experiment:
+        """Of one that waits; higher goes first."""
+        body = ExperimentChange(priority=priority)
+        return self._connection.ask(Experiment, Request("PATCH", f"{self._path}/{experiment}", body))
+
+
+class Queue:
+    """Whether experiments are taken, and in which order."""
+
+    def __init__(self, connection: Connection, robot: str) -> None:
+        self._connection = connection
+        self._path = f"{robot}/queue"
+
+    def status(self) -> QueueStatus:
+        """Paused or not, and what is missing."""
+        return self._connection.get(QueueStatus, self._path)
+
+    def waiting(self) -> Sequence[Experiment]:
+        """What waits, in the order in which it will be run."""
+        return self._connection.get(tuple[Experiment, ...], f"{self._path}/experiments")
+
+    def pause(self) -> QueueStatus:
+        """Lets no other experiment begin."""
+        return self._connection.ask(QueueStatus, Request("POST", f"{self._path}/pause"))
+
+    def resume(self, *, moves_real_arm: bool = False) -> QueueStatus:
+        """The operator's word that the queue may move the arm."""
+        body = QueueResume(moves_real_arm=moves_real_arm)
+        return self._connection.ask(QueueStatus, Request("POST", f"{self._path}/resume", body))
+
+    def attend(self) -> QueueStatus:
+        """The operator's word to be there, for a minute more."""
+        return self._connection.ask(QueueStatus, Request("POST", f"{self._path}/attend", repeatable=True))
+
+
+class Schedules:
+    """Experiments that are submitted every so often."""
+
+    def __init__(self, connection: Connection, robot: str) -> None:
+        self._connection = connection
+        self._path = f"{robot}/schedules"
+
+    def create(
+        self,
+        spec: ExperimentSpec,
+        every: float,
+        *,
+        starts: datetime | None = None,
+        count: int | None = None,
+        priority: int = 0,
+    ) -> Schedule:
+        """Every `every` s, from `starts` (None: now), `count` times (None: without end)."""
+        body = ScheduleRequest(spec=spec, every=every, starts=starts, count=count, priority=priority)
+        return self._connection.ask(Schedule, Request("POST", self._path, body))
+
+    def get(self, schedule: str) -> Schedule:
+        """One of them."""
+        return self._connection.get(Schedule, f"{self._path}/{schedule}")
+
+    def list(self) -> Iterator[Schedule]:
+        """The newest first."""
+        return self._connection.every(Schedule, self._path)
+
+    def switch(self, schedule: str, *, active: bool) -> Schedule:
+        """On or off."""
+        return self._connection.ask(
+            Schedule, Request("PATCH", f"{self._path}/{schedule}", ScheduleChange(active=active))
+        )
+
+    def delete(self, schedule: str) -> None:
+        """Takes it away; what it submitted stays."""
+        self._connection.do(Request("DELETE", f"{self._path}/{schedule}"))

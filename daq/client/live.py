@@ -1,0 +1,106 @@
+"""What is happening, as it happens: frames of the service's WebSocket, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from types import TracebackType
+from typing import Self
+
+import httpx
+from pydantic import TypeAdapter, ValidationError
+from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidURI
+from websockets.sync.client import ClientConnection, connect
+
+from daq.client.connection import API, CONNECT_WITHIN, Connection
+from daq.client.errors import ServiceNotReachedError
+from daq.contracts.service.live import LiveFrame, LiveMessage, LiveRequest, SampleRate, Topic
+
+LARGEST_FRAME = 64 << 20
+"""Bytes: the history of an hour."""
+CLOSE_WITHIN = 2.0
+_FRAME: TypeAdapter[LiveFrame] = TypeAdapter(LiveFrame)
+
+
+class LiveStream:
+    """An open stream. Iterate over it for frames; `next_frame` waits no longer than it is told."""
+
+    def __init__(self, connection: Connection, robot: str) -> None:
+        """Raises ServiceNotReachedError, also when the service lets this client not in."""
+        self._url = f"{_websocket(connection.url)}{API}/{robot}/live"
+        headers = {} if connection.token is None else {"Authorization": f"Bearer {connection.token}"}
+        try:
+            self._socket: ClientConnection = connect(
+                self._url, additional_headers=headers, open_timeout=CONNECT_WITHIN, close_timeout=CLOSE_WITHIN,
+                max_size=LARGEST_FRAME, compression=None, proxy=None,
+            )  # fmt: skip
+        except (OSError, InvalidHandshake, InvalidURI, TimeoutError) as error:
+            raise ServiceNotReachedError(f"{self._url}: no stream: {error or 'no answer in time'}") from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends the stream."""
+        self._socket.close()
+
+    def subscribe(
+        self, *topics: Topic, rate: SampleRate | None = None, history: float | None = None, points: int = 1000
+    ) -> None:
+        """From now on also these topics; `rate` samples a second; `history` s of samples at once, in about `points`."""
+        self.send(LiveRequest(subscribe=topics, rate=rate, history=history, points=points))
+
+    def unsubscribe(self, *topics: Topic) -> None:
+        """These no more."""
+        self.send(LiveRequest(unsubscribe=topics))
+
+    def send(self, request: LiveRequest) -> None:
+        """Whatever the stream takes, such as a jog command. Raises ServiceNotReachedError."""
+        try:
+            self._socket.send(request.model_dump_json(exclude_none=True))
+        except ConnectionClosed as error:
+            raise self._lost(error) from error
+
+    def next_frame(self, timeout: float | None = None) -> LiveFrame | None:
+        """The next frame; None when none came within `timeout` s. Raises ServiceNotReachedError."""
+        try:
+            text = self._socket.recv(timeout)
+        except TimeoutError:
+            return None
+        except ConnectionClosed as error:
+            raise self._lost(error) from error
+        try:
+            return _FRAME.validate_json(text, extra="ignore")
+        except ValidationError as error:
+            line = f"{self._url}: a frame is not as this version's service sends them: {error.errors()[0]['msg']}"
+            raise ServiceNotReachedError(line) from error
+
+    def __iter__(self) -> Iterator[LiveFrame]:
+        while (frame := self.next_frame()) is not None:
+            yield frame
+
+    def messages(self) -> Iterator[LiveMessage]:
+        """The messages of all frames, one by one."""
+        for frame in self:
+            yield from frame.messages
+
+    def _lost(self, error: ConnectionClosed) -> ServiceNotReachedError:
+        reason = error.rcvd.reason if error.rcvd is not None and error.rcvd.reason else "the connection is lost"
+        return ServiceNotReachedError(f"{self._url}: {reason}")
+
+
+def open_stream(
+    connection: Connection, robot: str, topics: Iterable[Topic], rate: SampleRate | None, history: float | None
+) -> LiveStream:
+    """A stream that has asked for something."""
+    stream = LiveStream(connection, robot)
+    stream.subscribe(*topics, rate=rate, history=history)
+    return stream
+
+
+def _websocket(url: str) -> str:
+    return str(httpx.URL(url).copy_with(scheme="wss" if url.startswith("https") else "ws")).rstrip("/")

@@ -1,0 +1,100 @@
+"""One robot of the service."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from daq.client import stopping
+from daq.client.connection import Connection, Request
+from daq.client.control import HeldControl
+from daq.client.experiments import Experiments, Queue, Schedules
+from daq.client.jobs import Jobs, Models
+from daq.client.live import LiveStream, open_stream
+from daq.client.traces import Traces
+from daq.contracts.machine import Machine
+from daq.contracts.service.events import ServiceEvent
+from daq.contracts.service.experiments import Experiment
+from daq.contracts.service.live import SampleRate, Topic
+from daq.contracts.service.queue import Control
+from daq.contracts.service.robot import Done, JointGains, ProcessState, ResetRequest, RobotStatus, StopResult
+from daq.contracts.service.teaching import CalibrationRequest, TeachingStatus
+
+CONNECT_PATIENCE = 60.0
+"""s for a mock with its physics engine to start, on a busy computer."""
+
+
+class Robot:
+    """What the service knows of one robot, and may do with it."""
+
+    def __init__(self, connection: Connection, name: str, stop_url: str | None = None) -> None:
+        self.name = name
+        self._connection = connection
+        self._path = f"robots/{name}"
+        self._stop_addresses = stopping.stop_addresses(connection.url, stop_url)
+        self.experiments = Experiments(connection, self._path)
+        self.queue = Queue(connection, self._path)
+        self.schedules = Schedules(connection, self._path)
+        self.traces = Traces(connection, self._path)
+        self.jobs = Jobs(connection, self._path)
+        self.models = Models(connection, self._path)
+
+    def stop(self) -> StopResult:
+        """Freezes the arm, at once. Read `confirmed`: anything else means that the emergency stop is needed.
+
+        Asked for at the service and at its stop listener at the same time; never raises.
+        """
+        return stopping.stop(self._stop_addresses, self._path, self._connection.token)
+
+    def status(self) -> RobotStatus:
+        """Everything about it now; every value says how old it is."""
+        return self._connection.get(RobotStatus, self._path)
+
+    def machine(self) -> Machine:
+        """Its machine file, with the service's limits in it."""
+        return self._connection.get(Machine, f"{self._path}/machine")
+
+    def connect(self) -> RobotStatus:
+        """Has the service connect, and keep connected. Moves nothing."""
+        request = Request("POST", f"{self._path}/connect", repeatable=True, patience=CONNECT_PATIENCE)
+        return self._connection.ask(RobotStatus, request)
+
+    def disconnect(self) -> Done:
+        """Has the service give the port back."""
+        return self._connection.ask(Done, Request("POST", f"{self._path}/disconnect"))
+
+    def reset(self, *, here: bool = False) -> Done:
+        """Ends a stop or a fault; with `here` the posture measured now becomes the set points first."""
+        return self._connection.ask(Done, Request("POST", f"{self._path}/reset", ResetRequest(here=here)))
+
+    def gains(self) -> JointGains:
+        """P, I, D of every joint."""
+        return self._connection.get(JointGains, f"{self._path}/gains")
+
+    def process(self) -> ProcessState:
+        """Process inputs and outputs, and the gripper."""
+        return self._connection.get(ProcessState, f"{self._path}/process")
+
+    def teaching(self) -> TeachingStatus:
+        """What is being taught now, and how the last one ended."""
+        return self._connection.get(TeachingStatus, f"{self._path}/teaching")
+
+    def events(self, experiment: str | None = None) -> Iterator[ServiceEvent]:
+        """What happened, and who asked for it; the newest first."""
+        return self._connection.every(ServiceEvent, f"{self._path}/events", experiment=experiment)
+
+    def control_status(self) -> Control:
+        """Who may move it now."""
+        return self._connection.get(Control, f"{self._path}/control")
+
+    def control(self, *, moves_real_arm: bool = False) -> HeldControl:
+        """The control of the robot, for a `with` block; a real arm needs the operator's word."""
+        return HeldControl(self._connection, self._path, moves_real_arm=moves_real_arm)
+
+    def calibrate_gain(self, joints: Sequence[int] = (1, 2, 3)) -> Experiment:
+        """Queues the experiment that shows the actual proportional gains (`traces.gains` tells them afterwards)."""
+        body = CalibrationRequest(joints=tuple(joints))
+        return self._connection.ask(Experiment, Request("POST", f"{self._path}/calibrations/gain", body))
+
+    def live(self, *topics: Topic, rate: SampleRate | None = None, history: float | None = None) -> LiveStream:
+        """A stream of what happens: samples, robot, link, queue, jobs, events, teaching."""
+        return open_stream(self._connection, self._path, topics, rate, history)

@@ -1,0 +1,76 @@
+"""A stop through the service, asked for at two doors at once: the service's own, and the one beside it that its event
+loop has no part in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+
+import httpx
+from pydantic import ValidationError
+
+from daq.client.connection import API
+from daq.contracts.service.problems import ProblemDetails
+from daq.contracts.service.robot import StopResult
+from daq.contracts.service.system import stop_port_after
+
+CONNECT_WITHIN = 1.0
+ANSWER_WITHIN = 3.0
+"""s for one door: the service itself answers within 1.1 s, whatever the link does."""
+
+
+def stop_addresses(url: str, stop_url: str | None = None) -> list[str]:
+    """Where a stop can be asked for: at the service, and at its stop listener, which is `stop_url` or, where the
+    service's address says its port, the port after that."""
+    if stop_url is not None:
+        return [url, stop_url.rstrip("/")]
+    found = httpx.URL(url)
+    if found.scheme != "http" or found.port is None:
+        return [url]  # a proxy stands before it: what it calls the listener is not known
+    return [url, str(found.copy_with(port=stop_port_after(found.port), path="/")).rstrip("/")]
+
+
+def stop(addresses: Sequence[str], robot_path: str, token: str | None) -> StopResult:
+    """Asks at every address at once; the first confirmed answer counts, else the one that says most.
+
+    Never raises: what is not known is in the result, which then says to use the emergency stop.
+    """
+    headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+    pool = ThreadPoolExecutor(len(addresses), thread_name_prefix="stop")
+    asked: set[Future[StopResult]] = {
+        pool.submit(_ask, f"{address}{API}/{robot_path}/stop", headers) for address in addresses
+    }
+    answers: list[StopResult] = []
+    try:
+        while asked:
+            done, asked = wait(asked, return_when=FIRST_COMPLETED)
+            answers += [one.result() for one in done]
+            if any(answer.confirmed for answer in answers):
+                break
+    finally:
+        pool.shutdown(wait=False)
+    return max(answers, key=lambda answer: (answer.confirmed, answer.delivered, answer.seconds > 0))
+
+
+def _ask(url: str, headers: dict[str, str]) -> StopResult:
+    try:
+        timeout = httpx.Timeout(ANSWER_WITHIN, connect=CONNECT_WITHIN)
+        response = httpx.post(url, headers=headers, timeout=timeout, trust_env=False)
+    except httpx.HTTPError as error:
+        return _undelivered(f"{url}: {_reason(error)}")
+    try:
+        if response.is_success:
+            return StopResult.model_validate_json(response.content, extra="ignore")
+        problem = ProblemDetails.model_validate_json(response.content)
+        return _undelivered(f"{problem.detail}; {problem.advice}".strip("; "))
+    except ValidationError:
+        return _undelivered(f"{url}: answers {response.status_code}, but is no such service")
+
+
+def _undelivered(why: str) -> StopResult:
+    text = f"stop NOT DELIVERED: {why}. Use the emergency stop."
+    return StopResult(delivered=False, confirmed=False, seconds=0.0, text=text)
+
+
+def _reason(error: httpx.HTTPError) -> str:
+    return "no answer in time" if isinstance(error, httpx.TimeoutException) else str(error) or type(error).__name__
