@@ -1,8 +1,8 @@
 """Spectra of the residual as a torque: which angle or time frequency a ripple or a disturbance would have.
 
-The response of a joint's reading to a torque on it is taken as a finite impulse response, fitted to exact derivatives
-of a few simulated tones. It is only right on average, friction being what it is, but a proposal is all that is needed:
-the fit that follows uses the model itself.
+The response of a joint's reading to a torque on it is taken as a finite impulse response, fitted to what a
+few small simulated tones change. It is only right on average, friction being what it is, but a proposal is all that is
+needed: the fit that follows uses the model itself.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from model.discrepancy.candidates import TONES, tone
-from model.discrepancy.observation import Observation
+from model.discrepancy.observation import DIFFERENCE, Observation
 from model.discrepancy.probing import Probed, Projection, projection
 from model.discrepancy.search import Point
-from model.dynamics.dual import DUAL_STEP
 
 Floats = NDArray[np.float64]
 
@@ -56,16 +55,20 @@ def torque_response(observation: Observation, point: Point, joint: int) -> Float
         if not any(u.name == name and joint in u.joints for u in model.effects):
             model = model.with_effect(name, (joint,))
     vector, initials = observation.state(model, point.unknowns, point.values)
-    vectors, waves = [], []
+    vectors, sizes, waves = [vector], [], []
     for name, shape, values in zip(TONES, ("cycles", "frequency"), (TRIAL_CYCLES, TRIAL_FREQUENCIES), strict=True):
         for value in values:
-            row = vector.astype(np.complex128)
+            row = vector.copy()
             row[list(model.parameter(f"joint{joint}.{name}.{shape}").slots)] = value
-            row[list(model.parameter(f"joint{joint}.{name}.sine").slots)] += 1j * DUAL_STEP
+            sine = model.parameter(f"joint{joint}.{name}.sine")
+            size = DIFFERENCE * (sine.deviation or 1.0)
+            row[list(sine.slots)] += size
             vectors.append(row)
+            sizes.append(size)
             waves.append(np.sin(_phase(observation, point, name, column, np.array([value]))[0]))
-    starts = [np.tile(i.astype(np.complex128), (len(vectors), 1, 1)) for i in initials]
-    shown = observation.readings(model, np.array(vectors), starts, point.noise)[0][..., column].imag / DUAL_STEP
+    starts = [np.tile(i, (len(vectors), 1, 1)) for i in initials]
+    shown = observation.readings(model, np.array(vectors), starts, point.noise)[0][..., column]
+    shown = (shown[1:] - shown[:1]) / np.array(sizes)[:, None]
     rows = [_lagged(wave) for wave in waves]
     regressor = np.concatenate([r[RESPONSE_SAMPLES:] for r in rows])
     target = np.concatenate([s[RESPONSE_SAMPLES:] for s in shown])
