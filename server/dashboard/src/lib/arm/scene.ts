@@ -1,0 +1,255 @@
+/** The arm in 3-D. Draws when something has changed and not otherwise; loaded only where a page shows it. */
+
+import {
+  CircleGeometry,
+  DirectionalLight,
+  GridHelper,
+  Group,
+  HemisphereLight,
+  type LineBasicMaterial,
+  Mesh,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  PerspectiveCamera,
+  Scene,
+  WebGLRenderer,
+} from 'three';
+import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import type { Way } from '../trajectory/preview';
+import { reachOf, tipOf, type Chain, type Vector } from './chain';
+import type { ArmColours } from './colours';
+import { ArmFigure, type FigureMaterials } from './figure';
+import { Trail } from './trail';
+import { cameraAt, fittingDistance, turned, viewFrom, viewNamed, type View, type ViewName } from './views';
+import { WayLine } from './way_line';
+
+const FIELD_OF_VIEW = 32;
+/** What has to be in the picture, as a share of the reach: the arm in any posture would be 1. */
+const SHOWN = 1.02;
+/** m. */
+const GRID_SQUARE = 0.1;
+const FINEST_PIXELS = 2;
+
+/** What is shown. Postures in rad, one value a joint. */
+export interface ArmPicture {
+  readonly posture: readonly number[] | null;
+  /** Where the arm is told to be, or where a limit is broken. */
+  readonly ghost?: readonly number[] | null;
+  readonly ghostIsViolation?: boolean;
+  readonly way?: Way | null;
+  readonly marks?: readonly Vector[];
+  readonly trail?: boolean;
+  readonly stale?: boolean;
+  readonly closed?: boolean;
+}
+
+/** Raises an Error where the browser has no WebGL. */
+export class ArmScene {
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 20);
+  private readonly controls: OrbitControls;
+  private readonly observer: ResizeObserver;
+  private readonly arm: ArmFigure;
+  private readonly ghost: ArmFigure;
+  private readonly shadow: ArmFigure;
+  private readonly trail = new Trail();
+  private readonly wayLine: WayLine;
+  private readonly ground = new Group();
+  private readonly groundMaterial = new MeshBasicMaterial();
+  private readonly shadowMaterial = new MeshBasicMaterial();
+  private readonly ghostMaterial = new MeshLambertMaterial({ transparent: true, opacity: 0.32, depthWrite: false });
+  private readonly materials: { links: MeshLambertMaterial[]; body: MeshLambertMaterial };
+  private readonly target: Vector;
+  private readonly floor: number;
+  private shown: ArmPicture = { posture: null };
+  private frame = 0;
+  private chosen: ViewName | null = 'corner';
+
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    private readonly chain: Chain,
+    floor: number | null,
+    private colours: ArmColours,
+  ) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'low-power' });
+    const reach = this.reach;
+    this.floor = floor ?? -0.6 * reach;
+    this.target = [0, 0, 0.1 * reach];
+    this.materials = { links: chain.map(() => new MeshLambertMaterial()), body: new MeshLambertMaterial() };
+    this.arm = new ArmFigure(chain, this.materials, this.floor);
+    this.ghost = new ArmFigure(chain, all(chain, this.ghostMaterial), null);
+    this.shadow = new ArmFigure(chain, all(chain, this.shadowMaterial), null);
+    this.wayLine = new WayLine(0.028 * reach);
+    this.build(reach);
+    this.camera.up.set(0, 0, 1);
+    this.controls = this.orbit();
+    this.setColours(colours);
+    this.show(this.shown);
+    this.observer = new ResizeObserver(() => this.resize());
+    this.observer.observe(canvas);
+    this.resize();
+  }
+
+  show(picture: ArmPicture): void {
+    const before = this.shown;
+    this.shown = picture;
+    const { posture, ghost } = picture;
+    this.arm.group.visible = this.shadow.group.visible = posture !== null;
+    this.ghost.group.visible = Boolean(ghost);
+    if (posture) {
+      for (const figure of [this.arm, this.shadow]) figure.take(posture);
+      if (picture.trail) this.trail.add(tipOf(this.chain, posture));
+    }
+    if (ghost) this.ghost.take(ghost);
+    if (picture.closed !== before.closed) this.arm.grip(picture.closed ?? false);
+    if (picture.trail !== before.trail && !picture.trail) this.trail.clear();
+    if (picture.way !== before.way || picture.marks !== before.marks) this.showWay();
+    if (picture.stale !== before.stale || picture.ghostIsViolation !== before.ghostIsViolation) this.paint();
+    this.invalidate();
+  }
+
+  /** After a change of the theme. */
+  setColours(colours: ArmColours): void {
+    this.colours = colours;
+    this.paint();
+    this.showWay();
+    this.invalidate();
+  }
+
+  look(name: ViewName): void {
+    this.chosen = name;
+    this.place(viewNamed(name, this.fitting));
+  }
+
+  /** Turns by angles (rad) about the target; `zoom` < 1 comes nearer. */
+  turn(azimuth: number, elevation: number, zoom: number): void {
+    this.chosen = null;
+    const { x, y, z } = this.camera.position;
+    this.place(turned(viewFrom([x, y, z], this.target), azimuth, elevation, zoom, this.fitting));
+  }
+
+  clearTrail(): void {
+    this.trail.clear();
+    this.invalidate();
+  }
+
+  dispose(): void {
+    cancelAnimationFrame(this.frame);
+    this.observer.disconnect();
+    this.controls.dispose();
+    for (const part of [this.arm, this.ghost, this.shadow, this.trail, this.wayLine]) part.dispose();
+    this.disposeGround();
+    this.renderer.dispose();
+  }
+
+  private get reach(): number {
+    return reachOf(this.chain) || 1;
+  }
+
+  private get fitting(): number {
+    return fittingDistance(SHOWN * this.reach, (FIELD_OF_VIEW * Math.PI) / 180, this.camera.aspect);
+  }
+
+  private build(reach: number): void {
+    const sun = new DirectionalLight(0xffffff, 2.2);
+    sun.position.set(-1, -2, 3);
+    this.scene.add(new HemisphereLight(0xffffff, 0x8090a0, 1.5), sun);
+    this.scene.add(this.ground, this.shadow.group, this.arm.group, this.trail.line, this.wayLine.group);
+    this.scene.add(this.ghost.group);
+    const disc = new Mesh(new CircleGeometry(1.35 * reach, 72), this.groundMaterial);
+    disc.position.z = this.floor - 0.002;
+    this.ground.add(disc);
+    this.shadow.group.scale.z = 1e-4;
+    this.shadow.group.position.z = this.floor + 0.001;
+  }
+
+  private orbit(): OrbitControls {
+    const controls = new OrbitControls(this.camera, this.canvas);
+    controls.enablePan = false;
+    controls.enableZoom = false;
+    controls.target.set(...this.target);
+    controls.addEventListener('change', () => this.invalidate());
+    controls.addEventListener('start', () => (this.chosen = null));
+    // A page that is scrolled over the picture must not be caught by it: the wheel zooms once the picture is chosen.
+    this.canvas.addEventListener('focus', () => (controls.enableZoom = true));
+    this.canvas.addEventListener('blur', () => (controls.enableZoom = false));
+    return controls;
+  }
+
+  private place(view: View): void {
+    this.camera.position.set(...cameraAt(view, this.target));
+    this.controls.minDistance = 0.35 * this.fitting;
+    this.controls.maxDistance = 3 * this.fitting;
+    this.controls.update();
+    this.invalidate();
+  }
+
+  private paint(): void {
+    const { colours, shown } = this;
+    this.materials.links.forEach((material, index) => {
+      material.color.set(shown.stale ? colours.stale : (colours.joints[index] ?? colours.body));
+    });
+    this.materials.body.color.set(shown.stale ? colours.stale : colours.body);
+    this.ghostMaterial.color.set(shown.ghostIsViolation ? colours.outside : colours.ghost);
+    this.shadowMaterial.color.set(colours.shadow);
+    this.groundMaterial.color.set(colours.ground);
+    this.trail.setColour(colours.trail);
+    this.regrid();
+  }
+
+  private showWay(): void {
+    const { way = null, marks = [] } = this.shown;
+    this.wayLine.show(way, marks, this.colours.trail, this.colours.outside);
+  }
+
+  /** A grid has its colours in its geometry: another theme needs another one. */
+  private regrid(): void {
+    const before = this.ground.children.find((child) => child instanceof GridHelper);
+    if (before) this.ground.remove(disposed(before));
+    const squares = 2 * Math.ceil((0.95 * this.reach) / GRID_SQUARE);
+    const grid = new GridHelper(squares * GRID_SQUARE, squares, this.colours.grid, this.colours.grid);
+    grid.rotation.x = Math.PI / 2;
+    grid.position.z = this.floor;
+    this.ground.add(grid);
+  }
+
+  private disposeGround(): void {
+    for (const child of this.ground.children) {
+      if (child instanceof GridHelper) disposed(child);
+      else if (child instanceof Mesh) child.geometry.dispose();
+    }
+    this.groundMaterial.dispose();
+  }
+
+  private resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (width === 0 || height === 0) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, FINEST_PIXELS));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    if (this.chosen) this.look(this.chosen);
+    this.draw();
+  }
+
+  private invalidate(): void {
+    this.frame ||= requestAnimationFrame(() => this.draw());
+  }
+
+  private draw(): void {
+    cancelAnimationFrame(this.frame);
+    this.frame = 0;
+    this.renderer.render(this.scene, this.camera);
+  }
+}
+
+function all(chain: Chain, material: MeshBasicMaterial | MeshLambertMaterial): FigureMaterials {
+  return { links: chain.map(() => material), body: material };
+}
+
+function disposed(grid: GridHelper): GridHelper {
+  grid.geometry.dispose();
+  (grid.material as LineBasicMaterial).dispose();
+  return grid;
+}

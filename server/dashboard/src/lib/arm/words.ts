@@ -1,0 +1,16 @@
+/** The picture of the arm in words, for people who do not see it. */
+
+import { tipOf, type Chain } from './chain';
+
+/** One line: where the end is (mm) and how every joint stands (°, mm on a prismatic one). */
+export function armInWords(chain: Chain, posture: readonly number[] | null, stale = false): string {
+  if (posture === null) return 'The posture of the arm is not known.';
+  const [x, y, z] = tipOf(chain, posture).map((value) => Math.round(value * 1000));
+  const joints = chain.map((joint, index) => {
+    const value = posture[index]!;
+    const text = joint.revolute ? `${((value * 180) / Math.PI).toFixed(1)}°` : `${(value * 1000).toFixed(1)} mm`;
+    return `${index + 1} ${joint.name} ${text}`;
+  });
+  const old = stale ? 'Not live: the last that is known. ' : '';
+  return `${old}End of the arm at x ${x}, y ${y}, z ${z} mm. Joints: ${joints.join(', ')}.`;
+}
