@@ -14,19 +14,30 @@ WORKERS ?=
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all lint format requirements bench clean distclean
+.PHONY: help serve demo page test test-all lint format types requirements bench clean distclean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
+serve: $(FOR_USE) ## the dashboard and the service, on the mock controller unless daq.toml says otherwise
+	@$(BIN)/python hatch_build.py
+	@$(BIN)/daq serve
+
 demo: $(FOR_USE) ## record a ramp-step on joints 1-3 of the mock controller, and show it
 	@$(BIN)/daq demo
 
-test: lint ## lint, types, import contracts, then the tests
+page: $(FOR_USE) ## build the dashboard's page where it is out of date
+	@$(BIN)/python hatch_build.py
+
+test: lint page ## lint, types, import contracts, then the tests
+	@echo "== tests of the page's modules"
+	@$(BIN)/python hatch_build.py test
 	@echo "== tests"
 	@$(BIN)/python -m pytest -q $(WORKERS) -m "not slow"
 
-test-all: lint ## the same, with the slow tests
+test-all: lint page ## the same, with the slow tests
+	@echo "== tests of the page's modules"
+	@$(BIN)/python hatch_build.py test
 	@echo "== tests, the slow ones too"
 	@$(BIN)/python -m pytest -q $(WORKERS)
 
@@ -39,20 +50,26 @@ lint: $(FOR_DEVELOPMENT) ## lint, format, types and import contracts, without th
 	@$(BIN)/mypy --no-error-summary
 	@echo "== import contracts"
 	@$(BIN)/lint-imports >.venv/import-contracts.log 2>&1 || { cat .venv/import-contracts.log; exit 1; }
+	@echo "== page"
+	@$(BIN)/python hatch_build.py check
 
 format: $(FOR_DEVELOPMENT) ## format the sources and mend what ruff can mend
 	@$(BIN)/ruff check --fix-only --quiet
 	@$(BIN)/ruff format --quiet
+	@$(BIN)/python hatch_build.py format
+
+types: $(FOR_DEVELOPMENT) ## make the page's types of the API anew, after a change of the API
+	@$(BIN)/python hatch_build.py types format
 
 bench: $(FOR_DEVELOPMENT) ## measure the figures of docs/benchmarks.md, shorter than there
 	@$(BIN)/python -m benchmarks main-job --quick
 
 clean: ## remove caches and what was built
-	@rm -rf build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	@rm -rf build dist server/dashboard/dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	@find . -name __pycache__ -type d -not -path './.venv/*' -prune -exec rm -rf {} +
 
 distclean: clean ## the same, and .venv
-	@rm -rf .venv
+	@rm -rf .venv server/dashboard/node_modules
 
 # ---- the virtual environment
 

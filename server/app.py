@@ -13,6 +13,7 @@ from fastapi.routing import APIRoute
 from server import problems
 from server.access.gate import Gate
 from server.api import controller, experiments, jobs, live, presets, queue, robots, system, teaching, traces
+from server.page import page_router
 from server.services import Services
 
 API = "/api/v1"
@@ -61,6 +62,7 @@ def bare_app(services: Services | None) -> FastAPI:
         api.include_router(part.router)
     app.include_router(api)
     app.include_router(system.plain)
+    app.include_router(page_router())
     return app
 
 

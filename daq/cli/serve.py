@@ -30,5 +30,9 @@ def serve(
 
 
 def _tell(address: str) -> None:
+    from server.page import NOT_BUILT, is_built
+
     console().print(f"serving {address} (Ctrl-C ends it)")
+    if not is_built():
+        console().print(NOT_BUILT)
     print(address, flush=True)

@@ -54,7 +54,12 @@ export class ArmFigure {
       new CylinderGeometry(LINK_RADIUS * 0.8 * this.size, LINK_RADIUS * this.size, 1, SIDES),
     );
     const barrel = this.kept(
-      new CylinderGeometry(BARREL_RADIUS * this.size, BARREL_RADIUS * this.size, BARREL_LENGTH * this.size, SIDES),
+      new CylinderGeometry(
+        BARREL_RADIUS * this.size,
+        BARREL_RADIUS * this.size,
+        BARREL_LENGTH * this.size,
+        SIDES,
+      ),
     );
     this.links = chain.map((joint, index) =>
       joint.a === 0 && joint.d === 0 && joint.revolute ? null : this.mesh(link, materials.links[index]!),

@@ -58,7 +58,11 @@ export class ArmScene {
   private readonly ground = new Group();
   private readonly groundMaterial = new MeshBasicMaterial();
   private readonly shadowMaterial = new MeshBasicMaterial();
-  private readonly ghostMaterial = new MeshLambertMaterial({ transparent: true, opacity: 0.32, depthWrite: false });
+  private readonly ghostMaterial = new MeshLambertMaterial({
+    transparent: true,
+    opacity: 0.32,
+    depthWrite: false,
+  });
   private readonly materials: { links: MeshLambertMaterial[]; body: MeshLambertMaterial };
   private readonly target: Vector;
   private readonly floor: number;

@@ -12,7 +12,11 @@ export class Trail {
   private readonly positions = new Float32Array(3 * CAPACITY);
   private readonly colours = new Float32Array(4 * CAPACITY);
   private readonly geometry = new BufferGeometry();
-  private readonly material = new LineBasicMaterial({ vertexColors: true, transparent: true, depthWrite: false });
+  private readonly material = new LineBasicMaterial({
+    vertexColors: true,
+    transparent: true,
+    depthWrite: false,
+  });
   private colour = new Color();
   private count = 0;
 

@@ -1,6 +1,15 @@
 import { describe, expect, it } from 'vitest';
 import type { Vector } from './chain';
-import { cameraAt, fittingDistance, turned, turnOfKey, viewFrom, viewNamed, VIEWS, type ViewName } from './views';
+import {
+  cameraAt,
+  fittingDistance,
+  turned,
+  turnOfKey,
+  viewFrom,
+  viewNamed,
+  VIEWS,
+  type ViewName,
+} from './views';
 
 const TARGET: Vector = [0.1, -0.2, 0.3];
 

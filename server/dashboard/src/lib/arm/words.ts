@@ -8,7 +8,9 @@ export function armInWords(chain: Chain, posture: readonly number[] | null, stal
   const [x, y, z] = tipOf(chain, posture).map((value) => Math.round(value * 1000));
   const joints = chain.map((joint, index) => {
     const value = posture[index]!;
-    const text = joint.revolute ? `${((value * 180) / Math.PI).toFixed(1)}°` : `${(value * 1000).toFixed(1)} mm`;
+    const text = joint.revolute
+      ? `${((value * 180) / Math.PI).toFixed(1)}°`
+      : `${(value * 1000).toFixed(1)} mm`;
     return `${index + 1} ${joint.name} ${text}`;
   });
   const old = stale ? 'Not live: the last that is known. ' : '';

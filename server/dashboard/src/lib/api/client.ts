@@ -1,0 +1,76 @@
+/**
+ * The service's API, typed by its own description.
+ *
+ *   const machine = await ask(api.GET('/api/v1/robots/{robot}/machine', { params: { path: here() } }));
+ *
+ * `ask` gives the answer's data, or throws a Problem.
+ */
+
+import createClient from 'openapi-fetch';
+import { notAnswered, Problem, problemOf } from './problem';
+import type { paths } from './schema';
+import { currentToken } from './token';
+import type { Told } from './types';
+
+export const api = createClient<paths>({ baseUrl: location.origin });
+
+api.use({
+  onRequest({ request }) {
+    const token = currentToken();
+    if (token !== null) request.headers.set('Authorization', `Bearer ${token}`);
+    return request;
+  },
+});
+
+let robot = '';
+
+/** The robot that this page shows: the part `robot` of an address. */
+export function here(): { robot: string } {
+  return { robot };
+}
+
+/** Chooses the robot; called once, before anything else is shown. */
+export function showRobot(name: string): void {
+  robot = name;
+}
+
+interface Answer<T> {
+  data?: T;
+  error?: unknown;
+  response: Response;
+}
+
+/** The data of an answer. Throws a Problem. */
+export async function ask<T>(request: Promise<Answer<T>>): Promise<Told<T>> {
+  let answer: Answer<T>;
+  try {
+    answer = await request;
+  } catch (error) {
+    throw error instanceof Problem || (error instanceof DOMException && error.name === 'AbortError')
+      ? error
+      : notAnswered();
+  }
+  if (!answer.response.ok) throw problemOf(answer.response.status, answer.error);
+  return answer.data as Told<T>;
+}
+
+/** The address of a file to download: a picture, a trace. With a token the file is fetched first: see `download`. */
+export function addressOf(path: string): string {
+  return `/api/v1/robots/${encodeURIComponent(robot)}${path}`;
+}
+
+/** Saves a file of the service under a name of its own. Throws a Problem. */
+export async function download(path: string, name: string): Promise<void> {
+  const token = currentToken();
+  const headers: HeadersInit = token === null ? {} : { Authorization: `Bearer ${token}` };
+  const answer = await fetch(addressOf(path), { headers }).catch(() => {
+    throw notAnswered();
+  });
+  if (!answer.ok) throw problemOf(answer.status, await answer.json().catch(() => null));
+  const address = URL.createObjectURL(await answer.blob());
+  const link = document.createElement('a');
+  link.href = address;
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(address), 10_000);
+}

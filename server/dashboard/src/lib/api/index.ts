@@ -1,0 +1,3 @@
+export { addressOf, api, ask, download, here } from './client';
+export { asProblem, Problem } from './problem';
+export type * from './types';

@@ -1,0 +1,206 @@
+/** What a chart is made of, and how it is turned into uPlot's options. The component only draws it. */
+
+import uPlot from 'uplot';
+
+export interface ChartSeries {
+  label: string;
+  /** A CSS colour; for joints `jointColour(joint)`. */
+  colour: string;
+  /** Lengths of dashes and gaps in px; a full line without. */
+  dash?: number[];
+  width?: number;
+  /** Written at the right end of the line, so that colour is not its only sign. */
+  end?: string;
+  /** Draw points only: measured values without order. */
+  points?: boolean;
+  show?: boolean;
+}
+
+export interface ChartMarker {
+  x: number;
+  label: string;
+  /** `warn`: a limit, a retry; `plain`: a ramp begins. */
+  tone?: 'plain' | 'warn' | 'bad';
+}
+
+export interface ChartColours {
+  ink: string;
+  soft: string;
+  grid: string;
+  warn: string;
+  bad: string;
+  surface: string;
+  font: string;
+}
+
+export interface ChartAxes {
+  /** How a value of the x-axis is written; numbers as they are without. */
+  x?: (value: number) => string;
+  y?: (value: number) => string;
+  /** Fixed places on the x-axis, given what is shown. */
+  splits?: (low: number, high: number) => number[];
+  logX?: boolean;
+  logY?: boolean;
+}
+
+export interface ChartDrawing {
+  series: readonly ChartSeries[];
+  axes: ChartAxes;
+  colours: ChartColours;
+  markers: () => readonly ChartMarker[];
+  /** A fixed range; what the data needs without. */
+  xRange: () => [number, number] | null;
+  yRange: () => [number, number] | null;
+  /** Charts of the same key share their cursor and their zoom. */
+  sync?: string;
+  zoomable: boolean;
+  zoomed: (range: [number, number]) => void;
+  cursorAt: (x: number | null) => void;
+}
+
+const AXIS_FONT_SIZE = 12;
+
+/** Room below and above what the data needs, so that no line runs along the edge. */
+export function padded(low: number, high: number, least = 0): [number, number] {
+  if (!Number.isFinite(low) || !Number.isFinite(high)) return [-1, 1];
+  const span = Math.max(high - low, least, 1e-9);
+  const middle = (low + high) / 2;
+  return [middle - span * 0.56, middle + span * 0.56];
+}
+
+export function optionsOf(drawing: ChartDrawing, width: number, height: number): uPlot.Options {
+  const { colours, axes } = drawing;
+  const font = `${AXIS_FONT_SIZE}px ${colours.font}`;
+  const axis: uPlot.Axis = {
+    font,
+    stroke: colours.soft,
+    grid: { stroke: colours.grid, width: 1 },
+    ticks: { show: false },
+  };
+  const written = (write?: (value: number) => string) =>
+    write === undefined
+      ? {}
+      : {
+          values: (_: uPlot, values: number[]) => values.map((value) => (value === null ? '' : write(value))),
+        };
+  const places = axes.splits;
+  return {
+    width,
+    height,
+    padding: [8, drawing.series.some((one) => one.end) ? 30 : 10, 0, 0],
+    legend: { show: false },
+    cursor: {
+      drag: { x: drawing.zoomable, y: false, setScale: false },
+      points: { size: 7 },
+      ...(drawing.sync === undefined ? {} : { sync: { key: drawing.sync } }),
+    },
+    scales: {
+      x: { time: false, distr: axes.logX ? 3 : 1, range: (_, low, high) => drawing.xRange() ?? [low, high] },
+      y: {
+        distr: axes.logY ? 3 : 1,
+        range: (_, low, high) => drawing.yRange() ?? (axes.logY ? [low, high] : padded(low, high)),
+      },
+    },
+    axes: [
+      {
+        ...axis,
+        size: 32,
+        gap: 6,
+        ...written(axes.x),
+        ...(places === undefined ? {} : { splits: (_, __, low, high) => places(low, high) }),
+      },
+      { ...axis, size: 56, gap: 6, ...written(axes.y) },
+    ],
+    series: [
+      {},
+      ...drawing.series.map((one) => ({
+        label: one.label,
+        stroke: one.colour,
+        width: one.points ? 0 : (one.width ?? 1.75),
+        show: one.show ?? true,
+        points: one.points ? { show: true, size: 4, fill: one.colour } : { show: false },
+        ...(one.dash === undefined ? {} : { dash: one.dash }),
+      })),
+    ],
+    hooks: {
+      draw: [(plot) => drawMarkers(plot, drawing), (plot) => drawEnds(plot, drawing)],
+      setSelect: [(plot) => select(plot, drawing)],
+      setCursor: [
+        (plot) =>
+          drawing.cursorAt(plot.cursor.idx == null ? null : plot.posToVal(plot.cursor.left ?? 0, 'x')),
+      ],
+    },
+  };
+}
+
+function select(plot: uPlot, drawing: ChartDrawing): void {
+  if (plot.select.width < 8) return;
+  drawing.zoomed([
+    plot.posToVal(plot.select.left, 'x'),
+    plot.posToVal(plot.select.left + plot.select.width, 'x'),
+  ]);
+  plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+}
+
+/** Vertical lines with a flag: a dashed line and a letter, since colour must not be the only sign. */
+function drawMarkers(plot: uPlot, drawing: ChartDrawing): void {
+  const { ctx, bbox } = plot;
+  const ratio = devicePixelRatio;
+  const { min, max } = plot.scales['x'] ?? {};
+  ctx.save();
+  ctx.font = `${11 * ratio}px ${drawing.colours.font}`;
+  ctx.textBaseline = 'top';
+  let free = -Infinity;
+  for (const marker of drawing.markers()) {
+    if (marker.x < (min ?? -Infinity) || marker.x > (max ?? Infinity)) continue;
+    const x = Math.round(plot.valToPos(marker.x, 'x', true));
+    const colour = { plain: drawing.colours.soft, warn: drawing.colours.warn, bad: drawing.colours.bad }[
+      marker.tone ?? 'plain'
+    ];
+    ctx.strokeStyle = ctx.fillStyle = colour;
+    ctx.lineWidth = ratio;
+    ctx.setLineDash(marker.tone === undefined || marker.tone === 'plain' ? [2 * ratio, 3 * ratio] : []);
+    ctx.beginPath();
+    ctx.moveTo(x, bbox.top);
+    ctx.lineTo(x, bbox.top + bbox.height);
+    ctx.stroke();
+    const wide = ctx.measureText(marker.label).width;
+    if (x + 4 * ratio > free && x + wide + 4 * ratio < bbox.left + bbox.width) {
+      ctx.fillText(marker.label, x + 4 * ratio, bbox.top + 2 * ratio);
+      free = x + wide + 10 * ratio;
+    }
+  }
+  ctx.restore();
+}
+
+/** Names at the right end of lines, moved apart where they would cover each other. */
+function drawEnds(plot: uPlot, drawing: ChartDrawing): void {
+  const { ctx, bbox } = plot;
+  const ratio = devicePixelRatio;
+  const ends: { y: number; text: string; colour: string }[] = [];
+  drawing.series.forEach((one, index) => {
+    if (one.end === undefined || plot.series[index + 1]?.show === false) return;
+    const last = lastValue(plot.data[index + 1] as ArrayLike<number | null> | undefined);
+    if (last !== null) ends.push({ y: plot.valToPos(last, 'y', true), text: one.end, colour: one.colour });
+  });
+  ends.sort((one, other) => one.y - other.y);
+  ctx.save();
+  ctx.font = `600 ${11 * ratio}px ${drawing.colours.font}`;
+  ctx.textBaseline = 'middle';
+  let free = bbox.top;
+  for (const end of ends) {
+    const y = Math.min(Math.max(end.y, free + 6 * ratio), bbox.top + bbox.height);
+    ctx.fillStyle = end.colour;
+    ctx.fillText(end.text, bbox.left + bbox.width + 6 * ratio, y);
+    free = y + 7 * ratio;
+  }
+  ctx.restore();
+}
+
+function lastValue(column: ArrayLike<number | null> | undefined): number | null {
+  for (let row = (column?.length ?? 0) - 1; row >= 0; row -= 1) {
+    const value = column?.[row] ?? null;
+    if (value !== null) return value;
+  }
+  return null;
+}

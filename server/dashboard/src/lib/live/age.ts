@@ -1,0 +1,46 @@
+/** How old a value is: by the service's clock while frames come, growing by this computer's clock since the last. */
+
+/** s after which a sample is stale: five control periods and a slow frame. */
+export const STALE_AFTER = 0.5;
+
+export class ServiceClock {
+  private now = 0;
+  private heardAt: number | null = null;
+
+  /** A frame that said `now` has arrived at `at` (s, this computer's monotonic clock). */
+  heard(now: number, at: number): void {
+    this.now = now;
+    this.heardAt = at;
+  }
+
+  /** Whether `now` is before what the last frame said, by more than `slack` s. */
+  wentBack(now: number, slack: number): boolean {
+    return this.heardAt !== null && now < this.now - slack;
+  }
+
+  /** The service's clock at `at`; null before the first frame. */
+  at(at: number): number | null {
+    return this.heardAt === null ? null : this.now + (at - this.heardAt);
+  }
+
+  /** s since `hostTime`, at `at`; null before the first frame. */
+  age(hostTime: number, at: number): number | null {
+    const now = this.at(at);
+    return now === null ? null : Math.max(0, now - hostTime);
+  }
+
+  /** s since a frame has arrived. */
+  silence(at: number): number | null {
+    return this.heardAt === null ? null : at - this.heardAt;
+  }
+}
+
+/** An age as a person reads it: 20 ms, 3.4 s, 12 min. */
+export function ageText(age: number | null): string {
+  if (age === null) return 'never';
+  if (age < 1) return `${Math.round(age * 1000)} ms`;
+  if (age < 10) return `${age.toFixed(1)} s`;
+  if (age < 120) return `${Math.round(age)} s`;
+  if (age < 7200) return `${Math.round(age / 60)} min`;
+  return `${Math.round(age / 3600)} h`;
+}

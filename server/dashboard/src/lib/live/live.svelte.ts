@@ -1,0 +1,239 @@
+/**
+ * What the service says live, for every page: `live.robot`, `live.queue`, `live.sample` and their ages.
+ *
+ * Samples arrive fifty times a second. `live.recording` and `live.newest` have them at once, without being reactive;
+ * what is shown as numbers (`live.sample`) follows ten times a second. Charts draw in `onFrame`.
+ */
+
+import { api, ask, here, showRobot } from '../api/client';
+import { asProblem, Problem } from '../api/problem';
+import { LiveSocket, type SocketState } from '../api/socket';
+import type {
+  Job,
+  LinkMessage,
+  LiveFrame,
+  LiveMessage,
+  LiveRequest,
+  Machine,
+  Me,
+  ProgressMessage,
+  QueueStatus,
+  RobotMessage,
+  SampleMessage,
+  ServiceEvent,
+} from '../api/types';
+import { ServiceClock, STALE_AFTER } from './age';
+import { Recording } from './recording';
+
+const SHOWN_EVERY = 100;
+/** s of samples that are kept, and s that are asked for at the start. */
+const KEPT = 300;
+const AT_START = 60;
+const POINTS = 1200;
+const EVENTS_KEPT = 100;
+const LINES_KEPT = 20;
+
+/** s of control, of the original controller; gaps are told by ticks, so that another one does no harm. */
+const PERIOD = 0.02;
+/** s by which the service's clock may seem to go back before its computer is taken to have been started anew. */
+const CLOCK_SLACK = 1;
+
+function jointsOf(count: number): number[] {
+  return Array.from({ length: count }, (_, index) => index + 1);
+}
+
+const seconds = (): number => performance.now() / 1000;
+
+class Live {
+  socket = $state.raw<SocketState>({ phase: 'connecting', attempt: 0 });
+  /** Set when the page cannot be used at all: no token, no service. */
+  problem = $state.raw<Problem | null>(null);
+  machine = $state.raw<Machine | null>(null);
+  me = $state.raw<Me | null>(null);
+  robot = $state.raw<RobotMessage | null>(null);
+  link = $state.raw<LinkMessage | null>(null);
+  queue = $state.raw<QueueStatus | null>(null);
+  /** How far the experiment is that runs; null when none does. */
+  progress = $state.raw<ProgressMessage | null>(null);
+  /** The newest jobs' last messages, by number. Load the list from the API, then follow changes here. */
+  jobs = $state.raw<ReadonlyMap<string, Job>>(new Map());
+  /** What happened since the page was opened, the newest first. */
+  events = $state.raw<readonly ServiceEvent[]>([]);
+  /** Lines for whoever teaches, the newest last. */
+  lines = $state.raw<readonly string[]>([]);
+  /** The last refusal of something that was sent over the socket. */
+  refused = $state.raw<string>('');
+  /** The newest sample, ten times a second. */
+  sample = $state.raw<SampleMessage | null>(null);
+  /** s; null before the first sample. */
+  sampleAge = $state<number | null>(null);
+  /** s since the service has said anything. */
+  silence = $state<number | null>(null);
+  /** s, this page's clock, a few times a second: for whatever shows an age. */
+  now = $state(seconds());
+  /** Largest lateness of samples in the last second, s. */
+  jitter = $state<number | null>(null);
+  isOpen: boolean = $derived(this.socket.phase === 'open');
+  /** Whether what is shown is not what is: no connection, or no samples although the robot is connected. */
+  isStale: boolean = $derived(!this.isOpen || this.sampleAge === null || this.sampleAge > STALE_AFTER);
+  isOperator: boolean = $derived(this.me?.role === 'operator');
+
+  readonly clock = new ServiceClock();
+  recording: Recording | null = null;
+  newest: SampleMessage | null = null;
+  private listeners = new Set<(message: LiveMessage) => void>();
+  private lateness: number[] = [];
+  private connection: LiveSocket | null = null;
+
+  /** Asks who and what there is, then listens for as long as the page lives. */
+  async start(): Promise<void> {
+    setInterval(() => this.tick(), SHOWN_EVERY);
+    await this.begin();
+  }
+
+  /** Tries at once to reach the service. */
+  retryNow(): void {
+    if (this.connection === null) void this.begin();
+    else this.connection.retryNow();
+  }
+
+  /** Sends over the socket. Whether it was open. */
+  send(request: LiveRequest): boolean {
+    return this.connection?.send(request) ?? false;
+  }
+
+  /** Calls back at every message, at once. Returns what ends it. */
+  onMessage(call: (message: LiveMessage) => void): () => void {
+    this.listeners.add(call);
+    return () => this.listeners.delete(call);
+  }
+
+  /** s since `hostTime` of the service's clock. Reactive: it grows. */
+  ageOf(hostTime: number): number | null {
+    return this.clock.age(hostTime, this.now);
+  }
+
+  private async begin(): Promise<void> {
+    try {
+      const [robots, me] = await Promise.all([ask(api.GET('/api/v1/robots')), ask(api.GET('/api/v1/me'))]);
+      const robot = robots[0];
+      if (robot === undefined) throw new Problem(404, 'not-found', 'this service has no robot');
+      showRobot(robot.robot);
+      this.me = me;
+      const machine = await ask(api.GET('/api/v1/robots/{robot}/machine', { params: { path: here() } }));
+      this.machine = machine as Machine;
+      this.recording = new Recording(jointsOf(machine.joints.length), PERIOD, KEPT);
+      this.problem = null;
+    } catch (error) {
+      this.problem = asProblem(error);
+      if (this.problem.status === 0 || this.problem.status >= 500) setTimeout(() => this.retryNow(), 2000);
+      return;
+    }
+    this.connection = this.connect();
+    this.connection.start();
+  }
+
+  private connect(): LiveSocket {
+    const path = `/api/v1/robots/${encodeURIComponent(here().robot)}/live`;
+    return new LiveSocket({
+      ticket: async () => (await ask(api.POST('/api/v1/tickets'))).ticket,
+      open: (ticket) => new WebSocket(`${location.origin.replace(/^http/, 'ws')}${path}?ticket=${ticket}`),
+      wanted: () => ({
+        subscribe: ['samples', 'robot', 'link', 'queue', 'jobs', 'events', 'teaching'],
+        history: this.missing(),
+        points: POINTS,
+      }),
+      frame: (frame, at) => this.hear(frame, at),
+      state: (state) => {
+        this.socket = state;
+      },
+      now: seconds,
+      after: (wait, call) => {
+        const timer = setTimeout(call, wait * 1000);
+        return () => clearTimeout(timer);
+      },
+    });
+  }
+
+  /** s of the past that this page does not have. */
+  private missing(): number {
+    const newest = this.recording?.newest ?? null;
+    const age = newest === null ? null : this.clock.age(newest, seconds());
+    return age === null ? AT_START : Math.min(KEPT, age + 1);
+  }
+
+  private hear(frame: LiveFrame, at: number): void {
+    if (this.clock.wentBack(frame.now, CLOCK_SLACK)) this.beginAnew();
+    this.clock.heard(frame.now, at);
+    for (const message of frame.messages) {
+      this.take(message);
+      for (const listener of this.listeners) listener(message);
+    }
+  }
+
+  /** The service's computer was started anew: what was recorded belongs to another time. */
+  private beginAnew(): void {
+    if (this.recording !== null) this.recording = new Recording(this.recording.joints, PERIOD, KEPT);
+    this.newest = null;
+  }
+
+  private take(message: LiveMessage): void {
+    switch (message.topic) {
+      case 'sample':
+        this.takeSample(message);
+        break;
+      case 'history':
+        this.recording?.addHistory(message);
+        break;
+      case 'record_event':
+        this.recording?.addEvent(message);
+        break;
+      case 'robot':
+        this.robot = message;
+        break;
+      case 'link':
+        this.link = message;
+        break;
+      case 'queue':
+        this.queue = message.status;
+        if (this.queue.running === null) this.progress = null;
+        break;
+      case 'progress':
+        this.progress = message;
+        break;
+      case 'job':
+        this.jobs = new Map([...this.jobs, [message.job.id, message.job]]);
+        break;
+      case 'event':
+        this.events = [message.event, ...this.events].slice(0, EVENTS_KEPT);
+        break;
+      case 'teaching':
+        this.lines = [...this.lines, message.text].slice(-LINES_KEPT);
+        break;
+      case 'refused':
+        this.refused = message.detail;
+        break;
+      case 'thinned':
+        break;
+    }
+  }
+
+  private takeSample(sample: SampleMessage): void {
+    this.newest = sample;
+    this.recording?.addSample(sample);
+    this.lateness.push(sample.lateness);
+  }
+
+  private tick(): void {
+    this.now = seconds();
+    this.silence = this.clock.silence(this.now);
+    if (this.newest !== this.sample) this.sample = this.newest;
+    this.sampleAge = this.newest === null ? null : this.clock.age(this.newest.host_time, this.now);
+    if (this.lateness.length >= 50) {
+      this.jitter = Math.max(...this.lateness);
+      this.lateness = [];
+    }
+  }
+}
+
+export const live = new Live();

@@ -1,0 +1,77 @@
+/** The part of a recording that a chart shows, thinned to what its width can show. Pure. */
+
+import type { Column, Recording, Signal } from './recording';
+
+/** Rows above which columns are thinned: more than the pixels of a wide chart. */
+export const MOST_ROWS = 2400;
+
+export interface Shown {
+  time: number[];
+  /** One a joint asked for. */
+  columns: Column[];
+}
+
+/** Rows of `signal` in [from, to] for these joints (places in the recording), plus one row on either side. */
+export function shownPart(
+  recording: Recording,
+  signals: readonly (readonly [Signal, number])[],
+  from: number,
+  to: number,
+): Shown {
+  const first = Math.max(0, recording.rowAt(from) - 1);
+  const last = Math.min(recording.time.length, recording.rowAt(to) + 1);
+  const columns = signals.map(([signal, place]) => recording.columns[signal][place] ?? []);
+  const every = Math.ceil((last - first) / MOST_ROWS);
+  if (every <= 1) {
+    return {
+      time: recording.time.slice(first, last),
+      columns: columns.map((column) => column.slice(first, last)),
+    };
+  }
+  return thinned(recording, columns, first, last, 2 * every);
+}
+
+/**
+ * Of every stretch of time the smallest and the largest value, in the order in which they came: no peak is lost.
+ * Stretches lie at whole multiples of their length, so that a curve that moves does not shimmer.
+ */
+function thinned(
+  recording: Recording,
+  columns: readonly Column[],
+  first: number,
+  last: number,
+  rows: number,
+): Shown {
+  const length = rows * recording.period;
+  const time: number[] = [];
+  const made: Column[] = columns.map(() => []);
+  let begin = first;
+  while (begin < last) {
+    const stretch = Math.floor((recording.time[begin] as number) / length);
+    let end = begin + 1;
+    while (end < last && Math.floor((recording.time[end] as number) / length) === stretch) end += 1;
+    time.push(stretch * length, (stretch + 0.5) * length);
+    columns.forEach((column, index) => made[index]?.push(...extremes(column, begin, end)));
+    begin = end;
+  }
+  return { time, columns: made };
+}
+
+function extremes(column: Column, begin: number, end: number): [number | null, number | null] {
+  let low: number | null = null;
+  let high: number | null = null;
+  let lowFirst = true;
+  for (let row = begin; row < end; row += 1) {
+    const value = column[row] ?? null;
+    if (value === null) continue;
+    if (low === null || value < low) {
+      low = value;
+      lowFirst = false;
+    }
+    if (high === null || value > high) {
+      high = value;
+      lowFirst = true;
+    }
+  }
+  return lowFirst ? [low, high] : [high, low];
+}

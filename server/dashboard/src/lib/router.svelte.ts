@@ -1,0 +1,39 @@
+/** Which page is shown: the part of the address behind `#`, such as `#/traces/42?joint=2`. */
+
+export interface Route {
+  /** The page: the first part. */
+  page: string;
+  /** The parts that follow. */
+  rest: string[];
+  query: URLSearchParams;
+}
+
+/** Splits what stands behind `#`. */
+export function routeOf(hash: string): Route {
+  const [path = '', query = ''] = hash.replace(/^#\/?/, '').split('?');
+  const [page = '', ...rest] = path.split('/').map(decodeURIComponent);
+  return { page, rest: rest.filter((part) => part !== ''), query: new URLSearchParams(query) };
+}
+
+/** The address of a page, for `href`. */
+export function linkTo(page: string, ...rest: string[]): string {
+  return `#/${[page, ...rest].map(encodeURIComponent).join('/')}`;
+}
+
+class Router {
+  route = $state.raw<Route>(routeOf(''));
+
+  start(): void {
+    const read = (): void => {
+      this.route = routeOf(location.hash);
+    };
+    read();
+    addEventListener('hashchange', read);
+  }
+
+  go(page: string, ...rest: string[]): void {
+    location.hash = linkTo(page, ...rest);
+  }
+}
+
+export const router = new Router();

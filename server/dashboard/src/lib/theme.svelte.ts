@@ -1,0 +1,52 @@
+/** Light or dark: as the system says, or as the user has chosen. Canvases read their colours from here. */
+
+export type Choice = 'system' | 'light' | 'dark';
+const KEY = 'ma2000-theme';
+
+class Theme {
+  choice = $state<Choice>('system');
+  private systemIsDark = $state(false);
+  shown: 'light' | 'dark' = $derived(
+    this.choice === 'system' ? (this.systemIsDark ? 'dark' : 'light') : this.choice,
+  );
+
+  start(): void {
+    const system = matchMedia('(prefers-color-scheme: dark)');
+    this.systemIsDark = system.matches;
+    system.addEventListener('change', (event) => {
+      this.systemIsDark = event.matches;
+      this.show();
+    });
+    const kept = localStorage.getItem(KEY);
+    if (kept === 'light' || kept === 'dark') this.choice = kept;
+    this.show();
+  }
+
+  choose(choice: Choice): void {
+    this.choice = choice;
+    if (choice === 'system') localStorage.removeItem(KEY);
+    else localStorage.setItem(KEY, choice);
+    this.show();
+  }
+
+  /** The other one of the two; the user's choice from now on. */
+  toggle(): void {
+    this.choose(this.shown === 'dark' ? 'light' : 'dark');
+  }
+
+  private show(): void {
+    document.documentElement.dataset['theme'] = this.shown;
+  }
+}
+
+export const theme = new Theme();
+
+/** The value of a design token (`--ink`), for canvases. Read `theme.shown` in the same effect to hear of changes. */
+export function token(name: string): string {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
+
+/** The colour of a joint (from 1), the same in charts, tables and 3-D. */
+export function jointColour(joint: number): string {
+  return token(`--joint-${((joint - 1) % 6) + 1}`);
+}

@@ -1,0 +1,22 @@
+/**
+ * The pages: their place in the address, their names, and what is loaded when one is opened. To add a page, write
+ * `pages/Name.svelte` and a line here.
+ */
+
+import type { Component } from 'svelte';
+import Live from './Live.svelte';
+
+export interface PageEntry {
+  path: string;
+  title: string;
+  load: () => Promise<{ default: Component }> | { default: Component };
+}
+
+export const PAGES: readonly PageEntry[] = [
+  { path: 'live', title: 'Live', load: () => ({ default: Live as Component }) },
+  { path: 'experiments', title: 'Experiments', load: () => import('./Experiments.svelte') },
+  { path: 'traces', title: 'Traces', load: () => import('./Traces.svelte') },
+  { path: 'models', title: 'Models', load: () => import('./Models.svelte') },
+  { path: 'diagnosis', title: 'Diagnosis', load: () => import('./Diagnosis.svelte') },
+  { path: 'system', title: 'System', load: () => import('./System.svelte') },
+];
