@@ -97,10 +97,13 @@ class QueueRow(Table):
 
 
 class TraceRow(Table):
-    """One trace of the folder. `searched` holds what a search looks into, in small letters."""
+    """One trace of the folder. `searched` holds what a search looks into, in small letters.
+
+    The index has the order of the list and all that a search looks at: what is not found is not read from the table.
+    """
 
     __tablename__ = "traces"
-    __table_args__ = (Index("traces_by_time", "robot", "created", "id"),)
+    __table_args__ = (Index("traces_found", "robot", "created", "id", "source", "outcome", "kind", "searched"),)
 
     id: Mapped[str] = mapped_column(String(64), primary_key=True)
     robot: Mapped[str] = mapped_column(String(32))
