@@ -10,7 +10,7 @@ import typer
 from daq.cli.context import JsonOption, console, print_json
 from daq.cli.effect_choice import patterns
 from daq.cli.model_input import MODEL_HELP, EffectFileOption, ReportOption, load_effects, read_model
-from daq.contracts.errors import SafetyError, SpecError
+from daq.contracts.errors import SpecError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from daq.contracts.experiment import ExperimentSpec
-    from daq.contracts.machine import Machine
     from model.design.information import InformationGain
     from model.design.search import DesignedExperiments
     from model.fitting.result import FitResult
@@ -51,6 +50,7 @@ def design(
     Nothing is run: `daq run spec FILE` runs a proposed experiment.
     """
     from daq.cli.model_progress import shown_progress
+    from daq.safety.planned import planned
     from model.design.information import information_gain
     from model.design.search import DesignOptions
     from model.design.search import design as search
@@ -105,6 +105,7 @@ def _report(
     """The page of these experiments, where one is asked for."""
     if path is None:
         return
+    from daq.safety.planned import planned
     from model.reports.design_report import PlannedExperiment, design_report
     from model.reports.page import write_report
 
@@ -113,18 +114,6 @@ def _report(
         for number, spec in enumerate(specs)
     ]
     console().print(f"report: {write_report(design_report(model, plans, gain, how), path)}")
-
-
-def planned(spec: ExperimentSpec, machine: Machine) -> NDArray[np.float64]:
-    """Set points (k, joints) of an experiment, rad. Raises SpecError, SafetyError where it may not be carried out."""
-    from daq.safety import check_plan
-    from daq.trajectories import plan, start_angles
-
-    motion = plan(spec, machine, start_angles(spec, machine))
-    violations = check_plan(motion, machine, machine.limits)
-    if violations:
-        raise SafetyError(str(violations[0]))
-    return motion.angles
 
 
 def _fitted(model: str, parameters: str | None) -> FitResult | None:

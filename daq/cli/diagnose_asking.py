@@ -1,56 +1,25 @@
-"""What `daq diagnose` may ask for: presets and slow reversals elsewhere, as far as the machine's limits allow them."""
+"""What `daq diagnose` may ask for: the library of experiments, as far as the machine's limits allow them."""
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
-
-from daq.cli.design import planned
-from daq.contracts.experiment import Cubic, ExperimentSpec, Pause, Segment, Sequence, SlowRamp
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
     from model.discrepancy.next_experiment import Asker, Experiment
 
-GENERAL = "diagnostic"
-SINGLE = ("ramp", "diagnostic-a", "diagnostic-b", "diagnostic-c", "diagnostic-d", "diagnostic-e")
-ELSEWHERE = (40.0, 35.0, -50.0)
-"""Degrees from the rest posture: the second posture of the diagnostic set."""
-
 
 def asker(machine: Machine, budget: float | None = None) -> Asker:
     """The library of experiments, planned and checked for a machine. budget: s of robot time that are left."""
+    from daq.safety.planned import planned
     from model.discrepancy.next_experiment import Asker
 
     return Asker(tuple(library()), lambda spec: planned(spec, machine), budget)
 
 
 def library() -> list[Experiment]:
-    """The diagnostic set, its parts, the source's ramp, and slow reversals at a second posture."""
-    from daq.trajectories.presets import PRESETS
+    """The experiments that may be asked for."""
+    from daq.trajectories.asked import asked_experiments
     from model.discrepancy.next_experiment import Experiment
 
-    named = [
-        Experiment(name, PRESETS[name].description, PRESETS[name].spec, name == GENERAL) for name in (GENERAL, *SINGLE)
-    ]
-    return [*named, *(_slow(speed) for speed in (2.0, 5.0))]
-
-
-def _slow(speed: float) -> Experiment:
-    """Reversals of all three joints at one low speed, at the second posture."""
-    from model.discrepancy.next_experiment import Experiment
-
-    there = {joint: math.radians(angle) for joint, angle in enumerate(ELSEWHERE, start=1)}
-    back = {joint: -angle for joint, angle in there.items()}
-    size = math.radians(1.5 * speed)
-    amplitude = {1: size, 2: -size, 3: size}
-    moves = (
-        Cubic(amplitude=there, duration=3.0), Pause(duration=0.5),
-        SlowRamp(amplitude=amplitude, speed=math.radians(speed), reversals=3), Pause(duration=0.5),
-        Cubic(amplitude=back, duration=3.0),
-    )  # fmt: skip
-    name = f"slow-reversals-{speed:g}"
-    spec = ExperimentSpec(
-        trajectory=Sequence(segments=tuple(Segment(move=m) for m in moves)), joints=(1, 2, 3), hold=0.5, name=name
-    )
-    return Experiment(name, f"slow reversals at {speed:g} °/s at a second posture", spec)
+    return [Experiment(one.name, one.description, one.spec, one.general) for one in asked_experiments()]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
@@ -14,17 +13,19 @@ from daq.contracts.service.jobs import (
     Job,
     JobKind,
     JobRequest,
-    JobResult,
     JobState,
     ModelChange,
     ModelDetails,
     ModelEntry,
+    ModelLineage,
     ModelName,
+    ModelNumber,
     ModelParameter,
 )
 from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
 from server.jobs.desk import REPORT, RESULT
 from server.jobs.models import LARGEST_MODEL
+from server.jobs.results import JobResult
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
 from server.queue.states import ENDS
@@ -33,6 +34,8 @@ from server.services import RobotServices, Services
 router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
 """A report is one page with its styles in it, and no script."""
+MOST_OF_A_LINEAGE = 500
+"""Models, and jobs."""
 _JSON_FILE = {"application/json": {"schema": {"type": "object"}}}
 
 
@@ -58,11 +61,12 @@ def list_jobs(
     _: Viewer,
     state: Annotated[list[JobState] | None, Query()] = None,
     kind: JobKind | None = None,
+    model: ModelNumber | None = None,
     limit: Limit = 50,
     cursor: CursorOf = None,
 ) -> Page[Job]:
-    """Jobs, the newest first."""
-    page = found.jobs.page(one.robot.name, state or (), kind, cursor, limit)
+    """Jobs, the newest first; with `model` those that were given that model, and the one that made it."""
+    page = found.jobs.page(one.robot.name, state or (), kind, cursor, limit, model)
     return page.model_copy(update={"items": tuple(one.jobs.as_told(job) for job in page.items)})
 
 
@@ -91,11 +95,10 @@ def delete_job(job: Identity, one: RobotPart, _: Operator) -> Response:
     return Response(status_code=204)
 
 
-@router.get("/jobs/{job}/result", tags=["jobs"])
-def get_job_result(job: Identity, one: RobotPart, found: ServicesPart, _: Viewer) -> JobResult:
+@router.get("/jobs/{job}/result", tags=["jobs"], response_model=JobResult)
+def get_job_result(job: Identity, one: RobotPart, _: Viewer) -> FileResponse:
     """What a job found: as `--json` of its command, with the signals that a plot needs."""
-    data = json.loads(one.jobs.result_file(job, RESULT).read_text("utf-8"))
-    return JobResult(id=job, kind=found.jobs.get(one.robot.name, job).request.kind, data=data)
+    return FileResponse(one.jobs.result_file(job, RESULT), media_type="application/json")
 
 
 @router.get(
@@ -140,6 +143,17 @@ async def upload_model(
 def list_machine_parameters(one: RobotPart, _: Viewer) -> tuple[ModelParameter, ...]:
     """Parameters of the model that the machine file describes: `machine` in requests."""
     return one.models.machine_parameters()
+
+
+@router.get("/lineage", tags=["models"])
+def get_lineage(one: RobotPart, found: ServicesPart, _: Viewer) -> ModelLineage:
+    """Where the models come from, and the jobs between them; of very many the newest."""
+    jobs = found.jobs.page(one.robot.name, (), None, None, MOST_OF_A_LINEAGE).items
+    return ModelLineage(
+        machine=one.models.machine_identity(),
+        models=found.models.newest(one.robot.name, MOST_OF_A_LINEAGE)[::-1],
+        jobs=tuple(one.jobs.as_told(job) for job in reversed(jobs)),
+    )
 
 
 @router.get("/models/{model}", tags=["models"])

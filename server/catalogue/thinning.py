@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq.contracts.trace import Floats, Trace
 
@@ -33,23 +34,35 @@ def thinned(trace: Trace, points: int, start: float | None = None, end: float | 
         chosen &= trace.time <= end
     time = trace.time[chosen]
     signals = {name: _rows(getattr(trace, name), chosen) for name in SIGNALS}
-    stretches = max(1, points // 2)
-    if len(time) <= max(points, 2):
+    first = stretches(len(time), points)
+    if first is None:
         return Thinned(time, signals)
-    edges = np.linspace(0, len(time), stretches + 1).astype(int)
-    first, last = edges[:-1], edges[1:] - 1
-    moments = np.stack([time[first], time[last]], axis=1).ravel()
-    return Thinned(moments, {name: None if s is None else _extremes(s, first) for name, s in signals.items()})
+    return Thinned(moments(time, first), {n: None if s is None else extremes(s, first) for n, s in signals.items()})
 
 
-def _rows(signal: Floats | None, chosen: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Floats | None:
-    return None if signal is None else signal[chosen]
+def stretches(samples: int, points: int) -> NDArray[np.int64] | None:
+    """Where each of `points // 2` stretches begins; None where there are not more samples than points."""
+    if samples <= max(points, 2):
+        return None
+    return np.linspace(0, samples, max(1, points // 2) + 1).astype(np.int64)[:-1]
 
 
-def _extremes(signal: Floats, first: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Floats:
+def moments(time: Floats, first: NDArray[np.int64]) -> Floats:
+    """(2 · stretches,): the first and the last moment of every stretch."""
+    return np.stack([time[first], time[_last(len(time), first)]], axis=1).ravel()
+
+
+def extremes(signal: Floats, first: NDArray[np.int64]) -> Floats:
     """(2 · stretches, j): of every stretch the smaller and the larger extreme, the earlier one first."""
     low, high = np.minimum.reduceat(signal, first), np.maximum.reduceat(signal, first)
-    ends = np.append(first[1:], len(signal)) - 1
-    falling = signal[first] > signal[ends]
+    falling = signal[first] > signal[_last(len(signal), first)]
     pairs = np.stack([np.where(falling, high, low), np.where(falling, low, high)], axis=1)
     return pairs.reshape(-1, signal.shape[1])
+
+
+def _last(samples: int, first: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.append(first[1:], samples) - 1
+
+
+def _rows(signal: Floats | None, chosen: NDArray[np.bool_]) -> Floats | None:
+    return None if signal is None else signal[chosen]

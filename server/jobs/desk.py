@@ -185,7 +185,7 @@ class JobDesk:
 
     def _end(self, identity: str, future: Future[Ended]) -> None:
         parts = self._parts
-        event, reason, model = Event.COMPLETED, "", None
+        event, reason, model, headline = Event.COMPLETED, "", None, ""
         try:
             ended = future.result()
         except BrokenExecutor:
@@ -199,9 +199,10 @@ class JobDesk:
                 event, reason = Event.STOPPED, "cancelled while it ran"
             elif ended.problem:
                 event, reason = Event.REFUSED, ended.problem
-            elif ended.model is not None:
-                model = self._keep_model(identity)
-        self._tell(parts.jobs.change(parts.robot, identity, event, parts.clock.utc(), reason, model))
+            else:
+                headline = ended.headline
+                model = None if ended.model is None else self._keep_model(identity)
+        self._tell(parts.jobs.change(parts.robot, identity, event, parts.clock.utc(), reason, model, headline))
 
     def _keep_model(self, identity: str) -> str:
         parts = self._parts

@@ -95,6 +95,10 @@ class Models:
             ancestors=self.store.ancestors(self._robot, identity),
         )
 
+    def machine_identity(self) -> str:
+        """Of the model that the machine file describes."""
+        return base_model(self._machine).identity
+
     def machine_parameters(self) -> tuple[ModelParameter, ...]:
         """Those of the model that the machine file describes."""
         return _parameters(base_model(self._machine))

@@ -7,7 +7,7 @@ import threading
 from dataclasses import dataclass
 from multiprocessing import parent_process
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pydantic import BaseModel, ConfigDict
 
@@ -24,6 +24,7 @@ from daq.contracts.service.jobs import (
     ValidateRequest,
 )
 from daq.traces.reader import read_trace
+from server.jobs.headlines import of_comparison, of_diagnosis, of_fit, of_validation
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox
 
 if TYPE_CHECKING:
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
     from model.comparison.compare import Comparison
     from model.machine_model.model import Model
     from model.reports.page import Report
+    from server.jobs.results import ComparisonJobResult, DiagnosisJobResult, FitJobResult, ValidationJobResult
+
+    AnyResult = FitJobResult | ValidationJobResult | ComparisonJobResult | DiagnosisJobResult
 
 NICENESS = 19
 CURVE_POINTS = 21
@@ -60,6 +64,7 @@ class Ended:
     problem: str = ""
     cancelled: bool = False
     model: str | None = None
+    headline: str = ""
 
 
 def begin_worker() -> None:
@@ -110,6 +115,8 @@ class _Worker:
         from model.fitting.fit import fit
         from model.fitting.options import FitOptions
         from model.reports.fit_report import fit_report
+        from server.jobs.overlays import overlays
+        from server.jobs.results import FitData, FitJobResult
 
         traces, held = self._traces(request.traces), self._traces(request.held_out)
         begin = _with_effects(self._model(request.model), request.effects)
@@ -122,8 +129,9 @@ class _Worker:
             [("before", begin), ("fitted", found.model)], [*traces, *held], request.held_out, FIT_SHARE
         )
         self._keep_model(found.model)
-        data = found.model_dump(mode="json", exclude={"covariance"}) | _comparison_data(comparison)
-        return self._done(data, fit_report(found, comparison), found.model)
+        data = FitData(**dict(found), models=comparison.models, signals=overlays(comparison))
+        result = FitJobResult(id=self._job, data=data)
+        return self._done(result, fit_report(found, comparison), of_fit(found, comparison), found.model)
 
     def validate(self, request: ValidateRequest) -> Ended:
         """As `daq validate`."""
@@ -133,6 +141,8 @@ class _Worker:
         from model.validation.fidelity import validate_by_distortion
         from model.validation.names import names_to_validate
         from model.validation.time_domain import vary_in_time
+        from server.jobs.overlays import thinned_variation
+        from server.jobs.results import ValidationData, ValidationJobResult
 
         traces, model = self._traces(request.traces), self._model(request.model)
         names = names_to_validate(model, request.parameters)
@@ -146,17 +156,20 @@ class _Worker:
             self._tell(VALIDATION_SHARE, 1, number / len(traces), f"variation with time: {trace.record.trace_id}")
             in_time.append(vary_in_time(model, trace, names))
         three = in_convention(fidelity, model, "three_sigma")
-        data = {
-            "fidelity": fidelity.model_dump(mode="json"),
-            "three_sigma": three.model_dump(mode="json", exclude={"curves"}),
-            "time_domain": [one.model_dump(mode="json") for one in in_time],
-        }
-        return self._done(data, validation_report(self._name(request.model), (fidelity, three), in_time))
+        data = ValidationData(
+            fidelity=fidelity,
+            three_sigma=three.model_copy(update={"curves": ()}),
+            time_domain=tuple(thinned_variation(one) for one in in_time),
+        )
+        report = validation_report(self._name(request.model), (fidelity, three), in_time)
+        return self._done(ValidationJobResult(id=self._job, data=data), report, of_validation(fidelity))
 
     def compare(self, request: CompareRequest) -> Ended:
         """As `daq compare`; also one model beside traces."""
         from model.comparison.difference import differences
         from model.reports.comparison_report import comparison_report
+        from server.jobs.overlays import overlays
+        from server.jobs.results import ComparisonData, ComparisonJobResult
 
         models = [self._model(number) for number in request.models]
         traces = self._traces(request.traces)
@@ -165,8 +178,9 @@ class _Worker:
         labels = [f"{self._name(number)} ({number})" for number in request.models]
         comparison = self._compared(list(zip(labels, models, strict=True)), traces, held, 0.0)
         differing = differences(models)
-        data = _comparison_data(comparison) | {"differences": [one.model_dump(mode="json") for one in differing]}
-        return self._done(data, comparison_report(comparison, differing))
+        data = ComparisonData(models=comparison.models, signals=overlays(comparison), differences=differing)
+        result = ComparisonJobResult(id=self._job, data=data)
+        return self._done(result, comparison_report(comparison, differing), of_comparison(comparison))
 
     def diagnose(self, request: DiagnoseRequest) -> Ended:
         """As `daq diagnose`."""
@@ -174,23 +188,28 @@ class _Worker:
         from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose
         from model.reports.diagnosis_report import LABELS, diagnosis_report
+        from server.jobs.asking import asker
+        from server.jobs.diagnosis_data import diagnosis_data
+        from server.jobs.results import DiagnosisJobResult
 
         traces, held = self._traces(request.traces), self._traces(request.held_out)
+        begin = self._model(request.model)
         options = DiagnosisOptions(effects=request.effects, joints=request.joints, most_steps=request.most_steps)
         found = diagnose(
-            self._model(request.model), traces, held, options,
-            lambda f, text: self._tell(0, DIAGNOSIS_SHARE, f, text), self.mailbox,
+            begin, traces, held, options, lambda f, text: self._tell(0, DIAGNOSIS_SHARE, f, text), self.mailbox,
+            ask=asker(begin.machine),
         )  # fmt: skip
-        data, comparison = found.model_dump(mode="json"), None
-        controlled = not isinstance(found.model_before.machine.controller, NoController)
+        comparison = None
+        controlled = not isinstance(begin.machine.controller, NoController)
         if controlled and all(trace.set_point is not None for trace in (*traces, *held)):
             models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
             comparison = self._compared(models, [*traces, *held], request.held_out, DIAGNOSIS_SHARE)
-            data |= _comparison_data(comparison)
         changed = found.model_after.identity != found.model_before.identity
         if changed:
             self._keep_model(found.model_after)
-        return self._done(data, diagnosis_report(found, comparison), found.model_after if changed else None)
+        result = DiagnosisJobResult(id=self._job, data=diagnosis_data(found, comparison))
+        report = diagnosis_report(found, comparison)
+        return self._done(result, report, of_diagnosis(found), found.model_after if changed else None)
 
     def _compared(
         self, models: list[tuple[str, Model]], traces: Sequence[Trace], held: Sequence[str] | None, share: float
@@ -219,12 +238,16 @@ class _Worker:
     def _keep_model(self, model: Model) -> None:
         self.mailbox.write_text(MODEL, model.model_dump_json(indent=1) + "\n")
 
-    def _done(self, data: dict[str, Any], report: Report, model: Model | None = None) -> Ended:
+    def _done(self, result: AnyResult, report: Report, headline: str, model: Model | None = None) -> Ended:
         from model.reports.page import html
 
         self.mailbox.write_text(REPORT, html(report))
-        self.mailbox.write(RESULT, _finite(data))
-        return Ended(model=None if model is None else model.identity)
+        self.mailbox.write_text(RESULT, result.model_dump_json())
+        return Ended(model=None if model is None else model.identity, headline=headline)
+
+    @property
+    def _job(self) -> str:
+        return self.mailbox.folder.name
 
 
 def _with_effects(model: Model, effects: Sequence[EffectChoice]) -> Model:
@@ -241,34 +264,3 @@ def _with_effects(model: Model, effects: Sequence[EffectChoice]) -> Model:
             every = tuple(j for j in model.machine.modelled_joints if not found.joints or j in found.joints)
             model = model.with_effect(choice.name, choice.joints or every)
     return model
-
-
-def _comparison_data(found: Comparison) -> dict[str, Any]:
-    """Agreement in numbers, and the signals for a plot: one row a joint."""
-    return {
-        "models": [one.model_dump(mode="json") for one in found.models],
-        "signals": [
-            {
-                "trace": one.trace,
-                "held_out": one.held_out,
-                "joints": one.joints,
-                "units": one.units,
-                "time": one.time.tolist(),
-                "measured": one.measured.T.tolist(),
-                "simulated": [simulated.T.tolist() for simulated in one.simulated],
-                "set_point": None if one.set_point is None else one.set_point.T.tolist(),
-            }
-            for one in found.signals
-        ],
-    }
-
-
-def _finite(data: Any) -> Any:
-    """JSON knows no NaN and no infinity: what has no number is null."""
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_finite(value) for value in data]
-    if isinstance(data, float) and not -1e308 < data < 1e308:
-        return None
-    return data

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from datetime import datetime
 
 from pydantic import TypeAdapter
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, String, cast, or_, select
 from sqlalchemy.orm import Session
 
 from daq.contracts.service.base import Page
@@ -69,6 +69,7 @@ class JobStore:
                 submitted=now,
                 submitted_by=by,
                 reason="",
+                headline="",
             )
             session.add(row)
             for trace in traces_of(request):
@@ -82,14 +83,22 @@ class JobStore:
             return as_job(_row(session, robot, identity))
 
     def page(
-        self, robot: str, states: Sequence[JobState], kind: JobKind | None, cursor: str | None, limit: int
+        self,
+        robot: str,
+        states: Sequence[JobState],
+        kind: JobKind | None,
+        cursor: str | None,
+        limit: int,
+        model: str | None = None,
     ) -> Page[Job]:
-        """The newest first."""
+        """The newest first; of a model, those that were given it and the one that made it."""
         query = select(JobRow).where(JobRow.robot == robot).order_by(JobRow.sequence.desc())
         if states:
             query = query.where(JobRow.state.in_(states))
         if kind is not None:
             query = query.where(JobRow.kind == kind)
+        if model is not None:
+            query = query.where(_concerns(model))
         if cursor is not None:
             query = query.where(JobRow.sequence < Cursor.parse(cursor).number)
         with self._store.reading() as session:
@@ -103,7 +112,14 @@ class JobStore:
             return [as_job(row) for row in session.scalars(query)]
 
     def change(
-        self, robot: str, identity: str, event: Event, now: datetime, reason: str = "", model: str | None = None
+        self,
+        robot: str,
+        identity: str,
+        event: Event,
+        now: datetime,
+        reason: str = "",
+        model: str | None = None,
+        headline: str = "",
     ) -> Job:
         """What happened to it. Raises a 409 when its state does not allow that."""
         with self._store.writing() as session:
@@ -116,7 +132,7 @@ class JobStore:
             if event is Event.TAKEN:
                 row.started = now
             else:
-                row.ended, row.reason, row.model = now, reason, model
+                row.ended, row.reason, row.model, row.headline = now, reason, model, headline
             session.flush()
             return as_job(row)
 
@@ -150,8 +166,18 @@ def as_job(row: JobRow) -> Job:
         started=row.started,
         ended=row.ended,
         reason=row.reason,
+        headline=row.headline,
         model=row.model,
         has_report=row.state == "done",
+    )
+
+
+def _concerns(model: str) -> ColumnElement[bool]:
+    """Jobs that were given a model, alone or among others, or that made it."""
+    return or_(
+        JobRow.model == model,
+        JobRow.request["model"].as_string() == model,
+        cast(JobRow.request["models"], String).contains(f'"{model}"', autoescape=True),
     )
 
 

@@ -71,6 +71,12 @@ class ModelStore:
                     found.append(_entry(session, row))
         return tuple(found)
 
+    def newest(self, robot: str, most: int) -> tuple[ModelEntry, ...]:
+        """So many models, the newest first."""
+        query = select(ModelRow).filter_by(robot=robot).order_by(ModelRow.created.desc(), ModelRow.id.desc())
+        with self._store.reading() as session:
+            return tuple(_entry(session, row) for row in session.scalars(query.limit(most)))
+
     def page(self, robot: str, cursor: str | None, limit: int) -> Page[ModelEntry]:
         """The newest first."""
         query = select(ModelRow).where(ModelRow.robot == robot)

@@ -155,6 +155,8 @@ class JobRow(Table):
     started: Mapped[datetime | None]
     ended: Mapped[datetime | None]
     reason: Mapped[str] = mapped_column(Text, default="")
+    headline: Mapped[str] = mapped_column(Text, default="", server_default="")
+    """What it found."""
     model: Mapped[str | None] = mapped_column(String(64))
     """The model that it made."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AwareDatetime, Field, FiniteFloat
 
@@ -108,17 +108,11 @@ class Job(Wire):
     progress_text: str = ""
     reason: str = ""
     """Why it is not done, in one line."""
+    headline: str = ""
+    """What it found, in one line."""
     model: str | None = None
     """The model that it made."""
     has_report: bool = False
-
-
-class JobResult(Wire):
-    """What a job found: the same data as `--json` of its command, and the signals that a plot needs."""
-
-    id: str
-    kind: JobKind
-    data: dict[str, Any]
 
 
 class ModelEntry(Wire):
@@ -163,3 +157,18 @@ class ModelChange(Wire):
 
     name: ModelName | None = None
     notes: Annotated[str, Field(max_length=10000)] | None = None
+
+
+class ModelLineage(Wire):
+    """Where a robot's models come from, and what was made of them.
+
+    A model's parent is another of these models, the one that the machine file describes, or one that is not here any
+    more. A job leads from the models and traces of its request to the model that it made, if it made one.
+    """
+
+    machine: str
+    """Identity of the model that the machine file describes, as a parent."""
+    models: tuple[ModelEntry, ...]
+    """The oldest first."""
+    jobs: tuple[Job, ...]
+    """The first submitted first."""

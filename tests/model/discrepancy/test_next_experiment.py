@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from daq.cli.design import planned
 from daq.cli.diagnose_asking import library
 from daq.cli.trial.experiments import trial_experiment
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.progress import Never, silent
 from daq.contracts.trace import Trace
+from daq.safety.planned import planned
 from model.discrepancy.candidates import Candidate
 from model.discrepancy.decision import decide
 from model.discrepancy.next_experiment import Experiment, best_experiment, most_information, rivals_of, settled

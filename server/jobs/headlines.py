@@ -1,0 +1,71 @@
+"""What a job found, in one line for lists. Pure."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from model.comparison.agreement import JointAgreement
+    from model.comparison.compare import Comparison
+    from model.discrepancy.answer import Candidate, Diagnosis, Step
+    from model.fitting.result import FitResult
+    from model.validation.criterion import Fidelity
+
+UNDECIDED_SHOWN = 3
+
+
+def of_fit(found: FitResult, comparison: Comparison) -> str:
+    """How many parameters are known, and what that does to the error."""
+    known = sum(p.verdict == "known" for p in found.parameters)
+    before, after = comparison.models
+    held = before.held_out is not None and after.held_out is not None
+    errors = (before.held_out, after.held_out) if held else (before.in_sample, after.in_sample)
+    told = " → ".join("?" if joints is None else _error(joints) for joints in errors)
+    return f"{known} of {len(found.parameters)} parameters known; error {told}{', held out' if held else ''}"
+
+
+def of_validation(found: Fidelity) -> str:
+    """Whether expected deviations explain what is left."""
+    said = "expected deviations explain what is left" if found.explains else "something is not in the model"
+    return f"Σλ² = {found.sum_of_contributions:.3g}: {said}"
+
+
+def of_comparison(found: Comparison) -> str:
+    """The error of each model over all traces."""
+    told = [f"{m.label.partition(' (')[0]} {_error(m.held_out or m.in_sample or ())}" for m in found.models]
+    return f"error {'; '.join(told)}"
+
+
+def of_diagnosis(found: Diagnosis) -> str:
+    """The verdict with its names."""
+    if found.verdict == "named":
+        return f"named: {'; '.join(_named(s) for s in found.steps if s.adopted)}"
+    if found.verdict == "ambiguous" and found.steps:
+        group = [_named(one) for one in found.steps[-1].group]
+        more = "" if len(group) <= UNDECIDED_SHOWN else f" or {len(group) - UNDECIDED_SHOWN} more"
+        return f"one of: {' or '.join(group[:UNDECIDED_SHOWN])}{more}"
+    return "nothing significant" if found.verdict == "nothing-significant" else "an effect that is not known"
+
+
+def _named(one: Step | Candidate) -> str:
+    joints = f", joint {'+'.join(map(str, one.joints))}" if one.joints else ""
+    return f"{(one.effect or '').replace('_', ' ')}{joints}"
+
+
+def _error(joints: Sequence[JointAgreement]) -> str:
+    """Root mean square over the joints that turn, in degrees; of those that slide, in mm."""
+    turning = [j.rmse for j in joints if j.unit == "rad"]
+    sliding = [j.rmse for j in joints if j.unit == "m"]
+    told = []
+    if turning:
+        told.append(f"{math.degrees(_rms(turning)):.3g}°")
+    if sliding:
+        told.append(f"{1e3 * _rms(sliding):.3g} mm")
+    return " and ".join(told) or "?"
+
+
+def _rms(values: Sequence[float]) -> float:
+    return math.sqrt(sum(v**2 for v in values) / len(values))

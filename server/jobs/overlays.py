@@ -1,0 +1,70 @@
+"""Signals of a comparison for a plot: so many points that a page draws them at once, and no peak lost."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from server.catalogue.thinning import extremes, moments, stretches
+from server.jobs.results import Overlay, Row
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from daq.contracts.trace import Floats
+    from model.comparison.compare import Comparison, TraceSignals
+    from model.validation.time_domain import TimeDomain
+
+MOST_POINTS, LEAST_POINTS = 1600, 200
+"""Of one trace, and how far that goes down when there are many."""
+ALL_POINTS = 16_000
+"""Of all traces of one result together."""
+DIGITS = 7
+"""Decimals of rad, m and s that are sent: a count of the sensor is a thousand times as large."""
+VARIATION_POINTS = 800
+"""Of a parameter's variation with time, which is smooth."""
+
+
+def overlays(found: Comparison) -> tuple[Overlay, ...]:
+    """Every trace of a comparison beside its simulations."""
+    points = int(np.clip(ALL_POINTS // max(1, len(found.signals)), LEAST_POINTS, MOST_POINTS))
+    return tuple(overlay(one, points) for one in found.signals)
+
+
+def overlay(one: TraceSignals, points: int) -> Overlay:
+    """One trace in about so many points."""
+    first = stretches(len(one.time), points)
+
+    def rows(signal: Floats) -> tuple[Row, ...]:
+        kept = signal if first is None else extremes(signal, first)
+        return tuple(_row(column) for column in kept.T)
+
+    time = one.time if first is None else moments(one.time, first)
+    return Overlay(
+        trace=one.trace,
+        held_out=one.held_out,
+        joints=one.joints,
+        units=one.units,
+        samples=len(one.time),
+        time=tuple(np.round(time, DIGITS).tolist()),
+        measured=rows(one.measured),
+        set_point=None if one.set_point is None else rows(one.set_point),
+        simulated=tuple(rows(simulated) for simulated in one.simulated),
+        residual=tuple(rows(one.measured - simulated) for simulated in one.simulated),
+    )
+
+
+def thinned_variation(one: TimeDomain) -> TimeDomain:
+    """The same in at most so many moments, evenly picked: accelerations were smoothed over more than that."""
+    stride = max(1, -(-len(one.time) // VARIATION_POINTS))
+    joints = tuple(j.model_copy(update={"values": j.values[::stride]}) for j in one.joints)
+    parameters = tuple(
+        p.model_copy(update={"values": p.values[::stride], "noise": p.noise[::stride]}) for p in one.parameters
+    )
+    return one.model_copy(update={"time": one.time[::stride], "joints": joints, "parameters": parameters})
+
+
+def _row(values: Sequence[float] | Floats) -> Row:
+    """JSON knows no NaN and no infinity: what has no number is None."""
+    return tuple(v if np.isfinite(v) else None for v in np.round(values, DIGITS).tolist())

@@ -1,0 +1,125 @@
+"""What jobs find, as clients get it: the data of `--json` of the command, and the signals that a plot needs."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from model.comparison.agreement import ModelAgreement
+from model.comparison.difference import ParameterDifference
+from model.discrepancy.answer import Candidate, Diagnosis, Step
+from model.fitting.result import FitResult
+from model.validation.criterion import Fidelity
+from model.validation.time_domain import TimeDomain
+
+Row = tuple[float | None, ...]
+"""One signal of one joint; None where a simulation did not stay finite."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Overlay(_Part):
+    """One trace beside its simulations, thinned so that no peak is lost: of every stretch the extremes are kept.
+
+    `time` is in s; signals have one row a joint, in the order of `joints`, in `units`. `simulated` and `residual`
+    (measured − simulated, thinned by itself) have such rows for every model, in the order of the result's `models`.
+    """
+
+    trace: str
+    held_out: bool | None
+    joints: tuple[int, ...]
+    units: tuple[str, ...]
+    samples: int
+    """Before thinning."""
+    time: tuple[float, ...]
+    measured: tuple[Row, ...]
+    set_point: tuple[Row, ...] | None
+    simulated: tuple[tuple[Row, ...], ...]
+    residual: tuple[tuple[Row, ...], ...]
+
+
+class FitData(FitResult):
+    """A fit, and the models before and after it beside the traces."""
+
+    models: tuple[ModelAgreement, ...]
+    signals: tuple[Overlay, ...]
+
+
+class ValidationData(_Part):
+    """A validation by distortion: `fidelity` in the source's convention of τ′, `three_sigma` in the other (its curves
+    are the same), and what would have to move with time, a trace each, thinned."""
+
+    fidelity: Fidelity
+    three_sigma: Fidelity
+    time_domain: tuple[TimeDomain, ...]
+
+
+class ComparisonData(_Part):
+    """Models beside the same traces."""
+
+    models: tuple[ModelAgreement, ...]
+    signals: tuple[Overlay, ...]
+    differences: tuple[ParameterDifference, ...]
+
+
+class TriedEffect(Candidate):
+    """An effect that was tried."""
+
+
+class DiagnosisStep(Step):
+    """One turn of the workflow."""
+
+    candidates: tuple[TriedEffect, ...]
+    group: tuple[TriedEffect, ...] = ()
+    chance: float
+    """Significance of a cell of `where` that noise alone takes one of all cells beyond, in one record of a hundred."""
+
+
+class DiagnosisData(Diagnosis):
+    """A diagnosis (docs/diagnosis.md), and the models before and after it beside the traces where those can be
+    simulated. `differences` are the parameters that moved, those of added effects among them."""
+
+    steps: tuple[DiagnosisStep, ...]
+    models: tuple[ModelAgreement, ...] = ()
+    signals: tuple[Overlay, ...] = ()
+    differences: tuple[ParameterDifference, ...] = ()
+
+
+class FitJobResult(_Part):
+    """Of a fit."""
+
+    id: str
+    kind: Literal["fit"] = "fit"
+    data: FitData
+
+
+class ValidationJobResult(_Part):
+    """Of a validation."""
+
+    id: str
+    kind: Literal["validate"] = "validate"
+    data: ValidationData
+
+
+class ComparisonJobResult(_Part):
+    """Of a comparison."""
+
+    id: str
+    kind: Literal["compare"] = "compare"
+    data: ComparisonData
+
+
+class DiagnosisJobResult(_Part):
+    """Of a diagnosis."""
+
+    id: str
+    kind: Literal["diagnose"] = "diagnose"
+    data: DiagnosisData
+
+
+JobResult = Annotated[
+    FitJobResult | ValidationJobResult | ComparisonJobResult | DiagnosisJobResult, Field(discriminator="kind")
+]
