@@ -17,6 +17,9 @@ from model.discrepancy.tones import proposed_tones
 FLAGGED_SHARE = 0.1
 """A joint is flagged where the best probe promises this share of the best of all."""
 
+ALWAYS_FITTED, HOPELESS = 3, 0.2
+"""After so many, no candidate is fitted whose probe promises less than this share of the best evidence so far."""
+
 
 @dataclass(frozen=True)
 class Ranking:
@@ -52,6 +55,8 @@ def ranked(
     fits: list[Refitted] = []
     for number, one in enumerate(chosen):
         _stop_if(cancel)
+        if number >= ALWAYS_FITTED and one.gain < HOPELESS * max((f.evidence for f in fits), default=0.0):
+            break
         progress(0.4 + 0.5 * number / len(chosen), f"fitting {describe(one.candidate.name, one.candidate.joints)}")
         found = refitted(observation, current, one)
         if found is not None:

@@ -24,6 +24,8 @@ SHARES = (1.0, 1.0, 0.4, 0.12)
 """Of the steps that are tried, each from derivatives that the ones before have corrected."""
 SETTLED = 1.0
 """A step that lowers the cost by less ends the search: one unit is one standard deviation of one parameter."""
+MOST_SEARCHES = 8
+"""With new derivatives: two are enough, but for a start that is far away."""
 
 
 @dataclass(frozen=True)
@@ -120,10 +122,13 @@ def with_new_tangents(observation: Observation, point: Point) -> Point:
 
 
 def settled(observation: Observation, point: Point, steps: int) -> Point:
-    """The point to which searches with derivatives computed where they begin lead, twice: what two close rivals still
-    differ by then is not the state of their fits."""
-    for _ in range(2):
-        point = searched(observation, with_new_tangents(observation, point), steps)
+    """The point to which searches lead, each with derivatives computed where it begins, until one gains nothing more:
+    what two close rivals still differ by then is not the state of their fits."""
+    for _ in range(MOST_SEARCHES):
+        following = searched(observation, with_new_tangents(observation, point), steps)
+        gained, point = point.cost - following.cost, following
+        if gained < SETTLED:
+            break
     return point
 
 
@@ -131,7 +136,8 @@ def _step(observation: Observation, point: Point) -> tuple[Point, bool]:
     """A step, and whether it descends; if not, the same point with derivatives that know better."""
     low, high = (np.array([getattr(u, side) for u in point.unknowns]) for side in ("low", "high"))
     for share in SHARES:
-        values = np.clip(point.values + share * _gauss_newton(point), low, high)
+        step = _gauss_newton(point, low - point.values, high - point.values)
+        values = np.clip(point.values + share * step, low, high)  # against rounding: the whole step is within bounds
         tried = _point(observation, point.model, point.unknowns, values, point.noise, point.tangents)
         if not np.isfinite(tried.weighted).all():
             continue
@@ -142,13 +148,23 @@ def _step(observation: Observation, point: Point) -> tuple[Point, bool]:
     return point, False
 
 
-def _gauss_newton(point: Point) -> Floats:
-    """The step to the least of the linearised problem."""
+def _gauss_newton(point: Point, least: Floats, most: Floats) -> Floats:
+    """The step to the least of the linearised problem, at most to the bounds: an unknown that would leave them goes to
+    its bound, and the others take that into account. Cutting such steps off would spoil the descent of all others."""
     information = point.information
     diagonal = np.diag(information)
     information[np.diag_indices_from(information)] += 1e-9 * np.maximum(diagonal, 1e-12 * diagonal.max())
     gradient = point.tangents @ point.weighted - point.precision * (point.values - point.expected)
-    return np.asarray(np.linalg.solve(information, gradient), dtype=np.float64)
+    step, free = np.zeros_like(gradient), np.ones(len(gradient), dtype=bool)
+    while free.any():
+        pull = gradient[free] - information[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.solve(information[np.ix_(free, free)], pull)
+        beyond = free & ((step < least) | (step > most))
+        if not beyond.any():
+            break
+        step[beyond] = np.clip(step[beyond], least[beyond], most[beyond])
+        free &= ~beyond
+    return step
 
 
 def _corrected(point: Point, tried: Point) -> Floats:

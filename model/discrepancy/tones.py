@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import oaconvolve
 
 from model.discrepancy.candidates import TONES, tone
 from model.discrepancy.observation import DIFFERENCE, Observation
@@ -106,6 +106,20 @@ def _grid(observation: Observation, point: Point, name: str, column: int) -> Flo
     return np.linspace(low, high, int(min(MOST_TONES, max(2.0, (high - low) / step))))
 
 
+def _passed(
+    observation: Observation, point: Point, name: str, column: int, values: Floats, response: Floats, record: int
+) -> NDArray[np.complex128]:
+    """Readings (k, m) that tones of unit torque make, the cosine as real part and the sine as imaginary part."""
+    source = observation.records[record]
+    waves = np.exp(1j * _phase(observation, point, name, column, values, record))
+    if name == "torque_ripple":
+        waves = oaconvolve(waves, response[None], axes=1)[:, : waves.shape[1]]
+    else:  # a frequency passes a linear response as it is, but for its size and phase
+        lags = np.arange(RESPONSE_SAMPLES) * source.inputs.period
+        waves *= np.exp(-2j * np.pi * values[:, None] * lags) @ response[:, None]
+    return np.concatenate([waves[:, run] for run in source.runs], axis=1)
+
+
 def _best_tone(
     observation: Observation, point: Point, clear: Projection, name: str, joint: int, column: int, response: Floats
 ) -> Probed | None:
@@ -113,12 +127,9 @@ def _best_tone(
     if not len(values):
         return None
     columns = np.arange(column, len(point.weighted), len(observation.deviations))
-    waves = []
-    for t, record in enumerate(observation.records):
-        phase = _phase(observation, point, name, column, values, t)
-        both = [lfilter(response, [1.0], f(phase), axis=1) for f in (np.sin, np.cos)]
-        waves.append(np.stack([np.concatenate([w[:, run] for run in record.runs], axis=1) for w in both]))
-    sine, cosine = np.concatenate(waves, axis=2) / observation.deviations[column]
+    waves = [_passed(observation, point, name, column, values, response, t) for t in range(len(observation.records))]
+    both = np.concatenate(waves, axis=1) / observation.deviations[column]
+    sine, cosine = np.ascontiguousarray(both.imag), np.ascontiguousarray(both.real)
     by_sine, sines = clear.gains(sine, columns)
     by_cosine, cosines = clear.gains(cosine, columns)
     mixed = clear.cross(sine, cosine, columns)

@@ -36,7 +36,7 @@ from model.discrepancy.ranking import Ranking, ranked
 from model.discrepancy.reasons_samples import Left
 from model.discrepancy.refitting import Judged, Refitted, judge
 from model.discrepancy.remaining import shapes
-from model.discrepancy.search import Point, point_at, searched, with_new_tangents
+from model.discrepancy.search import Point, point_at, searched, settled
 from model.discrepancy.thresholds import THRESHOLDS, Thresholds
 from model.discrepancy.torque_space.diagnose import diagnose_torques
 from model.discrepancy.where import located
@@ -157,9 +157,8 @@ def _given(observation: Observation, model: Model, unknowns: Sequence[Unknown]) 
 
 
 def _tolerances(observation: Observation, given: Point) -> Point:
-    """The tolerance parameters fitted, with derivatives taken where they ended."""
-    point = searched(observation, given, FIRST_STEPS)
-    return searched(observation, with_new_tangents(observation, point), LAST_STEPS)
+    """The tolerance parameters fitted to the end: what they leave undone would look like an effect."""
+    return settled(observation, searched(observation, given, FIRST_STEPS), LAST_STEPS)
 
 
 def _to_search(case: _Case, current: Judged, number: int) -> tuple[int, ...]:
@@ -214,8 +213,7 @@ def _turn(
     )  # fmt: skip
     if rejected is not None:
         return step, current
-    settled = searched(observation, with_new_tangents(observation, best.judged.point), LAST_STEPS)
-    return step, judge(observation, settled)
+    return step, judge(observation, settled(observation, best.judged.point, LAST_STEPS))
 
 
 def _held_errors(case: _Case, before: Point, after: Point) -> tuple[SignalError, ...]:
