@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from model.validation.criterion import Fidelity
-    from model.validation.time_domain import TimeDomain
+    from model.validation.variation import TimeDomain
 
 app = typer.Typer(add_completion=False)
 

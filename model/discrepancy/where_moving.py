@@ -9,7 +9,8 @@ from model.discrepancy.answer import AgainstWhat, MovingParameter
 from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.validation.names import names_to_validate
-from model.validation.time_domain import Variation, vary_in_time
+from model.validation.time_domain import vary_in_time
+from model.validation.variation import Variation
 
 SHOWN = 5
 """Parameters, those that explain most of what is left."""

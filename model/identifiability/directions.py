@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import qr
 
 Floats = NDArray[np.float64]
 
@@ -76,6 +75,8 @@ def torque_scale(values: Floats, natural: Floats, torque: Sequence[int]) -> Floa
 def sparse_basis(rows: Floats) -> list[Floats]:
     """Another basis of the space that the orthonormal rows (k, p) span, each vector with a member that is its own:
     reduced echelon form on the k best-conditioned columns."""
+    from scipy.linalg import qr  # here: the service shows results of fits, and makes none
+
     if len(rows) == 0:
         return []
     pivots = qr(rows, mode="economic", pivoting=True)[2][: len(rows)]

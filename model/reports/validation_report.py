@@ -10,7 +10,7 @@ import numpy as np
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels, thinned
 from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, Tone, cells, listed
 from model.validation.criterion import Curve, Fidelity
-from model.validation.time_domain import TimeDomain, Variation
+from model.validation.variation import TimeDomain, Variation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -4,35 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
 
 from model.analysis.bodies import gravity_loads
 from model.machine_model.model import Model
 from model.validation.measured_motion import Observation
+from model.validation.variation import Correlation
 
 Floats = NDArray[np.float64]
 
-REGRESSORS = ("position", "speed", "magnitude of speed", "direction", "load", "acceleration", "drive", "time")
-"""Names of the regressors; load is the gravity torque on the joint (N·m, or N)."""
-
 FEWEST = 6
 """Independent samples below which no correlation is given."""
-
-
-class Correlation(BaseModel):
-    """Pearson's correlation with one regressor of one joint. `noise` is what independent signals would show (1σ)."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    regressor: str
-    joint: int
-    value: float
-    noise: float
-
-    @property
-    def significant(self) -> bool:
-        """Beyond three standard deviations of what independent signals would show."""
-        return abs(self.value) > 3 * self.noise
 
 
 def regressors(model: Model, observation: Observation) -> dict[str, Floats]:

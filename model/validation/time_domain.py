@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
@@ -16,73 +15,13 @@ from model.machine_model.model import Model
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.expected_deviation import Convention, expected_deviation
 from model.validation.measured_motion import Observation, observe
-from model.validation.regressors import REGRESSORS, Correlation, correlations, regressors
+from model.validation.regressors import correlations, regressors
+from model.validation.variation import JointResidual, TimeDomain, Variation
 
 Floats = NDArray[np.float64]
 
 SIGNIFICANT = 2.0
 """Standard deviations of noise beyond which a variation counts as real."""
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Variation(_Part):
-    """α(t) of one parameter, all parameters moving together as little as explains the motion.
-
-    `values` and `noise` (the standard deviation that noise of the readings gives α) are in `unit` at the result's
-    times; None where no joint that the parameter acts on moves. `deviation` is the rms of α (4.23), corrected for
-    noise, `expected` is τ′, `mean` is what a constant change would be. `significant` is the share of times at which
-    α lies beyond noise. `alone_constant` and `alone_varying` are the shares of the residual's energy (beyond noise)
-    that this parameter explains by itself, as a constant and as a function of time.
-    """
-
-    name: str
-    unit: str
-    value: float
-    values: tuple[float | None, ...]
-    noise: tuple[float | None, ...]
-    deviation: float
-    expected: float
-    mean: float
-    significant: float
-    alone_constant: float
-    alone_varying: float
-    against: tuple[Correlation, ...]
-
-    @property
-    def within_expectation(self) -> bool:
-        """σ² ≤ τ′² (4.24)."""
-        return self.deviation <= self.expected
-
-
-class JointResidual(_Part):
-    """Measured less expected acceleration of a joint (rad/s²; None where it does not move) and what it goes with."""
-
-    joint: int
-    values: tuple[float | None, ...]
-    noise: float
-    rms: float
-    against: tuple[Correlation, ...]
-
-
-class TimeDomain(_Part):
-    """The time-domain form for one model and one trace. `smoothing` is the kernel's standard deviation in s."""
-
-    model: str
-    trace: str
-    convention: Convention
-    smoothing: float
-    time: tuple[float, ...]
-    joints: tuple[JointResidual, ...]
-    parameters: tuple[Variation, ...]
-    regressors: tuple[str, ...] = REGRESSORS
-    notes: tuple[str, ...] = ()
-
-    def parameter(self, name: str) -> Variation:
-        """The variation of a parameter. Raises KeyError."""
-        return {p.name: p for p in self.parameters}[name]
 
 
 @dataclass(frozen=True)

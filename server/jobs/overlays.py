@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from daq.contracts.trace import Floats
     from model.comparison.compare import Comparison, TraceSignals
-    from model.validation.time_domain import TimeDomain
+    from model.validation.variation import TimeDomain
 
 MOST_POINTS, LEAST_POINTS = 1600, 200
 """Of one trace, and how far that goes down when there are many."""

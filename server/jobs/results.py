@@ -11,7 +11,7 @@ from model.comparison.difference import ParameterDifference
 from model.discrepancy.answer import Candidate, Diagnosis, Step
 from model.fitting.result import FitResult
 from model.validation.criterion import Fidelity
-from model.validation.time_domain import TimeDomain
+from model.validation.variation import TimeDomain
 
 Row = tuple[float | None, ...]
 """One signal of one joint; None where a simulation did not stay finite."""

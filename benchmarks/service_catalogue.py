@@ -1,0 +1,157 @@
+"""A catalogue of 100 000 traces: how long its list, its pages and its search take over REST.
+
+    python -m benchmarks service_catalogue
+
+The table is filled with made-up rows in the shape of years of a lab's work: ten kinds, forty tags, notes in words; the
+folder has an empty file for each, since the service compares both when it starts. Then one client asks, one question
+after the other. The floor is the same questions to the same service with one trace in a hundred.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import insert
+
+from benchmarks.figures import Figure, at_most, quantile, show
+from benchmarks.service_process import ROBOT, RunningService, dice, started_service
+from server.store.engine import Store
+from server.store.tables import TraceRow, TraceTagRow
+
+TARGET_MS = 50.0
+START = datetime(2024, 1, 1, tzinfo=UTC)
+KINDS = ("ramp", "cubic", "step", "staircase", "sine", "multisine", "slow_ramp", "pause", "path", "sequence")
+OUTCOMES = (*["complete"] * 97, "stopped", "fault", "interrupted")
+WORDS = ("belt", "loose", "after", "service", "warm", "cold", "payload", "new", "motor", "joint", "elbow", "noise",
+         "wear", "morning", "repeat", "check", "gripper", "open", "bearing", "slack")  # fmt: skip
+TAGS = tuple(f"week {number}" for number in range(40))
+RARE = "brass bush replaced"
+BATCH = 5000
+
+
+def rows(count: int, random_: random.Random) -> Iterator[dict[str, Any]]:
+    """Rows of the table, the oldest first."""
+    moment = START
+    for number in range(count):
+        moment += timedelta(seconds=random_.uniform(30, 900))
+        identity, kind = f"{random_.getrandbits(48):012x}", random_.choice(KINDS)
+        file = f"{moment:%Y%m%dT%H%M%SZ}_{ROBOT}_{kind}_{identity}.mcap"
+        notes = RARE if number % 9973 == 0 else " ".join(random_.choices(WORDS, k=6))
+        outcome = random_.choice(OUTCOMES)
+        yield {
+            "id": identity, "robot": ROBOT, "file": file, "created": moment, "source": "real", "kind": kind,
+            "name": f"study {number % 300}", "joints": [1, 2, 3], "outcome": outcome, "samples": 1500,
+            "duration": 30.0, "size": 900_000, "operator": "anna", "experiment": None, "notes": notes,
+            "searched": "\n".join((identity, file, f"study {number % 300}", kind, "anna", notes, outcome)).lower(),
+            "missing": False,
+        }  # fmt: skip
+
+
+def fill(folder: Path, count: int) -> None:
+    """A database and a folder of traces as `daq serve` finds them in `folder`."""
+    random_ = dice(count)
+    (folder / "traces").mkdir()
+    store = Store(f"sqlite:///{folder / 'service' / 'service.sqlite'}")
+    store.migrate()
+    made = list(rows(count, random_))
+    for first in range(0, count, BATCH):
+        part = made[first : first + BATCH]
+        with store.writing() as session:
+            session.execute(insert(TraceRow), part)
+            session.execute(insert(TraceTagRow), [{"trace": row["id"], "tag": random_.choice(TAGS)} for row in part])
+        for row in part:
+            (folder / "traces" / row["file"]).touch()
+    store.close()
+
+
+def listed(service: RunningService, times: int) -> list[float]:
+    """ms of pages of the list, following it from the newest trace on, and beginning anew at random moments."""
+    random_, found, cursor = dice(1), [], None
+    for number in range(times):
+        query: dict[str, Any] = {"limit": 50} | ({} if cursor is None else {"cursor": cursor})
+        if number % 10 == 0:
+            query = {"limit": 50, "until": (START + timedelta(hours=random_.uniform(1, 12000))).isoformat()}
+        took, page = _timed(service, query)
+        found.append(took)
+        cursor = page["next"]
+    return found
+
+
+def searched(service: RunningService, times: int) -> dict[str, list[float]]:
+    """ms of searches by what they look for."""
+    random_ = dice(2)
+    kinds: dict[str, list[float]] = {}
+    for _ in range(times):
+        questions: dict[str, dict[str, Any]] = {
+            "a word that many have": {"q": random_.choice(WORDS)},
+            "words that few have": {"q": RARE},
+            "what nothing has": {"q": f"{random_.getrandbits(40):x} nowhere"},
+            "two letters": {"q": random_.choice(("qx", "be", "72"))},
+            "one tag": {"tag": random_.choice(TAGS)},
+            "one kind": {"kind": random_.choice(KINDS)},
+            "runs that failed": {"outcome": random_.choice(("fault", "interrupted"))},
+            "a week": {"since": START.isoformat(), "until": (START + timedelta(days=7)).isoformat(), "q": "belt"},
+            "a tag, a kind and a word": {"tag": TAGS[3], "kind": "sine", "q": "loose"},
+        }
+        for name, question in questions.items():
+            kinds.setdefault(name, []).append(_timed(service, question | {"limit": 50})[0])
+    return kinds
+
+
+def _timed(service: RunningService, query: dict[str, Any]) -> tuple[float, dict[str, Any]]:
+    begun = time.perf_counter()
+    page = service.ask("GET", "/traces", params=query)
+    return 1e3 * (time.perf_counter() - begun), page
+
+
+def measure(count: int, times: int) -> tuple[list[float], dict[str, list[float]], float]:
+    """List, searches (ms), and the start of the service (s) with so many traces."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        fill(folder, count)
+        (folder / "daq.toml").write_text("[server]\nconnect_at_start = false\n", "utf-8")
+        begun = time.perf_counter()
+        with started_service(folder, "mock://") as service:
+            start = time.perf_counter() - begun
+            return listed(service, 10 * times), searched(service, times), start
+
+
+def main() -> int:
+    """The exit code: 1 when a target was missed."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks service_catalogue", description=__doc__)
+    parser.add_argument("--traces", type=int, default=100_000)
+    parser.add_argument("--times", type=int, default=40, help="how often each question is asked")
+    parser.add_argument("--quick", action="store_true", help="each question 10 times")
+    given = parser.parse_args()
+    times = 10 if given.quick else given.times
+    pages, searches, start = measure(given.traces, times)
+    few_pages, few_searches, few_start = measure(max(1, given.traces // 100), times)
+    every, few_every = (
+        [one for each in kinds.values() for one in each] for kinds in (searches, few_searches)
+    )  # fmt: skip
+
+    def beside(many: list[float], few: list[float]) -> str:
+        return f"p50 {quantile(many, 0.5):.1f}, max {max(many):.1f} ms; of a hundredth p99 {quantile(few, 0.99):.1f} ms"
+
+    figures = [
+        at_most("list, p99", quantile(pages, 0.99), TARGET_MS, "ms", beside(pages, few_pages)),
+        at_most("search, p99", quantile(every, 0.99), TARGET_MS, "ms", beside(every, few_every)),
+    ]
+    figures += [
+        Figure(f"  {name}, p99", f"{quantile(took, 0.99):.3g} ms", beside=beside(took, few_searches[name]))
+        for name, took in searches.items()
+    ]
+    figures.append(Figure("start of the service", f"{start:.1f} s", beside=f"of a hundredth {few_start:.1f} s"))
+    return show(f"{given.traces} traces in the catalogue", "python -m benchmarks service_catalogue", figures)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
