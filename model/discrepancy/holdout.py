@@ -6,14 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq.contracts.trace import Trace
 from model.discrepancy.answer import SignalError
+from model.discrepancy.noise_floor import noise_floor
 from model.discrepancy.observation import Observation, Signals, observed
 from model.discrepancy.search import Point, point_at, searched
 from model.fitting.simulated import INITIAL
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
+
+Floats = NDArray[np.float64]
 
 BLOCK = 10
 """Samples whose errors may be alike."""
@@ -27,6 +31,10 @@ class HeldOut:
 
     observation: Observation
     starts: tuple[Unknown, ...]
+
+    def floor(self, point: Point) -> Floats:
+        """(n,) rad, as `noise_floor`, where each arm starts being estimated here as well."""
+        return noise_floor(self.observation, point, lambda made: replace(self, observation=made).residuals(point))
 
     def residuals(self, point: Point) -> Signals:
         """Measured − simulated (m, n) rad of every held-out trace, with the point's values.
@@ -45,11 +53,11 @@ class HeldOut:
             return begun.residuals
         return searched(observation, begun, START_STEPS, range(len(held), len(unknowns))).residuals
 
-    def rise(self, before: Point, after: Point) -> tuple[float, float]:
-        """How much the weighted sum of squares rises from one point to another, and the standard deviation that noise
+    def rise(self, before: Signals, after: Signals) -> tuple[float, float]:
+        """How much the weighted sum of squares of residuals rises, and the standard deviation that noise
         alone gives that number: from the scatter of its blocks of 0.2 s or so, which are nearly independent. Infinite
         where the simulation does not stay finite."""
-        old, new = (self.observation.weighted(self.residuals(point)) for point in (before, after))
+        old, new = (self.observation.weighted(residuals) for residuals in (before, after))
         if not np.isfinite(new).all():
             return float("inf"), 0.0
         risen = new**2 - old**2
@@ -66,8 +74,10 @@ def held_out(model: Model, traces: Sequence[Trace]) -> HeldOut | None:
     return HeldOut(observation, tuple(u for u in unknowns if u.name.startswith(INITIAL + ".")))
 
 
-def errors(observation: Observation, model: Model, before: Signals, after: Signals) -> tuple[SignalError, ...]:
-    """Root mean square of every joint before and after, beside the floor."""
+def errors(
+    observation: Observation, model: Model, before: Signals, after: Signals, floor: Floats
+) -> tuple[SignalError, ...]:
+    """Root mean square of every joint before and after, beside the floor (n,) rad."""
     found = []
     for column, joint in enumerate(model.machine.modelled_joints):
         sizes = []
@@ -75,8 +85,8 @@ def errors(observation: Observation, model: Model, before: Signals, after: Signa
             parts = [s[run, column] for s, r in zip(signals, observation.records, strict=True) for run in r.runs]
             sizes.append(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
         unit = "rad" if model.machine.joint(joint).kind == "revolute" else "m"
-        floor = float(observation.deviations[column])
-        found.append(SignalError(joint=joint, unit=unit, before=sizes[0], after=sizes[1], floor=floor))
+        least = float(floor[column])
+        found.append(SignalError(joint=joint, unit=unit, before=sizes[0], after=sizes[1], floor=least))
     return tuple(found)
 
 

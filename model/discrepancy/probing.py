@@ -28,13 +28,14 @@ LEAST_RESPONSE = 0.1
 
 @dataclass(frozen=True)
 class Probed:
-    """A candidate at its best trial: the fall of the cost that it promises, parameters to start a fit from, and how
-    far the other unknowns would then move (p,)."""
+    """A candidate at its best trial: the fall of the cost that it promises, parameters to start a fit from, how far the
+    other unknowns would then move (p,), and what the trial does to the weighted readings (N,)."""
 
     candidate: Candidate
     gain: float
     start: dict[str, float]
     moved: Floats
+    response: Floats
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,33 @@ def probed(observation: Observation, point: Point, candidates: Sequence[Candidat
     return sorted(found, key=lambda p: -p.gain)
 
 
+def still_promising(
+    point: Point, candidates: Sequence[Candidate], earlier: Sequence[Probed], least: float
+) -> list[Candidate]:
+    """Candidates but for those whose response, as an earlier probe has seen it, cannot explain what is left any more.
+
+    Args:
+        least: gain from which a candidate is kept: well below what a fit is worth, for its best trial may be another
+            one now.
+    """
+    clear = projection(point)
+    known = {_key(probe.candidate): probe.response for probe in earlier}
+    kept = []
+    for candidate in candidates:
+        response = known.get(_key(candidate))
+        if response is not None:
+            products, squares = clear.gains(response[None])
+            if products[0] ** 2 < least * squares[0]:
+                continue
+        kept.append(candidate)
+    return kept
+
+
+def _key(candidate: Candidate) -> tuple[str, tuple[int, ...], tuple[str, ...]]:
+    """Tells candidates apart, also two laws of one name."""
+    return candidate.name, candidate.joints, tuple(p.name for p in candidate.free)
+
+
 def _best_trial(
     observation: Observation, point: Point, clear: Projection, reference: Sequence[Floats], candidate: Candidate
 ) -> Probed | None:
@@ -111,7 +139,7 @@ def _best_trial(
         start, stretch = _stretched(point, candidate, trial, stretch)
         gain = float(2 * stretch * products[k] - stretch**2 * squares[k])
         if best is None or gain > best.gain:
-            best = Probed(candidate, gain, start, clear.moves(stretch * responses[k]))
+            best = Probed(candidate, gain, start, clear.moves(stretch * responses[k]), responses[k])
     return best
 
 

@@ -9,7 +9,7 @@ from daq.contracts.progress import Cancel, CancelledError, Progress
 from model.discrepancy.candidates import FLEXIBLE, TONES, candidates
 from model.discrepancy.observation import Observation
 from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.probing import Probed, probed
+from model.discrepancy.probing import Probed, probed, still_promising
 from model.discrepancy.refitting import Judged, Refitted, finished, polished, refitted
 from model.discrepancy.thresholds import Thresholds
 from model.discrepancy.tones import proposed_tones
@@ -19,6 +19,8 @@ FLAGGED_SHARE = 0.1
 
 ALWAYS_FITTED, HOPELESS = 3, 0.2
 """After so many, no candidate is fitted whose probe promises less than this share of the best evidence so far."""
+REMEMBERED = 0.3
+"""A candidate is probed again where its old response promises this share of what is interesting."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +33,14 @@ class Ranking:
 
 def ranked(
     observation: Observation, current: Judged, options: DiagnosisOptions, excluded: Sequence[str],
-    thresholds: Thresholds, progress: Progress, cancel: Cancel,
+    thresholds: Thresholds, progress: Progress, cancel: Cancel, earlier: Sequence[Probed] = (),
 ) -> Ranking:  # fmt: skip
-    """All candidates against the current point. `excluded`: effects that need not be tried."""
+    """All candidates against the current point.
+
+    Args:
+        excluded: effects that need not be tried. earlier: probes of the turn before: what they rule out is not
+            simulated again.
+    """
     point = current.point
     free = {u.name for u in point.unknowns if u.deviation is None}
     every = [
@@ -41,6 +48,7 @@ def ranked(
         for c in candidates(point.model, options.effects, options.joints)
         if c.name not in excluded and not {p.name for p in c.main} <= free  # what has been added is free already
     ]
+    every = still_promising(point, every, earlier, REMEMBERED * thresholds.interesting)
     progress(0.0, "probing the known effects")
     probes = probed(observation, point, [c for c in every if c.name not in FLEXIBLE])
     _stop_if(cancel)

@@ -143,5 +143,6 @@ def _best_tone(
     candidate = tone(point.model, name, joint, trial)
     if candidate is None:
         return None
-    moved = clear.moves(first[best] * sine[best] + second[best] * cosine[best], columns)
-    return Probed(candidate, float(gains[best]), candidate.trials[0], moved)
+    response = np.zeros_like(point.weighted)
+    response[columns] = first[best] * sine[best] + second[best] * cosine[best]
+    return Probed(candidate, float(gains[best]), candidate.trials[0], clear.moves(response), response)

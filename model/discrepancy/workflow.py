@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq.contracts.errors import TraceError
 from daq.contracts.machine import NoController
@@ -30,8 +31,10 @@ from model.discrepancy.decision import Decision, decide, explained_share
 from model.discrepancy.distortion import sum_of_contributions
 from model.discrepancy.holdout import HeldOut, errors, excess_removed, held_out
 from model.discrepancy.next_experiment import Asked, Asker, rivals_of
+from model.discrepancy.noise_floor import noise_floor
 from model.discrepancy.observation import Observation, Signals, observed
 from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.probing import Probed
 from model.discrepancy.ranking import Ranking, ranked
 from model.discrepancy.reasons_samples import Left
 from model.discrepancy.refitting import Judged, Refitted, judge
@@ -44,6 +47,8 @@ from model.fitting.fit import INTERVAL
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
 
+Floats = NDArray[np.float64]
+
 FIRST_STEPS, LAST_STEPS = 6, 4
 """Of a search before and after its derivatives are computed anew."""
 
@@ -53,7 +58,9 @@ class _Case:
     """What stays the same during a diagnosis."""
 
     observation: Observation
+    floor: Floats
     held: HeldOut | None
+    floor_held: Floats
     traces: tuple[Trace, ...]
     options: DiagnosisOptions
     thresholds: Thresholds
@@ -85,22 +92,20 @@ def diagnose(
     traces, holdout = tuple(_used(t, findings) for t in traces), tuple(_used(t, findings) for t in holdout)
     progress(0.02, "fitting the tolerance parameters")
     observation, wider, unknowns = observed(known, traces)
-    recorded = all(t.error is not None and t.power_raw is not None for t in traces)
-    case = _Case(
-        observation, held_out(known, holdout), traces, options, THRESHOLDS,
-        OF_THE_CONTROLLER if recorded else (), tuple(t.record.trace_id for t in traces),
-    )  # fmt: skip
     given = _given(observation, wider, unknowns)
     point = _tolerances(observation, given)
+    case = _case(observation, held_out(known, holdout), point, traces, options)
     steps = [_controller_step(model, observation, f) for f in findings]
     current, verdict = judge(observation, point), None
     first = current
     rivals: tuple[Refitted, ...] = ()
+    probes: tuple[Probed, ...] = ()
     while verdict is None:
         number = len(steps) - len(findings)
         share = 0.1 + 0.8 * number / options.most_steps
         joints = _to_search(case, current, number)
-        turn = _ranked_in(case, current, joints, share, progress, cancel) if joints else Ranking((), ())
+        turn = _ranked_in(case, current, joints, share, progress, cancel, probes) if joints else Ranking((), ())
+        probes = (*probes, *turn.probed)
         collected = sum(s.evidence for s in steps[len(findings) :] if s.adopted)
         decision = decide(turn, case.thresholds, collected)
         step, following = _turn(case, current, turn, decision)
@@ -118,13 +123,23 @@ def diagnose(
         verdict=verdict, summary=_summary(verdict, steps, remaining), steps=tuple(steps), remaining=remaining,
         model_before=model, model_after=_adopted(model, current.point, case.names),
         traces=case.names, holdout=tuple(t.record.trace_id for t in holdout),
-        rmse_fit=errors(observation, model, given.residuals, current.point.residuals),
-        rmse_holdout=_held_errors(case, given, current.point),
+        rmse_fit=errors(observation, model, given.residuals, current.point.residuals, case.floor),
+        rmse_holdout=_held_errors(case, model, *_held(case, given, current.point)),
         seconds=time.perf_counter() - begun, robot_seconds=float(sum(t.time[-1] - t.time[0] for t in traces)),
         notes=_notes(case) + (() if asked.note is None else (asked.note,)), next_experiment=asked.experiment,
     )  # fmt: skip
     progress(1.0, "done")
     return answer
+
+
+def _case(
+    observation: Observation, held: HeldOut | None, point: Point, traces: tuple[Trace, ...], options: DiagnosisOptions
+) -> _Case:
+    recorded = all(t.error is not None and t.power_raw is not None for t in traces)
+    return _Case(
+        observation, noise_floor(observation, point), held, np.zeros(0) if held is None else held.floor(point), traces,
+        options, THRESHOLDS, OF_THE_CONTROLLER if recorded else (), tuple(t.record.trace_id for t in traces),
+    )  # fmt: skip
 
 
 def _refuse_shared(traces: Sequence[Trace], holdout: Sequence[Trace]) -> None:
@@ -173,15 +188,16 @@ def _to_search(case: _Case, current: Judged, number: int) -> tuple[int, ...]:
 
 
 def _ranked_in(
-    case: _Case, current: Judged, joints: tuple[int, ...], share: float, progress: Progress, cancel: Cancel
-) -> Ranking:
+    case: _Case, current: Judged, joints: tuple[int, ...], share: float, progress: Progress, cancel: Cancel,
+    earlier: Sequence[Probed],
+) -> Ranking:  # fmt: skip
     width = 0.8 / case.options.most_steps
 
     def tell(done: float, text: str) -> None:
         progress(share + width * done, text)
 
     options = case.options.model_copy(update={"joints": joints})
-    return ranked(case.observation, current, options, case.excluded, case.thresholds, tell, cancel)
+    return ranked(case.observation, current, options, case.excluded, case.thresholds, tell, cancel, earlier)
 
 
 def _turn(
@@ -191,11 +207,12 @@ def _turn(
     best = decision.best
     if decision.kind == "nothing" or best is None:
         return None, current
-    rejected = _rejected(case, current.point, best)
+    held = _held(case, current.point, best.judged.point)
+    rejected = _rejected(case, best, *held)
     observation, model = case.observation, best.judged.point.model
     where = _where(case, current.point)
     values = found_values(best)
-    held_errors = _held_errors(case, current.point, best.judged.point)
+    held_errors = _held_errors(case, model, *held)
     listed = tuple(_listed(r) for r in ranking.fitted) + _only_probed(ranking, observation.samples)
     reason = reasons.reason(
         best.candidate.name, best.candidate.joints, values, best.evidence, decision.margin,
@@ -205,7 +222,7 @@ def _turn(
     step = Step(
         effect=best.candidate.name, joints=best.candidate.joints, parameters=values, evidence=best.evidence,
         margin=decision.margin, candidates=listed, group=tuple(_listed(r) for r in decision.group),
-        rmse_fit=errors(observation, model, current.point.residuals, best.judged.point.residuals),
+        rmse_fit=errors(observation, model, current.point.residuals, best.judged.point.residuals, case.floor),
         rmse_holdout=held_errors, excess_removed_holdout=excess_removed(held_errors),
         sum_lambda2_before=_sum_lambda2(current.point, current.point),
         sum_lambda2_after=_sum_lambda2(best.judged.point, current.point),
@@ -216,18 +233,20 @@ def _turn(
     return step, judge(observation, settled(observation, best.judged.point, LAST_STEPS))
 
 
-def _held_errors(case: _Case, before: Point, after: Point) -> tuple[SignalError, ...]:
-    """Errors on the held-out traces; none where there are no such traces."""
-    if case.held is None:
-        return ()
-    return errors(case.held.observation, after.model, case.held.residuals(before), case.held.residuals(after))
+def _held(case: _Case, before: Point, after: Point) -> tuple[Signals, Signals]:
+    """Residuals of the held-out traces, before and after; empty where there are no such traces."""
+    return ((), ()) if case.held is None else (case.held.residuals(before), case.held.residuals(after))
 
 
-def _rejected(case: _Case, before: Point, best: Refitted) -> str | None:
+def _held_errors(case: _Case, model: Model, before: Signals, after: Signals) -> tuple[SignalError, ...]:
+    return () if case.held is None else errors(case.held.observation, model, before, after, case.floor_held)
+
+
+def _rejected(case: _Case, best: Refitted, before: Signals, after: Signals) -> str | None:
     """Why the step is not taken, if held-out traces speak against it."""
     if case.held is None:
         return None
-    rise, deviation = case.held.rise(before, best.judged.point)
+    rise, deviation = case.held.rise(before, after)
     bearable = case.thresholds.worse * deviation if best.evidence >= case.thresholds.convincing else 0.0
     if rise > bearable:
         return (
@@ -355,7 +374,7 @@ def _controller_step(model: Model, observation: Observation, finding: Controller
     where = Where(joint=finding.joint, phase=None, summary=f"joint {finding.joint}: {said}", cells=(), dependences=())
     return Step(
         effect=finding.effect, joints=(finding.joint,), parameters={name: value}, evidence=evidence, margin=evidence,
-        candidates=(proof,), rmse_fit=errors(observation, model, quiet, quiet), where=where,
+        candidates=(proof,), rmse_fit=errors(observation, model, quiet, quiet, observation.deviations), where=where,
         reason=f"joint {finding.joint}: {said}; this needs no model of the arm", adopted=True,
     )  # fmt: skip
 

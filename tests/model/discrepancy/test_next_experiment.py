@@ -15,6 +15,7 @@ from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.progress import Never, silent
 from daq.contracts.trace import Trace
 from daq.safety.planned import planned
+from model.discrepancy import search
 from model.discrepancy.candidates import Candidate
 from model.discrepancy.decision import decide
 from model.discrepancy.next_experiment import Experiment, best_experiment, most_information, rivals_of, settled
@@ -50,7 +51,7 @@ def known(trace: Trace) -> Point:
     """The model without an effect, fitted."""
     observation, model, unknowns = observed(imagined.arm(), [trace])
     given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]), observation.quiet)
-    return searched(observation, with_new_tangents(observation, searched(observation, given, 6)), 4)
+    return search.settled(observation, given, 6)
 
 
 def turn(trace: Trace, effects: tuple[str, ...]) -> Ranking:
@@ -108,7 +109,7 @@ def again(point: Point, traces: list[Trace]) -> Point:
     every = (*(point.unknowns[k] for k in shared), *starts)
     values = np.concatenate([point.values[shared], [u.start for u in starts]])
     begun = point_at(observation, point.model, every, values, observation.quiet)
-    return searched(observation, with_new_tangents(observation, searched(observation, begun, 6)), 4)
+    return search.settled(observation, begun, 6)
 
 
 def speed_law(trace: Trace, point: Point, effect: str) -> Refitted:
