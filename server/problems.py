@@ -86,17 +86,22 @@ def of_exit_code(exit_code: int, line: str) -> ProblemError:
     return ProblemError(409, "not-safe", line, "remove the cause, then try again")
 
 
-def response(request: Request, problem: ProblemError) -> JSONResponse:
-    """A problem on its way out."""
-    details = ProblemDetails(
+def details_of(problem: ProblemError, request_id: str | None = None) -> ProblemDetails:
+    """A problem as it is told."""
+    return ProblemDetails(
         type=f"docs/service.md#{problem.kind}",
         title=TITLES.get(problem.status, "Problem"),
         status=problem.status,
         detail=problem.detail,
         advice=problem.advice,
         fields=problem.fields,
-        request_id=getattr(request.state, "request_id", None),
+        request_id=request_id,
     )
+
+
+def response(request: Request, problem: ProblemError) -> JSONResponse:
+    """A problem on its way out."""
+    details = details_of(problem, getattr(request.state, "request_id", None))
     return JSONResponse(details.model_dump(mode="json"), problem.status, headers=problem.headers, media_type=MEDIA_TYPE)
 
 

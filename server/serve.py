@@ -10,31 +10,30 @@ import uvicorn
 
 from daq.config import Settings
 from daq.config.service import ServiceSettings
-from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.errors import SpecError
 from server import logs
+from server.access.caller import Caller
 from server.access.gate import Gate
 from server.access.origin import is_loopback
+from server.access.stop_gate import StopGate
 from server.access.tokens import KnownTokens
 from server.app import make_app
+from server.listening import listening
 from server.services import Services
+from server.stop_listener import StopListener
 
 GRACE = 1
 """s for requests under way when the service ends; streams are told to end before."""
 
 
-class ListenError(DaqError):
-    """The address cannot be listened at."""
-
-    exit_code = 3
-
-
 def serve(settings: Settings, ready: Callable[[str], None]) -> None:
     """Serves until a signal ends it. `ready` is called with the address. Raises ListenError, StoreError, SpecError."""
     logs.begin()
-    listener = _listen(settings.server.host, settings.server.port)
-    with listener:
+    section = settings.server
+    with listening(section) as (listener, beside):
         services = Services(settings)
-        app = make_app(services, _gate(services, settings.server))
+        gate = _gate(services, section, beside.getsockname()[1])
+        app = make_app(services, gate)
         config = uvicorn.Config(
             app,
             log_config=None,
@@ -48,11 +47,15 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         )
         host, port = listener.getsockname()[:2]
         address = f"http://{f'[{host}]' if ':' in host else host}:{port}"
-        with suppress(KeyboardInterrupt):  # the service has ended in order by then
-            _Server(config, lambda: ready(address)).run([listener])
+        stop_listener = _stop_listener(services, gate, beside, port)
+        try:
+            with suppress(KeyboardInterrupt):  # the service has ended in order by then
+                _Server(config, lambda: ready(address)).run([listener])
+        finally:
+            stop_listener.close()
 
 
-def _gate(services: Services, section: ServiceSettings) -> Gate:
+def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
     """Raises SpecError where others than this computer's users would get in without a token."""
     local = is_loopback(section.host)
     if not local and all(token.revoked is not None for token in services.tokens.all()):
@@ -62,7 +65,18 @@ def _gate(services: Services, section: ServiceSettings) -> Gate:
         )
     known = KnownTokens(services.tokens, services.clock)
     names = tuple(name.lower() for name in section.names)
-    return Gate(known, services.tickets, local, names, services.metrics.request)
+    return Gate(known, services.tickets, local, names, stop_port, services.metrics.request)
+
+
+def _stop_listener(services: Services, gate: Gate, listener: socket.socket, service_port: int) -> StopListener:
+    def told(robot: str, text: str, caller: Caller) -> None:
+        with suppress(RuntimeError):  # the service is ending, and writes nothing down any more
+            services.tell_later(robot, "stop", text, actor=caller.name)
+
+    stop_gate = StopGate(gate.tokens, gate.open_on_loopback, gate.names, service_port)
+    services.stop_port = listener.getsockname()[1]
+    stops = {one.robot.name: one.stop.stop_now for one in services.robots()}
+    return StopListener(listener, stop_gate, stops, told)
 
 
 class _Server(uvicorn.Server):
@@ -77,15 +91,3 @@ class _Server(uvicorn.Server):
         await super().startup(sockets)
         if self.started:
             self._ready()
-
-
-def _listen(host: str, port: int) -> socket.socket:
-    try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        listener = socket.socket(family, kind, protocol)
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(address)
-    except OSError as error:
-        line = f"server.host {host}, server.port {port}: cannot be listened at: {error.strerror or error}"
-        raise ListenError(line) from error
-    return listener

@@ -87,6 +87,8 @@ class Services:
         self.events = EventStore(self.store)
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
         self.begun = self.clock.monotonic()
+        self.stop_port = 0
+        """Of the stop listener, once there is one."""
         self.metrics = Metrics()
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)

@@ -32,17 +32,16 @@ def gain(
     from daq.calibration import gain_experiment, gains_from_trace
     from daq.cli.run_result import acquire
     from daq.contracts.experiment import parse_joints
-    from daq.traces.catalogue import find_trace
     from daq.traces.reader import read_trace
 
     call = invocation(context)
     wanted = parse_joints(joints)
-    machine = call.settings.machine()
+    machine = call.machine
     place = folder or call.trace_folder
     if trace is None:
         path = acquire(call, gain_experiment(wanted), machine, place, yes).trace
     else:
-        path = find_trace(place, trace)
+        path = call.find_trace(place, trace)
     found = [one for one in gains_from_trace(read_trace(path), machine) if one.joint in wanted]
     if json:
         print_json({"trace": path, "gains": [one.as_data() for one in found]})

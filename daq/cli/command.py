@@ -10,8 +10,8 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from daq.cli.context import Invocation
-from daq.cli.lazy import LazyGroup
-from daq.contracts.errors import DaqError
+from daq.cli.lazy import HERE, LazyGroup
+from daq.contracts.errors import DaqError, SpecError
 from firmware_protocol.errors import ProtocolError
 
 EXIT_PROGRAM_FAULT = 1
@@ -19,6 +19,7 @@ EXIT_WRONG_INPUT = 2
 EXIT_INTERRUPTED = 130
 """As shells report a process that Ctrl-C has ended."""
 
+SERVER_VARIABLE = "DAQ_SERVER"
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 """What typer raises for a command line that it does not understand; it has no public name there."""
 
@@ -43,9 +44,19 @@ def options(
         str | None,
         typer.Option(help="Robot's port: serial:///dev/ttyUSB0?baud=115200, tcp://host:port or mock://."),
     ] = None,
+    server: Annotated[
+        str | None,
+        typer.Option(envvar=SERVER_VARIABLE, help="A service that has the robot: http://host:8300. Token: DAQ_TOKEN."),
+    ] = None,
 ) -> None:
     """Options that go before the subcommand."""
-    context.obj = Invocation(config_file=config_file, port_option=port)
+    if server is not None and port is not None:
+        raise SpecError("--port and --server: the server has the robot at its own port; give one of them")
+    if server is not None and context.invoked_subcommand in HERE:
+        if getattr(context.get_parameter_source("server"), "name", "") != "ENVIRONMENT":
+            raise SpecError(f"--server: `daq {context.invoked_subcommand}` has nothing to do with a server's robot")
+        server = None
+    context.obj = Invocation(config_file=config_file, port_option=port, server=server)
 
 
 def main() -> None:

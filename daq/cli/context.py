@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from daq.config import Settings
+    from daq.contracts.machine import Machine
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")]
 YesOption = Annotated[bool, typer.Option("--yes", help="Consent to moving a real arm without being asked.")]
@@ -34,6 +35,8 @@ class Invocation:
 
     config_file: Path | None = None
     port_option: str | None = None
+    server: str | None = None
+    """URL of a service that has the robot; None for a robot at this computer."""
     told: bool = field(default=False, repr=False)
 
     @cached_property
@@ -52,6 +55,32 @@ class Invocation:
             self.told = True
             console().print("No robot is configured: using the mock controller (no arm moves). See `daq config show`.")
         return self.settings.port
+
+    @cached_property
+    def machine(self) -> Machine:
+        """The robot's machine file with the limits that hold for it: configured here, or at the server.
+
+        Raises SpecError, ServiceError, ServiceNotReachedError.
+        """
+        if self.server is None:
+            return self.settings.machine()
+        from daq.cli.remote.robot import remote_robot
+
+        with remote_robot(self) as robot:
+            return robot.machine()
+
+    def find_trace(self, folder: Path, wanted: str) -> Path:
+        """The file of a trace: by path, number, name or `last`, in `folder`; at the server, fetched into `folder`.
+
+        Raises TraceError, ServiceError, ServiceNotReachedError.
+        """
+        if self.server is None or Path(wanted).is_file():
+            from daq.traces.catalogue import find_trace
+
+            return find_trace(folder, wanted)
+        from daq.cli.remote.traces import fetched_trace
+
+        return fetched_trace(self, folder, wanted)
 
     @property
     def memory_map_text(self) -> str | None:

@@ -63,7 +63,7 @@ def _run(
 
 def _check_same_machine(call: Invocation, machine: Machine) -> None:
     """Raises SpecError when the port's arm is another machine than the traces'."""
-    configured = call.settings.machine()
+    configured = call.machine
     if configured.name != machine.name:
         raise SpecError(
             f"--acquire: the traces were made on {machine.name}, the configured robot is {configured.name}; "

@@ -19,8 +19,15 @@ app = typer.Typer(add_completion=False, help="Show or set the controller's PID g
 @app.command()
 def show(context: typer.Context, json: JsonOption = False) -> None:
     """P, I and D of every joint (0-20; not the physical gains)."""
-    with connected(invocation(context)) as controller:
-        found = controller.gains()
+    call = invocation(context)
+    if call.server is None:
+        with connected(call) as controller:
+            found = controller.gains()
+    else:
+        from daq.cli.remote.robot import remote_robot
+
+        with remote_robot(call) as robot:
+            found = robot.gains().gains
     if json:
         print_json({joint: dict(zip("pid", gain, strict=True)) for joint, gain in found.items()})
         return
@@ -37,6 +44,11 @@ def set_gains(
     """Write gains and read them back. Refused for a joint off its set point, which would jump there."""
     wanted = parse_gains(gains)
     call = invocation(context)
+    if call.server is not None:
+        from daq.cli.remote.control import set_gains_at_server
+
+        set_gains_at_server(call, wanted, yes)
+        return
     with connected(call) as controller:
         if not controller.identity.simulated and not yes and not agreed(call.port):
             raise SafetyError(f"{call.port} is a real arm: its gains change only with the operator's consent (--yes)")

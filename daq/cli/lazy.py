@@ -19,6 +19,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "teach": ("daq.cli.teach", "Jog, lead by the nose, steps, and playing back."),
     "calibrate": ("daq.cli.calibrate", "Find what the machine really does."),
     "serve": ("daq.cli.serve", "Serve experiments and traces to people and programs."),
+    "queue": ("daq.cli.queue", "The queue of a server's robot: show, pause, resume."),
     "token": ("daq.cli.token", "Tokens of the service: make, list, revoke."),
     "traces": ("daq.cli.traces", "List, show, plot, convert and verify traces."),
     "config": ("daq.cli.config", "Show and check the configuration."),
@@ -33,6 +34,9 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "blind": ("daq.cli.blind", "Effects hidden in the mock, diagnosed blindly, scored."),
     "demo": ("daq.cli.demo", "The ramp step on the mock, from command to plot."),
 }
+
+HERE = frozenset({"ports", "serve", "token", "config", "mock", "simulate", "design", "thesis", "blind", "demo"})
+"""Subcommands that are about this computer alone: `--server` is refused, DAQ_SERVER does not concern them."""
 
 
 class LazyGroup(typer.core.TyperGroup):

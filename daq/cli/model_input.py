@@ -76,7 +76,6 @@ def model_labels(names: Sequence[str]) -> list[str]:
 
 def read_traces(call: Invocation, folder: Path | None, names: Sequence[str]) -> list[Trace]:
     """Traces by file, number, name or `last`; CSV files are read as they are. Raises TraceError, SpecError."""
-    from daq.traces.catalogue import find_trace
     from daq.traces.csv_table import import_csv
     from daq.traces.reader import read_trace
 
@@ -88,7 +87,7 @@ def read_traces(call: Invocation, folder: Path | None, names: Sequence[str]) -> 
         if Path(name).suffix == ".csv" and Path(name).is_file():
             trace = import_csv(Path(name))
         else:
-            trace = read_trace(find_trace(place, name))
+            trace = read_trace(call.find_trace(place, name))
         found.append(trace)
     return found
 
@@ -101,4 +100,4 @@ def machine_of(traces: Sequence[Trace], call: Invocation) -> Machine:
     machines = {t.record.machine.name: t.record.machine for t in traces if t.record.machine is not None}
     if len(machines) > 1:
         raise SpecError(f"the traces were made on different machines: {', '.join(machines)}; one at a time")
-    return next(iter(machines.values()), None) or call.settings.machine()
+    return next(iter(machines.values()), None) or call.machine

@@ -31,6 +31,12 @@ def reset(
     """End the freeze of a stop. Set points stay where the stop put them, or with --here become the present posture."""
     from firmware_protocol.commands import StatusFlag
 
+    if invocation(context).server is not None:
+        from daq.cli.remote.robot import remote_robot
+
+        with remote_robot(invocation(context)) as robot:
+            print(robot.reset(here=here).text)
+        return
     with connected(invocation(context)) as controller:
         frozen = StatusFlag.FROZEN in controller.status().flags
         if here:

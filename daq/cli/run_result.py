@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +16,8 @@ from daq.cli.stop_keys import StopKeys
 from daq.contracts.errors import SafetyError
 
 if TYPE_CHECKING:
+    from rich.progress import Progress
+
     from daq.acquisition.messages import Failed, Finished, Job
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import Machine
@@ -28,11 +32,10 @@ def carry_out(
 
     Returns None for a dry run.
     """
-    machine = call.settings.machine()
     if dry_run:
-        preview(spec, machine, as_json)
+        preview(spec, call.machine, as_json)
         return None
-    finished = acquire(call, spec, machine, folder or call.trace_folder, consent)
+    finished = acquire(call, spec, call.machine, folder or call.trace_folder, consent)
     if as_json:
         print_json(finished.model_dump(mode="json"))
     else:
@@ -43,10 +46,14 @@ def carry_out(
 
 
 def acquire(call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Path, consent: bool) -> Finished:
-    """Runs `spec` in an acquisition process, showing its progress; Ctrl-C freezes the arm.
+    """Runs `spec` in an acquisition process, or at the server, showing its progress; Ctrl-C freezes the arm.
 
     Where a real arm waits for consent and a person can be asked, asks. Raises AcquisitionFailedError.
     """
+    if call.server is not None:
+        from daq.cli.remote.run import acquire_remotely
+
+        return acquire_remotely(call, spec, folder, consent)
     from daq.acquisition.messages import Finished, Job
     from daq.transport import parse_port_url
 
@@ -73,34 +80,55 @@ def acquire(call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Pa
 
 def _shown(job: Job) -> Finished | Failed:
     """One acquisition process, its progress and events on the terminal; Ctrl-C and its like are passed on as a stop."""
-    from rich.markup import escape
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
     from daq.acquisition import messages
     from daq.acquisition.parent import Acquisition
 
-    # A sequence has dozens of marks; they are in the trace.
-    quiet = {"start", "end"} | (
-        {"note", "ramp_start", "ramp_end", "reversal"} if job.spec.trajectory.kind == "sequence" else set()
-    )
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[text]}"), TimeElapsedColumn())
-    with (
-        StopKeys() as keys,
-        Acquisition(job) as process,
-        Progress(*columns, console=console(), transient=True, disable=not console().is_terminal) as bar,
-    ):
+    with StopKeys() as keys, Acquisition(job) as process, shown_run(job.spec) as shown:
         keys.stops(process.stop)
-        task = bar.add_task(job.spec.trajectory.kind, total=1.0, text="connecting")
         for report in process:
             if isinstance(report, messages.Progress):
-                bar.update(task, completed=report.fraction, text=report.text)
-            elif isinstance(report, messages.EventHappened) and report.event.kind not in quiet:
-                event = report.event
-                line = escape(f"{event.kind.replace('_', ' ')}: {event.message}")
-                bar.console.print(f"[dim]{event.time:8.2f} s[/dim]  {line}", soft_wrap=True)
+                shown.progress(report.fraction, report.text)
+            elif isinstance(report, messages.EventHappened):
+                shown.event(report.event.kind, report.event.time, report.event.message)
             elif isinstance(report, messages.Finished | messages.Failed):
                 return report
     raise AssertionError("an acquisition always ends with a report")
+
+
+class ShownRun:
+    """A run as it goes on: a bar, and a line for each event above it."""
+
+    def __init__(self, bar: Progress, kind: str, quiet: frozenset[str]) -> None:
+        self._bar = bar
+        self._quiet = quiet
+        self._task = bar.add_task(kind, total=1.0, text="connecting")
+
+    def progress(self, fraction: float, text: str) -> None:
+        """How far it is."""
+        from rich.markup import escape
+
+        self._bar.update(self._task, completed=fraction, text=escape(text))
+
+    def event(self, kind: str, time: float, message: str) -> None:
+        """Something that is in the trace too; `time` in s from the start of the record."""
+        from rich.markup import escape
+
+        if kind not in self._quiet:
+            line = escape(f"{kind.replace('_', ' ')}: {message}")
+            self._bar.console.print(f"[dim]{time:8.2f} s[/dim]  {line}", soft_wrap=True)
+
+
+@contextmanager
+def shown_run(spec: ExperimentSpec) -> Iterator[ShownRun]:
+    """Shows a run within; the bar is gone when it is done, and is not there where nobody watches."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    kind = spec.trajectory.kind
+    # A sequence has dozens of marks; they are in the trace.
+    marks = {"note", "ramp_start", "ramp_end", "reversal"} if kind == "sequence" else set()
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[text]}"), TimeElapsedColumn())
+    with Progress(*columns, console=console(), transient=True, disable=not console().is_terminal) as bar:
+        yield ShownRun(bar, kind, frozenset({"start", "end"} | marks))
 
 
 class AcquisitionFailedError(SafetyError):

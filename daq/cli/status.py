@@ -18,6 +18,11 @@ app = typer.Typer(add_completion=False)
 def status(context: typer.Context, json: JsonOption = False) -> None:
     """Posture, state and link of the robot, read once."""
     call = invocation(context)
+    if call.server is not None:
+        from daq.cli.remote.status import show_status
+
+        show_status(call, json)
+        return
     machine = call.settings.machine()
     with connected(call) as controller:
         found = controller.status()

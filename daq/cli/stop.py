@@ -21,13 +21,22 @@ EXIT_NOT_DELIVERED = 3
 def stop(context: typer.Context, json: JsonOption = False) -> None:
     """Freeze every robot that is being moved, and the configured one: set points become the measured posture.
 
+    With --server the robots of that service; with DAQ_SERVER those and the ones that are moved from here.
+
     Ends with 0 when every stop was confirmed by its board, with 3 when one was NOT DELIVERED or NOT CONFIRMED, or there
     was no robot. A program's stop never replaces the hardware's own.
     """
     from daq.cli import early_stop
 
-    answers = [_answered(attempt) for attempt in early_stop.attempts()]
-    answers += _stop_configured(invocation(context), {answer.port for answer in answers})
+    call = invocation(context)
+    asked = early_stop.attempts() if call.server is None else early_stop.asked()
+    answers = [_answered(attempt) for attempt in asked]
+    if call.server is None:
+        answers += _stop_configured(call, {answer.port for answer in answers})
+    else:
+        from daq.cli.remote.stop import stop_at_server
+
+        answers += stop_at_server(call)
     if json:
         print_json([answer.as_data() for answer in answers])
     elif not answers:

@@ -68,11 +68,21 @@ def jog(
     from daq.teaching.program import Absolute, Program, save_program
 
     call = invocation(context)
-    machine = call.settings.machine()
+    machine = call.machine
     pendant = Pendant(machine, require_jog_speed(parse_angle(speed, "speed")))
     kept: list[Absolute] = []
     line = StatusLine()
+
+    def keep(angles: dict[int, float]) -> None:
+        kept.append(Absolute(angles=angles))
+        line.tell(f"posture {len(kept)} kept")
+
     try:
+        if call.server is not None:
+            from daq.cli.remote.jog import jog_at_server
+
+            jog_at_server(call, pendant, keep, yes, line)
+            return
         with keys() as keyboard, _owned(call, yes) as robot:
             arm = _arm(robot, machine)
             line.tell(HELP)
@@ -84,8 +94,7 @@ def jog(
                     pendant.gripper = None
                 if pendant.keep:
                     pendant.keep = False
-                    kept.append(Absolute(angles=dict(zip(arm.joints, row.set_point, strict=True))))
-                    line.tell(f"posture {len(kept)} kept")
+                    keep(dict(zip(arm.joints, row.set_point, strict=True)))
                 line.show(pendant)
                 return command
 
@@ -106,6 +115,8 @@ def step(
     yes: YesOption = False,
 ) -> None:
     """One off-line step, all joints arriving together: to absolute angles, or by relative ones."""
+    from pydantic import ValidationError
+
     from daq.teaching.program import Absolute, Instruction, Program, Relative
 
     if (to is None) == (by is None):
@@ -115,8 +126,13 @@ def step(
         raise SpecError(f"step {to or by!r}: write joint=angle pairs like 1=180,2=45")
     call = invocation(context)
     kind: type[Absolute | Relative] = Relative if to is None else Absolute
-    instruction: Instruction = kind(angles=angles, speed=parse_angle(speed, "speed"))
-    program = Program(name="step", machine=call.settings.machine().name, instructions=(instruction,))
+    try:
+        instruction: Instruction = kind(angles=angles, speed=parse_angle(speed, "speed"))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise SpecError(f"step: {where} = {first['input']:.5g} rad or rad/s: {first['msg']}") from error
+    program = Program(name="step", machine=call.machine.name, instructions=(instruction,))
     _perform(call, program, yes)
 
 
@@ -138,6 +154,11 @@ def _perform(call: Invocation, program: object, consent: bool) -> None:
     from daq.teaching.program_plan import check_program, plan_program, run_program
 
     assert isinstance(program, Program)
+    if call.server is not None:
+        from daq.cli.remote.teach import perform_at_server
+
+        perform_at_server(call, program, consent)
+        return
     machine = call.settings.machine()
     with _owned(call, consent) as robot:
         here = _arm(robot, machine).next_sample()
@@ -172,7 +193,6 @@ def lead(
     if not output.absolute().parent.is_dir():
         raise SpecError(f"lead: {output}: its folder does not exist; nothing was begun")
     call = invocation(context)
-    machine = call.settings.machine()
 
     def keep(path: RecordedPath) -> None:
         try:
@@ -181,6 +201,12 @@ def lead(
             raise SpecError(f"{output}: cannot be written: {error.strerror}") from error
         print(f"{output}: {path.duration:.2f} s on joints {', '.join(map(str, path.joints))}")
 
+    if call.server is not None:
+        from daq.cli.remote.teach import lead_at_server
+
+        lead_at_server(call, parse_joints(joints), seconds, keep, yes)
+        return
+    machine = call.settings.machine()
     with _owned(call, yes) as robot:
         begun = robot.controller.clock.now()
 

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq.cli.context import Invocation, JsonOption, console, invocation, print_json
-from daq.contracts.errors import TraceError
+from daq.contracts.errors import SpecError, TraceError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from daq.contracts.trace import Trace
+    from daq.traces.catalogue import TraceSummary
 
 app = typer.Typer(add_completion=False, help="List, show, plot, convert and verify traces.", no_args_is_help=True)
 
@@ -30,18 +33,14 @@ def _folder(call: Invocation, folder: Path | None) -> Path:
 
 
 def _path(context: typer.Context, wanted: str, folder: Path | None) -> Path:
-    from daq.traces.catalogue import find_trace
-
-    return find_trace(_folder(invocation(context), folder), wanted)
+    call = invocation(context)
+    return call.find_trace(_folder(call, folder), wanted)
 
 
 @app.command("ls")
 def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOption = False) -> None:
     """List traces, the oldest first."""
-    from daq.traces.catalogue import list_traces
-
-    place = _folder(invocation(context), folder)
-    summaries = list_traces(place) if place.is_dir() else ()
+    summaries, place = _summaries(invocation(context), folder)
     if json:
         print_json([summary.model_dump(mode="json") for summary in summaries])
         return
@@ -68,6 +67,18 @@ def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOpti
     from rich.console import Console
 
     Console(highlight=False).print(table)
+
+
+def _summaries(call: Invocation, folder: Path | None) -> tuple[Sequence[TraceSummary], str]:
+    """Traces and where they are."""
+    if call.server is not None:
+        from daq.cli.remote.traces import summaries_at_server
+
+        return summaries_at_server(call), call.server
+    from daq.traces.catalogue import list_traces
+
+    place = _folder(call, folder)
+    return list_traces(place) if place.is_dir() else (), str(place)
 
 
 def joints_text(joints: tuple[int, ...]) -> str:
@@ -183,7 +194,13 @@ def import_(
     from daq.traces.naming import trace_path
     from daq.traces.store import write_trace
 
-    place = _folder(invocation(context), folder)
+    call = invocation(context)
+    if call.server is not None:
+        from daq.cli.remote.traces import upload
+
+        upload(call, file)
+        return
+    place = _folder(call, folder)
     found = import_csv(file)
     try:
         place.mkdir(parents=True, exist_ok=True)
@@ -215,7 +232,10 @@ def salvage(context: typer.Context, folder: FolderOption = None, json: JsonOptio
     """Finish the traces that a crash left without an end; they are marked as interrupted."""
     from daq.traces.salvage import salvage_folder
 
-    results = salvage_folder(_folder(invocation(context), folder))
+    call = invocation(context)
+    if call.server is not None:
+        raise SpecError("--server: `daq traces salvage` is for this computer's traces; a service salvages its own")
+    results = salvage_folder(_folder(call, folder))
     if json:
         print_json([vars(result) for result in results])
         return

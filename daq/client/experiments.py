@@ -51,9 +51,10 @@ class Experiments:
         body = ExperimentRequest(spec=spec)
         return self._connection.ask(MotionPreview, Request("POST", f"{self._path}/preview", body, repeatable=True))
 
-    def get(self, experiment: str) -> Experiment:
-        """One of them, as it is now."""
-        return self._connection.get(Experiment, f"{self._path}/{experiment}")
+    def get(self, experiment: str, wait: float = 0.0) -> Experiment:
+        """One of them, as it is now; with `wait` as it is at its end, or after so many s (60 at most)."""
+        path = f"{self._path}/{experiment}"
+        return self._connection.get(Experiment, path, wait=wait or None, patience=wait)
 
     def list(self, *states: ExperimentState, schedule: str | None = None) -> Iterator[Experiment]:
         """The newest first; all states where none is named."""
@@ -66,8 +67,7 @@ class Experiments:
         until = None if seconds is None else clock() + seconds
         while True:
             left = WAIT if until is None else max(0.0, min(WAIT, until - clock()))
-            path = f"{self._path}/{experiment}"
-            found = self._connection.get(Experiment, path, wait=left, patience=left)
+            found = self.get(experiment, left)
             if found.state in ENDS:
                 return found
             if until is not None and clock() >= until:

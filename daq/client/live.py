@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
 
@@ -27,11 +28,14 @@ class LiveStream:
     def __init__(self, connection: Connection, robot: str) -> None:
         """Raises ServiceNotReachedError, also when the service lets this client not in."""
         self._url = f"{_websocket(connection.url)}{API}/{robot}/live"
+        self._closed_last = ExitStack()
         headers = {} if connection.token is None else {"Authorization": f"Bearer {connection.token}"}
         try:
-            self._socket: ClientConnection = connect(
-                self._url, additional_headers=headers, open_timeout=CONNECT_WITHIN, close_timeout=CLOSE_WITHIN,
-                max_size=LARGEST_FRAME, compression=None, proxy=None,
+            self._socket: ClientConnection = self._closed_last.enter_context(
+                connect(
+                    self._url, additional_headers=headers, open_timeout=CONNECT_WITHIN, close_timeout=CLOSE_WITHIN,
+                    max_size=LARGEST_FRAME, compression=None, proxy=None,
+                )
             )  # fmt: skip
         except (OSError, InvalidHandshake, InvalidURI, TimeoutError) as error:
             raise ServiceNotReachedError(f"{self._url}: no stream: {error or 'no answer in time'}") from error
@@ -46,7 +50,7 @@ class LiveStream:
 
     def close(self) -> None:
         """Ends the stream."""
-        self._socket.close()
+        self._closed_last.close()
 
     def subscribe(
         self, *topics: Topic, rate: SampleRate | None = None, history: float | None = None, points: int = 1000

@@ -69,7 +69,7 @@ def _ask(url: str, headers: dict[str, str]) -> StopResult:
 
 def _undelivered(why: str) -> StopResult:
     text = f"stop NOT DELIVERED: {why}. Use the emergency stop."
-    return StopResult(delivered=False, confirmed=False, seconds=0.0, text=text)
+    return StopResult(delivered=False, confirmed=False, seconds=0.0, note=why, text=text)
 
 
 def _reason(error: httpx.HTTPError) -> str:

@@ -19,6 +19,8 @@ class ServiceSettings(BaseModel):
     """Address to listen at. Anything but loopback needs tokens (`daq token add`)."""
     port: Annotated[int, Field(ge=0, le=65535)] = DEFAULT_PORT
     """0: any free one, which is told."""
+    stop_port: Annotated[int, Field(ge=0, le=65535)] | None = None
+    """Port of the stop listener; None for the one after `port`, 0 for any free one."""
     folder: Path = Path("service")
     """The database, models and results of jobs."""
     database: str | None = None

@@ -9,7 +9,13 @@ from typing import Annotated, Any
 
 import platformdirs
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
-from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict, SettingsError
+from pydantic_settings import (
+    BaseSettings,
+    EnvSettingsSource,
+    PydanticBaseSettingsSource,
+    SettingsConfigDict,
+    SettingsError,
+)
 
 from daq.config.limits import merged_limits
 from daq.config.service import ServiceSettings
@@ -20,6 +26,8 @@ from daq.contracts.machine import Machine, load_machine
 APP = "ma2000-daq"
 LOCAL_FILE = "daq.toml"
 MOCK_URL = "mock://"
+SERVER_VARIABLE = "DAQ_SERVER"
+"""Of the command line: URL of a service, and no section `[server]`."""
 
 
 class RobotSettings(BaseModel):
@@ -75,6 +83,8 @@ class Settings(BaseSettings):
     ) -> tuple[PydanticBaseSettingsSource, ...]:
         """The environment, then the file's values (given to the constructor)."""
         del settings_cls, dotenv_settings, file_secret_settings
+        assert isinstance(env_settings, EnvSettingsSource)
+        env_settings.env_vars = {k: v for k, v in env_settings.env_vars.items() if k.upper() != SERVER_VARIABLE}
         return env_settings, init_settings
 
     @property
@@ -143,7 +153,7 @@ def _validated(data: dict[str, Any], origin: str) -> Settings:
 def _variable_of(where: tuple[int | str, ...]) -> str | None:
     """The environment variable that a value came from, since that goes before the file; None where there is none."""
     name = "DAQ_" + "__".join(str(part) for part in where).upper()
-    found = next((variable for variable in os.environ if variable.upper() == name), None)
+    found = next((one for one in os.environ if one.upper() == name != SERVER_VARIABLE), None)
     return None if found is None else f"environment {found}"
 
 

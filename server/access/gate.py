@@ -19,7 +19,7 @@ from server import logs
 from server.access.caller import LOCAL, Caller
 from server.access.headers import secure
 from server.access.limits import LARGEST_BODY, Buckets, counted
-from server.access.origin import SAFE_METHODS, is_from_elsewhere, is_known_name
+from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_known_name
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
 from server.problems import ProblemError, response
@@ -37,6 +37,7 @@ class Gate:
     """Decides who a caller is and whether a request goes on.
 
     open_on_loopback: whether whoever reaches this service without a token is an operator: it listens at loopback alone
+    stop_port:        of the stop listener, which the page may ask for a stop, too
     observed:         called with method, status and seconds of every request
     """
 
@@ -44,6 +45,7 @@ class Gate:
     tickets: Tickets
     open_on_loopback: bool
     names: tuple[str, ...] = ()
+    stop_port: int | None = None
     observed: Callable[[str, int, float], None] = lambda _method, _status, _seconds: None
     buckets: Buckets = field(default_factory=Buckets)
 
@@ -66,6 +68,8 @@ class Gate:
         state["request_id"] = request_id = secrets.token_hex(8)
         logs.request_id.set(request_id)
         status = 500
+        host = Headers(scope=scope).get("host", "")
+        stop_listener = None if self.stop_port is None else beside(host, self.stop_port)
 
         async def secured(message: Message) -> None:
             nonlocal status
@@ -73,7 +77,7 @@ class Gate:
                 status = message["status"]
                 headers = MutableHeaders(scope=message)
                 headers["X-Request-Id"] = request_id
-                secure(headers, scope["path"])
+                secure(headers, scope["path"], stop_listener)
             await send(message)
 
         try:

@@ -15,12 +15,16 @@ SECURITY = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
 }
+POLICY, CONNECT = "Content-Security-Policy", "connect-src 'self'"
 API_PREFIX = "/api/"
 
 
-def secure(headers: MutableHeaders, path: str) -> None:
-    """Adds them. Answers of the API are not kept by anybody on the way."""
+def secure(headers: MutableHeaders, path: str, stop_listener: str | None = None) -> None:
+    """Adds them. Answers of the API are not kept by anybody on the way. `stop_listener`: an origin that the page may
+    ask for a stop, beside its own."""
     for name, value in SECURITY.items():
         headers.setdefault(name, value)
+    if stop_listener is not None and headers[POLICY] == SECURITY[POLICY]:
+        headers[POLICY] = SECURITY[POLICY].replace(CONNECT, f"{CONNECT} {stop_listener}")
     if path.startswith(API_PREFIX) and "cache-control" not in headers:
         headers["Cache-Control"] = "no-store"

@@ -7,10 +7,12 @@ and not the name by which it reached this service: a name of its own that it let
 from __future__ import annotations
 
 import ipaddress
+import re
 from collections.abc import Collection, Mapping
 from urllib.parse import urlsplit
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
+NAME = re.compile(r"[a-z0-9.-]+|\[[0-9a-f:.]+\]")
 LOOPBACK_NAMES = ("localhost", "localhost.localdomain")
 
 
@@ -46,6 +48,15 @@ def is_known_name(host_header: str, names: Collection[str], *, loopback_only: bo
     except ValueError:
         return False
     return True
+
+
+def beside(host_header: str, port: int) -> str | None:
+    """The origin at another port of the same computer, under the name by which it was reached; None for a name that is
+    none."""
+    name = name_of(host_header)
+    if ":" in name:
+        name = f"[{name}]"
+    return f"http://{name}:{port}" if NAME.fullmatch(name) else None
 
 
 def is_from_elsewhere(headers: Mapping[str, str], *, changes_something: bool) -> bool:

@@ -75,6 +75,7 @@ def get_system(found: ServicesPart, _: Viewer) -> SystemStatus:
         live_dropped=sum(one.hub.dropped for one in found.robots()),
         jobs_at_once=found.settings.server.jobs_at_once,
         unattended=found.settings.server.unattended,
+        stop_port=found.stop_port,
     )
 
 

@@ -118,7 +118,13 @@ class Hub:
             case EventHappened():
                 event = report.event
                 message = RecordEventMessage(
-                    kind=event.kind, message=event.message, tick=event.tick, joint=event.joint, host_time=now
+                    kind=event.kind,
+                    message=event.message,
+                    tick=event.tick,
+                    joint=event.joint,
+                    host_time=now,
+                    time=event.time,
+                    experiment=self._experiment(),
                 )
                 self.history.add_event(message)
                 self.publish("events", message)

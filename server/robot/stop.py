@@ -47,6 +47,7 @@ class StopDesk:
             confirmed=answer.confirmed,
             tick=answer.tick,
             seconds=self._clock.monotonic() - begun,
+            note=answer.text,
             text=text,
         )
 

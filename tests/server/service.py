@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -44,6 +44,12 @@ class Service:
         found: dict[str, Any] = self.client.get("/robots/ma2000").json()
         return found
 
+    def until_arm(self, state: str) -> dict[str, Any]:
+        """Asks until the arm's state is told: a stop is answered before everybody has heard of it. The status."""
+        while (found := self.status())["arm"] != state:
+            assert self.process.poll() is None
+        return found
+
     def end_of(self, experiment: str) -> dict[str, Any]:
         """Waits until an experiment has ended; the test's own time limit ends the wait."""
         while True:
@@ -68,13 +74,17 @@ class Service:
 
 @contextmanager
 def running_service(
-    folder: Path, port: str = MOCK, *options: str, headers: dict[str, str] | None = None
+    folder: Path,
+    port: str = MOCK,
+    *options: str,
+    headers: dict[str, str] | None = None,
+    program: Sequence[str] = DAQ,
 ) -> Iterator[Service]:
-    """A service whose database, traces and stop sockets lie in `folder`."""
+    """A service whose database, traces and stop sockets lie in `folder`; `program` stands for `daq`."""
     environment = {key: value for key, value in os.environ.items() if not key.startswith("DAQ_")}
     environment |= {"DAQ_RUNTIME_FOLDER": str(folder / "run"), "XDG_CONFIG_HOME": str(folder / "configuration")}
     process = subprocess.Popen(
-        [*DAQ, "--port", port, "serve", "--port", "0", *options],
+        [*program, "--port", port, "serve", "--port", "0", *options],
         cwd=folder,
         env=environment,
         stdout=subprocess.PIPE,

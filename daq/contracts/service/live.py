@@ -62,6 +62,10 @@ class RecordEventMessage(Wire):
     tick: int | None
     joint: int | None
     host_time: float
+    time: float
+    """s from the start of the record."""
+    experiment: str | None
+    """The experiment whose record it is in."""
 
 
 class RobotMessage(Wire):

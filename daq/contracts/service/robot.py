@@ -93,7 +93,10 @@ class StopResult(Wire):
     tick: int | None = None
     seconds: float
     """From the request to this answer."""
+    note: str = ""
+    """What else is known: joints without drive, or why it was not confirmed."""
     text: str
+    """All of it in one line."""
 
 
 class ResetRequest(Wire):

@@ -52,3 +52,5 @@ class SystemStatus(Wire):
     live_dropped: int
     jobs_at_once: int
     unattended: bool
+    stop_port: int
+    """Where a stop is answered even while the service is too busy to."""

@@ -1,0 +1,55 @@
+"""A stop of a server's robot: asked for under its likely name, before anything else is asked."""
+
+from __future__ import annotations
+
+import os
+
+from daq.acquisition.stop_socket import StopAnswer
+from daq.cli.context import Invocation
+from daq.cli.remote.robot import TOKEN_VARIABLE
+from daq.client import Client
+from daq.contracts.errors import DaqError
+from daq.contracts.service.robot import StopResult
+
+DEFAULT_ROBOT = "ma2000"
+
+
+def stop_at_server(call: Invocation) -> list[StopAnswer]:
+    """Stops the robot that goes by the configured name; where there is none of that name, all that the service has.
+
+    Never raises: what is not known is in the answers.
+    """
+    assert call.server is not None
+    name = _likely_name(call)
+    try:
+        with Client(call.server, os.environ.get(TOKEN_VARIABLE) or None) as client:
+            first = client.robot(name).stop()
+            others = [] if first.delivered else _others(client, name)
+            return [_answer(one, call.server, client.robot(one).stop()) for one in others] or [
+                _answer(name, call.server, first)
+            ]
+    except DaqError as error:
+        return [StopAnswer(robot=name, port=call.server, delivered=False, confirmed=False, text=str(error))]
+
+
+def _likely_name(call: Invocation) -> str:
+    """A configuration that cannot be read is no reason not to stop."""
+    try:
+        return call.settings.robot.name
+    except DaqError:
+        return DEFAULT_ROBOT
+
+
+def _others(client: Client, name: str) -> list[str]:
+    """Names of the robots of a service that has none of this name."""
+    try:
+        names = [one.robot for one in client.robots()]
+    except DaqError:
+        return []
+    return [] if name in names else names
+
+
+def _answer(robot: str, url: str, found: StopResult) -> StopAnswer:
+    return StopAnswer(
+        robot=robot, port=url, delivered=found.delivered, confirmed=found.confirmed, tick=found.tick, text=found.note
+    )

@@ -1,0 +1,130 @@
+"""Teaching a server's robot: steps, programs, leading by hand. Ctrl-C stops the arm."""
+
+from __future__ import annotations
+
+import select
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from daq.cli.context import Invocation, console
+from daq.cli.remote.control import controlled
+from daq.cli.stop_keys import StopKeys
+from daq.contracts.errors import DaqError, SafetyError
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+    from daq.client import HeldControl, Robot
+    from daq.contracts.service.robot import StopResult
+    from daq.contracts.service.teaching import TeachingStatus
+    from daq.teaching import RecordedPath
+
+LOOK_EVERY = 0.1
+"""s between two looks at how it goes on."""
+EXIT_STOPPED = 6
+
+
+class StoppedAtServerError(DaqError):
+    """A person has stopped the arm."""
+
+    exit_code = EXIT_STOPPED
+
+
+@contextmanager
+def taught(call: Invocation, consent: bool) -> Iterator[tuple[Robot, HeldControl, Stopped]]:
+    """The robot, its control, and whether a key has stopped it: Ctrl-C and its like do so within, on a thread that does
+    nothing else."""
+    with StopKeys() as keys, controlled(call, consent) as (robot, control), Stopped(robot) as stopped:
+        keys.stops(stopped.pressed.set)
+        try:
+            yield robot, control, stopped
+        finally:
+            keys.stops(lambda: None)
+
+
+class Stopped:
+    """Stops the robot when `pressed` is set; `result` says then what became of it."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.pressed = threading.Event()
+        self.result: StopResult | None = None
+        self._robot = robot
+        self._ended = False
+        self._thread = threading.Thread(target=self._wait, name="stop-keys", daemon=True)
+
+    def __enter__(self) -> Stopped:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended = True
+        self.pressed.set()
+        self._thread.join()
+
+    def _wait(self) -> None:
+        self.pressed.wait()
+        if not self._ended:
+            self.result = self._robot.stop()
+
+    def raise_if_pressed(self) -> None:
+        """Raises StoppedAtServerError once the stop has been answered."""
+        if self.result is not None:
+            raise StoppedAtServerError(self.result.text)
+
+
+def perform_at_server(call: Invocation, program: BaseModel, consent: bool) -> None:
+    """As `daq teach program`. Raises SafetyError, StoppedAtServerError, and what the service refuses."""
+    with taught(call, consent) as (robot, control, stopped):
+        before = _newest(robot.teaching())
+        control.perform(program)
+        print(_end_of(robot, control, stopped, before).result)
+
+
+def lead_at_server(
+    call: Invocation, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None], consent: bool
+) -> None:
+    """As `daq teach lead`: the path is kept also of a lead that was stopped."""
+    from daq.teaching import RecordedPath
+
+    with taught(call, consent) as (robot, control, stopped):
+        before = robot.teaching().path
+        control.lead(joints)
+        console().print("recording: lead the arm" + ("; Enter ends it" if seconds is None else f" for {seconds:g} s"))
+        until = None if seconds is None else time.monotonic() + seconds
+        while stopped.result is None and robot.teaching().activity == "lead":
+            if until is not None and time.monotonic() >= until:
+                break
+            if select.select([] if until is not None else [sys.stdin], [], [], LOOK_EVERY)[0]:
+                break
+        found = robot.teaching() if stopped.result is not None else control.finish()
+        if found.path is not None and found.path != before:
+            keep(RecordedPath.model_validate(found.path.model_dump()))
+        stopped.raise_if_pressed()
+        if found.problem:
+            raise SafetyError(found.problem)
+
+
+def _end_of(robot: Robot, control: HeldControl, stopped: Stopped, shown: int) -> TeachingStatus:
+    """Waits for it, showing what the service tells whoever teaches, from line `shown` on."""
+    while True:
+        status = robot.teaching()
+        for line in status.lines:
+            if line.number > shown:
+                console().print(line.text)
+        shown = max(shown, _newest(status))
+        stopped.raise_if_pressed()
+        if status.activity == "none":
+            if status.problem:
+                raise SafetyError(status.problem)
+            return status
+        _ = control.lease  # raises when it is lost: the arm holds then, and nothing ends as it should
+        time.sleep(LOOK_EVERY)
+
+
+def _newest(status: TeachingStatus) -> int:
+    """Number of the newest line."""
+    return max((line.number for line in status.lines), default=0)

@@ -1,0 +1,56 @@
+"""The gate before the stop listener: the rules of the service's own gate, asked on whichever thread the request is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+from server.access.caller import LOCAL, Caller
+from server.access.origin import is_known_name, name_of
+from server.access.tokens import KnownTokens
+from server.problems import ProblemError
+
+
+@dataclass(frozen=True)
+class StopGate:
+    """Lets in whoever may see the robot. `service_port`: where the page comes from that may stop it, too."""
+
+    tokens: KnownTokens
+    open_on_loopback: bool
+    names: tuple[str, ...]
+    service_port: int
+
+    def admit(self, headers: Mapping[str, str]) -> Caller:
+        """Who calls. Raises a 401 or 403."""
+        host = headers.get("host", "")
+        if not is_known_name(host, self.names, loopback_only=self.open_on_loopback):
+            line = f"this service is not called {host!r:.100}"
+            raise ProblemError(403, "unknown-name", line, "use its address, or add the name to server.names")
+        if not self.is_from_here(headers):
+            line = f"a page of another origin ({headers.get('origin')!r:.100}) may not do this"
+            raise ProblemError(403, "other-origin", line, "use the page that this service serves")
+        kind, _, token = headers.get("authorization", "").partition(" ")
+        if not token or kind.lower() != "bearer":
+            if self.open_on_loopback:
+                return LOCAL
+            advice = "send the header Authorization: Bearer TOKEN; `daq token add` makes one"
+            raise ProblemError(401, "token-needed", "this service needs a token", advice)
+        known, caller = self.tokens.remembered(token.strip())
+        if not known:
+            caller = self.tokens.look_up(token.strip())
+        if caller is None:
+            line = "this token is not known, or was revoked"
+            raise ProblemError(401, "token-unknown", line, "`daq token ls` lists tokens by name")
+        return caller
+
+    def is_from_here(self, headers: Mapping[str, str]) -> bool:
+        """Whether this comes from the service's own page, or from a program: programs name no origin."""
+        origin = headers.get("origin")
+        if origin is None:
+            return headers.get("sec-fetch-site", "none") in ("none", "same-origin")
+        try:
+            page = urlsplit(origin)
+            return page.hostname == name_of(headers.get("host", "")) and page.port == self.service_port
+        except ValueError:
+            return False

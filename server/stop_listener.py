@@ -1,0 +1,157 @@
+"""A second door for the stop alone, on threads of its own: it opens also while the event loop is blocked.
+
+It speaks just enough HTTP for `POST /api/v1/robots/{robot}/stop`, with the same answers as the service, and touches
+nothing that the event loop does. When the whole process hangs or is gone, `daq stop` on the computer itself remains.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import socket
+import threading
+from collections.abc import Callable, Mapping
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+from daq.contracts.service.problems import ProblemDetails
+from daq.contracts.service.robot import StopResult
+from server.access.caller import Caller
+from server.access.stop_gate import StopGate
+from server.problems import MEDIA_TYPE, ProblemError, details_of, not_found
+
+ADDRESS = re.compile(r"/api/v1/robots/([a-z0-9][a-z0-9_-]{0,31})/stop")
+READ_WITHIN = 2.0
+"""s that a client may be silent."""
+MOST_AT_ONCE = 32
+"""Connections; one more is closed at once, and the service's own door is still there."""
+LONGEST_BODY = 4096
+"""Bytes of a body that are read, so that the answer is not lost with it; nothing in it is looked at."""
+log = logging.getLogger("server.stop")
+
+Stop = Callable[[], StopResult]
+Told = Callable[[str, str, Caller], None]
+
+
+class StopListener:
+    """Listens until closed. `stops` by robot; `told` is given robot, result in one line, and who asked."""
+
+    def __init__(self, listener: socket.socket, gate: StopGate, stops: Mapping[str, Stop], told: Told) -> None:
+        self._server = _Server(listener, _handler(gate, stops, told))
+        self._thread = threading.Thread(target=self._server.serve_forever, name="stop-listener", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """No more requests; those under way are answered."""
+        self._server.shutdown()
+        self._thread.join()
+        self._server.server_close()
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+
+    def __init__(self, listener: socket.socket, handler: type[BaseHTTPRequestHandler]) -> None:
+        super().__init__(listener.getsockname()[:2], handler, bind_and_activate=False)
+        self.socket.close()
+        self.socket = listener
+        self._room = threading.BoundedSemaphore(MOST_AT_ONCE)
+        self.server_activate()
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """On a thread of its own, as long as there are not too many."""
+        if self._room.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """As the base's; makes room at its end."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._room.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A client that goes away is no fault; anything else is in the log."""
+        del request
+        log.warning("stop listener: request of %s", client_address, exc_info=True)
+
+
+def _handler(gate: StopGate, stops: Mapping[str, Stop], told: Told) -> type[BaseHTTPRequestHandler]:
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+        server_version = "daq"
+        sys_version = ""
+        timeout = READ_WITHIN
+
+        def do_POST(self) -> None:
+            """The stop."""
+            self._read_body()
+            try:
+                robot, caller = self._admitted()
+            except ProblemError as problem:
+                self._answer(problem.status, details_of(problem), MEDIA_TYPE, problem.headers)
+                return
+            result = stops[robot]()
+            self._answer(200, result, "application/json")
+            told(robot, result.text, caller)
+
+        def do_OPTIONS(self) -> None:
+            """Whether the service's page may ask, which is at another port and so of another origin."""
+            headers = {"Access-Control-Allow-Methods": "POST", "Access-Control-Allow-Headers": "authorization"}
+            self._answer(204, None, "", headers if gate.is_from_here(self._headers()) else {})
+
+        def do_GET(self) -> None:
+            """Nothing else is here."""
+            problem = ProblemError(405, "no-such-method", f"{self.command} {self.path[:100]}: a stop is a POST")
+            self._answer(problem.status, details_of(problem), MEDIA_TYPE)
+
+        do_PUT = do_PATCH = do_DELETE = do_HEAD = do_GET
+
+        def log_message(self, format: str, *args: object) -> None:
+            """With the other logs."""
+            log.debug(format, *args)
+
+        def _admitted(self) -> tuple[str, Caller]:
+            found = ADDRESS.fullmatch(self.path)
+            caller = gate.admit(self._headers())
+            if found is None or found[1] not in stops:
+                raise not_found(f"address {self.path[:100]}", "here is POST /api/v1/robots/{robot}/stop alone")
+            return found[1], caller
+
+        def _headers(self) -> dict[str, str]:
+            return {name.lower(): value for name, value in self.headers.items()}
+
+        def _read_body(self) -> None:
+            length = self.headers.get("Content-Length", "0")
+            if length.isdecimal() and 0 < int(length) <= LONGEST_BODY:
+                self.rfile.read(int(length))
+
+        def _answer(
+            self,
+            status: int,
+            body: StopResult | ProblemDetails | None,
+            kind: str,
+            more: Mapping[str, str] | None = None,
+        ) -> None:
+            content = b"" if body is None else body.model_dump_json().encode()
+            headers = {
+                "Content-Length": str(len(content)),
+                "Connection": "close",
+                "Cache-Control": "no-store",
+                "X-Content-Type-Options": "nosniff",
+                **({"Content-Type": kind} if kind else {}),
+                **(more or {}),
+            }
+            origin = self.headers.get("Origin")
+            if origin is not None and gate.is_from_here(self._headers()):
+                headers |= {"Access-Control-Allow-Origin": origin, "Vary": "Origin"}
+            self.send_response(status)
+            for name, value in headers.items():
+                self.send_header(name, value)
+            self.end_headers()
+            self.wfile.write(content)
+            self.close_connection = True
+
+    return Handler

@@ -1,0 +1,232 @@
+"""The stop while the service cannot answer: its event loop blocked, or its whole process hanging."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+
+from daq.client import Client
+from daq.config.service import ServiceSettings
+from server.access.caller import LOCAL, Caller
+from server.access.origin import beside
+from server.access.stop_gate import StopGate
+from server.access.tokens import KnownTokens, TokenStore
+from server.listening import ListenError, listening
+from server.problems import ProblemError
+from server.store.engine import Store
+from tests.server.clocks import HandClock
+from tests.server.service import DAQ, Service, running_service
+
+LONG = {"trajectory": {"kind": "ramp", "amplitude": 0.1, "duration": 0.5}, "joints": [1, 2], "hold": 600}
+BLOCKING = """
+import pathlib, time
+import server.serve
+make_app = server.serve.make_app
+
+def with_a_fault(services, gate):
+    app = make_app(services, gate)
+
+    @app.get("/block")
+    async def block() -> None:
+        pathlib.Path("blocked").touch()
+        while not pathlib.Path("unblock").exists():
+            time.sleep(0.01)
+
+    return app
+
+server.serve.make_app = with_a_fault
+from daq.cli import main
+main()
+"""
+"""`daq` with a coroutine in its service that does not give the event loop back."""
+
+
+def _daq_stop(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("DAQ_")}
+    environment |= {"DAQ_RUNTIME_FOLDER": str(folder / "run"), "XDG_CONFIG_HOME": str(folder / "configuration")}
+    command = [*DAQ, *words, "stop"]
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=60, check=False)
+
+
+def _running(service: Service) -> str:
+    service.until_connected()
+    experiment: str = service.robot.post("/experiments", json={"spec": LONG}).json()["id"]
+    service.until_recording(experiment)
+    return experiment
+
+
+@contextmanager
+def _blocked(service: Service) -> Iterator[None]:
+    """The service's event loop stands still within."""
+    stuck = threading.Thread(target=httpx.get, args=(f"{service.url}/block",), kwargs={"timeout": 60})
+    stuck.start()
+    try:
+        while not (service.folder / "blocked").exists():
+            assert service.process.poll() is None
+        with pytest.raises(httpx.ReadTimeout):
+            httpx.get(f"{service.url}/healthz", timeout=0.5)
+        yield
+    finally:
+        (service.folder / "unblock").touch()
+        stuck.join()
+
+
+def test_a_stop_reaches_the_arm_while_the_event_loop_is_blocked(tmp_path: Path) -> None:
+    with running_service(tmp_path, program=[sys.executable, "-c", BLOCKING]) as service:
+        experiment = _running(service)
+        with _blocked(service), Client(service.url) as client:
+            stopped = client.robot("ma2000").stop()
+            assert stopped.confirmed, stopped
+        ended = service.end_of(experiment)
+        assert (ended["state"], ended["outcome"]) == ("cancelled", "stopped")
+        texts = [event["text"] for event in service.robot.get("/events").json()["items"] if event["kind"] == "stop"]
+        assert any("confirmed by the board" in text for text in texts)
+
+
+def test_daq_stop_reaches_it_too_and_through_the_service_from_elsewhere(tmp_path: Path) -> None:
+    with running_service(tmp_path, program=[sys.executable, "-c", BLOCKING]) as service:
+        experiment = _running(service)
+        with _blocked(service):
+            said = _daq_stop(tmp_path)
+            assert said.returncode == 0, said
+            assert "ma2000: stopped, confirmed by the board" in said.stdout
+            said = _daq_stop(tmp_path, "--server", service.url)
+            assert said.returncode == 0, said
+            assert "confirmed by the board" in said.stdout
+        assert service.end_of(experiment)["state"] == "cancelled"
+
+
+def test_when_the_whole_service_hangs_daq_stop_remains_and_a_client_is_told_to_use_the_emergency_stop(
+    tmp_path: Path,
+) -> None:
+    with running_service(tmp_path) as service:
+        experiment = _running(service)
+        service.process.send_signal(signal.SIGSTOP)
+        try:
+            said = _daq_stop(tmp_path)
+            with Client(service.url) as client:
+                not_stopped = client.robot("ma2000").stop()
+        finally:
+            service.process.send_signal(signal.SIGCONT)
+        assert said.returncode == 0, said
+        assert "ma2000: stopped, confirmed by the board" in said.stdout
+        assert not not_stopped.delivered
+        assert "emergency stop" in not_stopped.text
+        assert service.end_of(experiment)["state"] == "cancelled"
+
+
+# ---- who may
+
+
+def _beside(service: Service) -> str:
+    found: int = service.client.get("/system").json()["stop_port"]
+    return f"http://127.0.0.1:{found}/api/v1/robots/ma2000"
+
+
+def test_the_listener_stops_and_does_nothing_else(service: Service) -> None:
+    base = _beside(service)
+    answer = httpx.post(f"{base}/stop", timeout=30)
+    assert answer.json()["confirmed"] is True
+    service.until_arm("stopped")
+    for method, path, status in (
+        ("GET", "/stop", 405),
+        ("PUT", "/stop", 405),
+        ("POST", "/reset", 404),
+        ("POST", "/../../../../etc/passwd", 404),
+    ):
+        answer = httpx.request(method, f"{base}{path}", timeout=30)
+        assert answer.status_code == status, (method, path)
+        assert answer.headers["Content-Type"] == "application/problem+json"
+    answer = httpx.post(f"{base.replace('ma2000', 'other')}/stop", timeout=30)
+    assert (answer.status_code, answer.json()["type"]) == (404, "docs/service.md#not-found")
+
+
+def test_the_services_own_page_may_ask_the_listener_and_no_other_page(service: Service) -> None:
+    base = _beside(service)
+    own = {"Origin": service.url, "Sec-Fetch-Site": "same-site"}
+    answer = httpx.post(f"{base}/stop", headers=own, timeout=30)
+    assert answer.json()["confirmed"] is True
+    assert answer.headers["Access-Control-Allow-Origin"] == service.url
+    asked = httpx.request("OPTIONS", f"{base}/stop", headers=own, timeout=30)
+    assert asked.headers["Access-Control-Allow-Headers"] == "authorization"
+    for headers in ({"Origin": "http://attacker.example"}, {"Sec-Fetch-Site": "cross-site"}, {"Origin": "null"}):
+        answer = httpx.post(f"{base}/stop", headers=headers, timeout=30)
+        assert (answer.status_code, answer.json()["type"]) == (403, "docs/service.md#other-origin")
+        assert "Access-Control-Allow-Origin" not in answer.headers
+    named = httpx.post(f"{base}/stop", headers={"Host": "attacker.example"}, timeout=30)
+    assert (named.status_code, named.json()["type"]) == (403, "docs/service.md#unknown-name")
+
+
+def test_the_page_is_told_that_it_may_connect_there(service: Service) -> None:
+    port = service.client.get("/system").json()["stop_port"]
+    policy = service.client.get("/robots").headers["Content-Security-Policy"]
+    assert f"connect-src 'self' http://127.0.0.1:{port};" in policy
+
+
+def test_a_silent_client_or_a_crowd_of_them_keeps_nobody_from_stopping(service: Service) -> None:
+    port = service.client.get("/system").json()["stop_port"]
+    crowd = [socket.create_connection(("127.0.0.1", port)) for _ in range(40)]
+    try:
+        with Client(service.url) as client:
+            assert client.robot("ma2000").stop().confirmed
+    finally:
+        for connection in crowd:
+            connection.close()
+
+
+def test_viewers_may_stop_and_strangers_may_not(tmp_path: Path) -> None:
+    clock, store = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
+    store.migrate()
+    tokens = TokenStore(store)
+    token = tokens.add("anna", "viewer", clock.utc())
+    gate = StopGate(KnownTokens(tokens, clock), False, (), 8300)
+    assert gate.admit({"host": "10.0.0.1:8301", "authorization": f"Bearer {token}"}) == Caller("anna", "viewer")
+    for headers in ({}, {"authorization": "Bearer daq_wrong"}, {"authorization": "Basic eDp5"}):
+        with pytest.raises(ProblemError) as refused:
+            gate.admit({"host": "10.0.0.1:8301"} | headers)
+        assert refused.value.status == 401
+    assert StopGate(KnownTokens(tokens, clock), True, (), 8300).admit({"host": "localhost:8301"}) == LOCAL
+    store.close()
+
+
+@pytest.mark.parametrize(
+    ("host", "origin"),
+    [
+        ("127.0.0.1:8300", "http://127.0.0.1:8301"),
+        ("[::1]:8300", "http://[::1]:8301"),
+        ("Arm.Lab", "http://arm.lab:8301"),
+        ("x; script-src *", None),
+        ("", None),
+    ],
+)
+def test_what_a_page_may_connect_to_is_a_name_and_a_port(host: str, origin: str | None) -> None:
+    assert beside(host, 8301) == origin
+
+
+# ---- where
+
+
+def test_the_listener_is_at_the_port_after_the_services_unless_it_is_set() -> None:
+    with listening(ServiceSettings(port=0)) as (own, stop):
+        assert stop.getsockname()[1] == own.getsockname()[1] + 1
+    with listening(ServiceSettings(port=0, stop_port=0)) as (own, stop):
+        assert stop.getsockname()[1] != own.getsockname()[1]
+
+
+def test_a_service_whose_stop_cannot_be_listened_for_does_not_start() -> None:
+    with listening(ServiceSettings(port=0)) as (_, taken):
+        taken.listen()
+        port = taken.getsockname()[1]
+        line = f"server.host 127.0.0.1, server.stop_port {port}: cannot be listened at"
+        with pytest.raises(ListenError, match=line), listening(ServiceSettings(port=0, stop_port=port)):
+            pass
