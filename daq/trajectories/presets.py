@@ -105,6 +105,23 @@ def _second_posture() -> list[Segment]:
     ]
 
 
+def _to_judge_by() -> list[Segment]:
+    """What the diagnostic set does, but with other sizes and speeds and at a third posture."""
+    there = (-25.0, 20.0, 30.0)
+    slow = SlowRamp(amplitude=_by_joint(3.0, 4.0, -4.0), speed=math.radians(4.5), reversals=1)
+    return [
+        _segment(
+            Multisine(amplitude=_by_joint(12.0, 8.0, 12.0), duration=7.0, lowest=0.2, highest=1.2, tones=8, seed=1991)
+        ),
+        _segment(Cubic(amplitude=_by_joint(*there), duration=1.8)),
+        _segment(Pause(duration=0.3)),
+        *_there_and_back((18.0, -18.0, -18.0), 0.5, 0.4),
+        _segment(slow),
+        *_there_and_back((5.0, 5.0, 5.0), 0.1, 0.5),
+        _segment(Cubic(amplitude=_by_joint(*(-angle for angle in there)), duration=1.8)),
+    ]
+
+
 def _sequence(name: str, segments: list[Segment]) -> ExperimentSpec:
     return ExperimentSpec(trajectory=Sequence(segments=tuple(segments)), joints=MAJOR, hold=1.0, name=name)
 
@@ -128,12 +145,7 @@ PRESETS: dict[str, Preset] = {
         for letter, (description, segments) in PARTS.items()
     },
     "held-out": Preset(
-        "10 s of multisine that no fit has seen, to judge a model by",
-        ExperimentSpec(
-            trajectory=Multisine(amplitude=_by_joint(12.0, 8.0, 12.0), lowest=0.1, highest=0.8, tones=8, seed=1991),
-            joints=MAJOR,
-            hold=1.0,
-            name="held-out",
-        ),
+        "17 s that no fit has seen, to judge a model by: tones, ramps, slow reversals, steps at a third posture",
+        _sequence("held-out", _to_judge_by()),
     ),
 }

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from daq.contracts.errors import SpecError
 from model.discrepancy.observation import Observation, Signals
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
@@ -125,7 +126,10 @@ def settled(observation: Observation, point: Point, steps: int) -> Point:
     """The point to which searches lead, each with derivatives computed where it begins, until one gains nothing more:
     what two close rivals still differ by then is not the state of their fits."""
     for _ in range(MOST_SEARCHES):
-        following = searched(observation, with_new_tangents(observation, point), steps)
+        try:
+            following = searched(observation, with_new_tangents(observation, point), steps)
+        except SpecError:
+            break  # at the brink of instability, where a delay is missing: there is no going on
         gained, point = point.cost - following.cost, following
         if gained < SETTLED:
             break
