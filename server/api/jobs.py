@@ -14,6 +14,7 @@ from daq.contracts.service.jobs import (
     JobKind,
     JobRequest,
     JobState,
+    KnownEffect,
     ModelChange,
     ModelDetails,
     ModelEntry,
@@ -24,6 +25,7 @@ from daq.contracts.service.jobs import (
 )
 from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
 from server.jobs.desk import REPORT, RESULT
+from server.jobs.effects import known_effects
 from server.jobs.models import LARGEST_MODEL
 from server.jobs.results import JobResult
 from server.live.waiting import Wait, when_ended
@@ -154,6 +156,13 @@ def get_lineage(one: RobotPart, found: ServicesPart, _: Viewer) -> ModelLineage:
         models=found.models.newest(one.robot.name, MOST_OF_A_LINEAGE)[::-1],
         jobs=tuple(one.jobs.as_told(job) for job in reversed(jobs)),
     )
+
+
+@router.get("/effects", tags=["models"])
+def list_effects(one: RobotPart, _: Viewer) -> tuple[KnownEffect, ...]:
+    """Effects that a fit may add and a diagnosis looks for, family by family."""
+    del one
+    return known_effects()
 
 
 @router.get("/models/{model}", tags=["models"])

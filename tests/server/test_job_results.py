@@ -11,6 +11,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from model.comparison.compare import TraceSignals
+from model.effects.library import library
 from server.jobs import headlines
 from server.jobs.diagnosis_data import diagnosis_data
 from server.jobs.overlays import LEAST_POINTS, overlay, overlays
@@ -162,3 +163,11 @@ def test_results_are_described_kind_by_kind(sound_service: Service) -> None:
     kinds = set(content["schema"]["discriminator"]["mapping"])
     assert kinds == {"fit", "validate", "compare", "diagnose"}
     assert len(get_args(get_args(JobResult)[0])) == len(kinds)
+
+
+def test_the_effects_of_the_library_are_told_once_each(sound_service: Service) -> None:
+    told = sound_service.robot.get("/effects").json()
+    names = [one["name"] for one in told]
+    assert names == list(library())
+    assert all(one["title"] and one["family"] for one in told)
+    assert next(one for one in told if one["name"] == "base_tilt")["whole_machine"]

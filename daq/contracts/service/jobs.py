@@ -93,6 +93,21 @@ JobRequest = Annotated[
 ]  # fmt: skip
 
 
+class KnownEffect(Wire):
+    """An effect of the library: what a fit may add and a diagnosis looks for."""
+
+    name: str
+    family: str
+    title: str
+    """One line for people."""
+    physics: str
+    """The equation, in the symbols of its parameters."""
+    joints: tuple[int, ...]
+    """On which joints it may act; empty for any."""
+    whole_machine: bool
+    """It belongs to the machine, not to a joint."""
+
+
 class Job(Wire):
     """One computation and what became of it. `progress` is a fraction from 0 to 1."""
 

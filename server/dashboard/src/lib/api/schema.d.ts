@@ -1008,6 +1008,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/robots/{robot}/effects": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Effects
+         * @description Effects that a fit may add and a diagnosis looks for, family by family.
+         */
+        get: operations["list_effects"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/robots/{robot}/models/{model}": {
         parameters: {
             query?: never;
@@ -2624,6 +2644,24 @@ export interface components {
             against: components["schemas"]["Correlation"][];
         };
         /**
+         * KnownEffect
+         * @description An effect of the library: what a fit may add and a diagnosis looks for.
+         */
+        KnownEffect: {
+            /** Name */
+            name: string;
+            /** Family */
+            family: string;
+            /** Title */
+            title: string;
+            /** Physics */
+            physics: string;
+            /** Joints */
+            joints: number[];
+            /** Whole Machine */
+            whole_machine: boolean;
+        };
+        /**
          * LeadRequest
          * @description Joints to be led by hand. They lose their drive and sink: hold the arm.
          */
@@ -2660,6 +2698,28 @@ export interface components {
             following_error_counts?: number | null;
             /** Following Error Time */
             following_error_time?: number | null;
+        };
+        /**
+         * Lineage
+         * @description Where a model comes from: identity of the model it was made from, traces and a summary of the fit.
+         */
+        Lineage: {
+            /** Parent */
+            parent?: string | null;
+            /**
+             * Traces
+             * @default []
+             */
+            traces?: string[];
+            /** Fit */
+            fit?: {
+                [key: string]: unknown;
+            } | null;
+            /**
+             * Note
+             * @default
+             */
+            note?: string;
         };
         /**
          * LinkMessage
@@ -2849,7 +2909,7 @@ export interface components {
              *       "note": ""
              *     }
              */
-            lineage?: components["schemas"]["model__machine_model__model__Lineage"];
+            lineage?: components["schemas"]["Lineage"];
         };
         /**
          * ModelAgreement
@@ -2924,6 +2984,21 @@ export interface components {
              * @default
              */
             notes?: string;
+        };
+        /**
+         * ModelLineage
+         * @description Where a robot's models come from, and what was made of them.
+         *
+         *     A model's parent is another of these models, the one that the machine file describes, or one that is not here any
+         *     more. A job leads from the models and traces of its request to the model that it made, if it made one.
+         */
+        ModelLineage: {
+            /** Machine */
+            machine: string;
+            /** Models */
+            models: components["schemas"]["ModelEntry"][];
+            /** Jobs */
+            jobs: components["schemas"]["Job"][];
         };
         /**
          * ModelParameter
@@ -3546,6 +3621,10 @@ export interface components {
             joint: number | null;
             /** Host Time */
             host_time: number;
+            /** Time */
+            time: number;
+            /** Experiment */
+            experiment: string | null;
         };
         /**
          * RecordedPath
@@ -4178,6 +4257,11 @@ export interface components {
             tick?: number | null;
             /** Seconds */
             seconds: number;
+            /**
+             * Note
+             * @default
+             */
+            note?: string;
             /** Text */
             text: string;
         };
@@ -4217,6 +4301,8 @@ export interface components {
             jobs_at_once: number;
             /** Unattended */
             unattended: boolean;
+            /** Stop Port */
+            stop_port: number;
         };
         /**
          * TaughtPath
@@ -4655,43 +4741,6 @@ export interface components {
              * @default []
              */
             moving?: components["schemas"]["MovingParameter"][];
-        };
-        /**
-         * Lineage
-         * @description Where a robot's models come from, and what was made of them.
-         *
-         *     A model's parent is another of these models, the one that the machine file describes, or one that is not here any
-         *     more. A job leads from the models and traces of its request to the model that it made, if it made one.
-         */
-        daq__contracts__service__jobs__Lineage: {
-            /** Machine */
-            machine: string;
-            /** Models */
-            models: components["schemas"]["ModelEntry"][];
-            /** Jobs */
-            jobs: components["schemas"]["Job"][];
-        };
-        /**
-         * Lineage
-         * @description Where a model comes from: identity of the model it was made from, traces and a summary of the fit.
-         */
-        model__machine_model__model__Lineage: {
-            /** Parent */
-            parent?: string | null;
-            /**
-             * Traces
-             * @default []
-             */
-            traces?: string[];
-            /** Fit */
-            fit?: {
-                [key: string]: unknown;
-            } | null;
-            /**
-             * Note
-             * @default
-             */
-            note?: string;
         };
     };
     responses: never;
@@ -6334,7 +6383,30 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["daq__contracts__service__jobs__Lineage"];
+                    "application/json": components["schemas"]["ModelLineage"];
+                };
+            };
+        };
+    };
+    list_effects: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["KnownEffect"][];
                 };
             };
         };

@@ -6,35 +6,57 @@ type Schemas = components['schemas'];
 
 /**
  * A message as the service tells it: it writes out every field, also those that a request may leave out because they
- * have a default.
+ * have a default. Tuples are told as lists, as openapi-fetch has them.
  */
-export type Told<T> = T extends object ? { [K in keyof T]-?: Told<T[K]> } : T;
+export type Told<T> = T extends readonly (infer Item)[]
+  ? Told<Item>[]
+  : T extends object
+    ? { [Key in keyof T]-?: Told<T[Key]> }
+    : T;
 
 export type CatalogueEntry = Told<Schemas['CatalogueEntry']>;
+export type ComparisonData = Told<Schemas['ComparisonData']>;
 export type Control = Told<Schemas['Control']>;
 export type ControlLease = Told<Schemas['ControlLease']>;
+export type Dependence = Told<Schemas['Dependence']>;
+export type DiagnosisData = Told<Schemas['DiagnosisData']>;
+export type DiagnosisStep = Told<Schemas['DiagnosisStep']>;
 export type Experiment = Told<Schemas['Experiment']>;
 export type ExperimentPreset = Told<Schemas['ExperimentPreset']>;
 export type ExperimentRequest = Schemas['ExperimentRequest'];
 export type ExperimentSpec = Schemas['ExperimentSpec'];
+export type Fidelity = Told<Schemas['Fidelity']>;
+export type FitData = Told<Schemas['FitData']>;
+export type FittedParameter = Told<Schemas['FittedParameter']>;
+export type FoundValue = Told<Schemas['FoundValue']>;
 export type Health = Told<Schemas['Health']>;
 export type Job = Told<Schemas['Job']>;
 export type JobRequest = Schemas['Job']['request'];
+export type KnownEffect = Told<Schemas['KnownEffect']>;
 export type Machine = Told<Schemas['Machine']>;
 export type Me = Told<Schemas['Me']>;
+export type ModelAgreement = Told<Schemas['ModelAgreement']>;
 export type ModelDetails = Told<Schemas['ModelDetails']>;
 export type ModelEntry = Told<Schemas['ModelEntry']>;
+export type ModelLineage = Told<Schemas['ModelLineage']>;
+export type ModelParameter = Told<Schemas['ModelParameter']>;
 export type MotionPreview = Told<Schemas['MotionPreview']>;
+export type NextExperiment = Told<Schemas['NextExperiment']>;
+export type Overlay = Told<Schemas['Overlay']>;
+export type PhaseCell = Told<Schemas['PhaseCell']>;
 export type ProcessState = Told<Schemas['ProcessState']>;
 export type QueueStatus = Told<Schemas['QueueStatus']>;
 export type RobotStatus = Told<Schemas['RobotStatus']>;
 export type Schedule = Told<Schemas['Schedule']>;
 export type ServiceEvent = Told<Schemas['ServiceEvent']>;
+export type SignalError = Told<Schemas['SignalError']>;
 export type StopResult = Told<Schemas['StopResult']>;
 export type SystemStatus = Told<Schemas['SystemStatus']>;
 export type TeachingStatus = Told<Schemas['TeachingStatus']>;
 export type TraceDetails = Told<Schemas['TraceDetails']>;
 export type TraceSignals = Told<Schemas['TraceSignals']>;
+export type TriedEffect = Told<Schemas['TriedEffect']>;
+export type ValidationData = Told<Schemas['ValidationData']>;
 
 export type HistoryMessage = Told<Schemas['HistoryMessage']>;
 export type LinkMessage = Told<Schemas['LinkMessage']>;

@@ -1,0 +1,79 @@
+import { describe, expect, it } from 'vitest';
+import type { DiagnosisStep, TriedEffect } from '../api/types';
+import { evidenceBars } from './evidence';
+import { candidateName, effectName, listed, sentence, verdictTitle } from './words';
+
+const tried = (effect: string, joint: number, evidence: number, refitted = true): TriedEffect => ({
+  effect,
+  joints: joint === 0 ? [] : [joint],
+  evidence,
+  misfit: refitted ? 1.1 : null,
+  refitted,
+  parameters: {},
+});
+const candidates = [
+  tried('stribeck_friction', 2, 80),
+  tried('coulomb_friction', 2, 100),
+  tried('backlash', 2, -3),
+  tried('base_tilt', 0, -8, false),
+];
+const step = (group: TriedEffect[]): DiagnosisStep =>
+  ({
+    effect: 'coulomb_friction',
+    joints: [2],
+    evidence: 100,
+    margin: 20,
+    adopted: true,
+    candidates,
+    group,
+  }) as unknown as DiagnosisStep;
+
+describe('candidates', () => {
+  it('are ranked, with the named one marked and every one explained', () => {
+    const bars = evidenceBars(step([]), 10);
+    expect(bars.map((one) => [one.name, one.width, one.chosen])).toEqual([
+      ['Coulomb friction, joint 2', 1, true],
+      ['Stribeck friction, joint 2', 0.8, false],
+      ['backlash, joint 2', 0, false],
+      ['base tilt', 0, false],
+    ]);
+    expect(bars.map((one) => one.reason)).toEqual([
+      'leads by 20 over the next other answer',
+      'explains 20 less than the best',
+      'explains less than its parameters cost',
+      'a probe promised too little for a fit',
+    ]);
+  });
+
+  it('of a group are all marked', () => {
+    const bars = evidenceBars(step(candidates.slice(0, 2)), 3);
+    expect(bars.map((one) => one.chosen)).toEqual([true, true, false]);
+  });
+});
+
+describe('words', () => {
+  it('write effects as the field does', () => {
+    expect(effectName('back_emf_error')).toBe('back-EMF error');
+    expect(effectName('load_dependent_friction')).toBe('load dependent friction');
+    expect(candidateName({ effect: 'input_delay', joints: [1, 3] })).toBe('input delay, joint 1 + 3');
+  });
+
+  it('make sentences and lists', () => {
+    expect(sentence('joint 2 lags')).toBe('Joint 2 lags.');
+    expect(sentence('')).toBe('');
+    expect(listed(['a', 'b', 'c'])).toBe('a, b and c');
+    expect(listed(['a'])).toBe('a');
+  });
+
+  it('put the verdict into a headline', () => {
+    expect(verdictTitle({ verdict: 'named', steps: [step([])] })).toBe(
+      'Coulomb friction, joint 2 is missing from the model',
+    );
+    expect(verdictTitle({ verdict: 'ambiguous', steps: [step(candidates.slice(0, 2))] })).toBe(
+      'Either Stribeck friction, joint 2 or Coulomb friction, joint 2',
+    );
+    expect(verdictTitle({ verdict: 'nothing-significant', steps: [] })).toBe(
+      'Nothing significant is missing',
+    );
+  });
+});

@@ -1,0 +1,21 @@
+"""The effects of the library, as clients see them."""
+
+from __future__ import annotations
+
+from daq.contracts.service.jobs import KnownEffect
+from model.effects.library import library
+
+
+def known_effects() -> tuple[KnownEffect, ...]:
+    """In the order of the shared list: those of one family stand together."""
+    return tuple(
+        KnownEffect(
+            name=one.name,
+            family=one.shared_name.family,
+            title=one.shared_name.line,
+            physics=one.physics,
+            joints=one.joints,
+            whole_machine=one.whole_machine,
+        )
+        for one in library().values()
+    )
