@@ -30,7 +30,7 @@ from benchmarks.figures import Figure, at_most, quantile, show
 from benchmarks.mock_control import MockControl
 from benchmarks.mock_process import started_mock
 from benchmarks.service_clients import Clients, Seen, clients
-from benchmarks.service_process import ROBOT, RunningService, dice, ramp, started_service, sway
+from benchmarks.service_process import ROBOT, RunningService, child, dice, ramp, started_service, sway
 from daq.traces.reader import read_trace
 
 BAUD = 115200
@@ -117,15 +117,6 @@ def _processor_time(process: int) -> float:
     """s, of all its threads."""
     fields = Path(f"/proc/{process}/stat").read_text("utf-8").rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def child(process: int, mark: bytes) -> int:
-    """The child of a process whose command line has this in it. Raises RuntimeError when there is none."""
-    for thread in Path(f"/proc/{process}/task").iterdir():
-        for number in (thread / "children").read_text("utf-8").split():
-            if mark in Path(f"/proc/{number}/cmdline").read_bytes():
-                return int(number)
-    raise RuntimeError(f"process {process} has no child with {mark!r} in its command line")
 
 
 class Stopper:

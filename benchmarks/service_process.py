@@ -64,19 +64,24 @@ class RunningService:
         self.process.wait(END_WITHIN)
 
 
-@contextlib.contextmanager
-def started_service(folder: Path, port: str, *options: str) -> Iterator[RunningService]:
-    """`daq serve` with everything it keeps in `folder`; ended with the block."""
+def serving(folder: Path, port: str, *options: str) -> subprocess.Popen[bytes]:
+    """The process of `daq serve`, which may not answer yet; it keeps everything in `folder`, its log too."""
     environment = {key: value for key, value in os.environ.items() if not key.startswith("DAQ_")}
     environment |= {"DAQ_RUNTIME_FOLDER": str(folder / "run"), "XDG_CONFIG_HOME": str(folder / "configuration")}
     with (folder / "service.log").open("ab") as log:
-        process = subprocess.Popen(
+        return subprocess.Popen(
             [*COMMAND, "--port", port, "serve", "--port", "0", *options],
             cwd=folder,
             env=environment,
             stdout=subprocess.PIPE,
             stderr=log,
         )
+
+
+@contextlib.contextmanager
+def started_service(folder: Path, port: str, *options: str) -> Iterator[RunningService]:
+    """A service that answers, ended with the block."""
+    process = serving(folder, port, *options)
     assert process.stdout is not None
     try:
         url = process.stdout.readline().decode().strip()
@@ -109,3 +114,12 @@ def sway(seconds: float) -> dict[str, Any]:
 def dice(seed: int) -> random.Random:
     """Random moments that are the same in every run."""
     return random.Random(seed)
+
+
+def child(process: int, mark: bytes) -> int:
+    """The child of a process whose command line has this in it. Raises RuntimeError when there is none."""
+    for thread in Path(f"/proc/{process}/task").iterdir():
+        for number in (thread / "children").read_text("utf-8").split():
+            if mark in Path(f"/proc/{number}/cmdline").read_bytes():
+                return int(number)
+    raise RuntimeError(f"process {process} has no child with {mark!r} in its command line")
