@@ -42,7 +42,7 @@ class BuildError(Exception):
 class PageHook(BuildHookInterface):  # type: ignore[type-arg]
     """Before the package is built, so is the page."""
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
         """A wheel without the page is none; an installation for development can do without until it is built."""
         try:
             build_page()

@@ -19,8 +19,8 @@ export interface ChartSeries {
 export interface ChartMarker {
   x: number;
   label: string;
-  /** `warn`: a limit, a retry; `plain`: a ramp begins. */
-  tone?: 'plain' | 'warn' | 'bad';
+  /** `warn`: a limit; `plain`: a ramp begins; `tick`: a short line at the foot, without a name: a retry. */
+  tone?: 'plain' | 'warn' | 'bad' | 'tick';
 }
 
 export interface ChartColours {
@@ -51,6 +51,8 @@ export interface ChartDrawing {
   /** A fixed range; what the data needs without. */
   xRange: () => [number, number] | null;
   yRange: () => [number, number] | null;
+  /** The least that the y-axis spans. */
+  least: number;
   /** Charts of the same key share their cursor and their zoom. */
   sync?: string;
   zoomable: boolean;
@@ -98,14 +100,15 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
       x: { time: false, distr: axes.logX ? 3 : 1, range: (_, low, high) => drawing.xRange() ?? [low, high] },
       y: {
         distr: axes.logY ? 3 : 1,
-        range: (_, low, high) => drawing.yRange() ?? (axes.logY ? [low, high] : padded(low, high)),
+        range: (_, low, high) =>
+          drawing.yRange() ?? (axes.logY ? [low, high] : padded(low, high, drawing.least)),
       },
     },
     axes: [
       {
         ...axis,
-        size: 32,
-        gap: 6,
+        size: 26,
+        gap: 4,
         ...written(axes.x),
         ...(places === undefined ? {} : { splits: (_, __, low, high) => places(low, high) }),
       },
@@ -142,30 +145,30 @@ function select(plot: uPlot, drawing: ChartDrawing): void {
   plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
 }
 
-/** Vertical lines with a flag: a dashed line and a letter, since colour must not be the only sign. */
+/** Vertical lines with a flag, the names in words: colour is not their only sign. */
 function drawMarkers(plot: uPlot, drawing: ChartDrawing): void {
   const { ctx, bbox } = plot;
   const ratio = devicePixelRatio;
-  const { min, max } = plot.scales['x'] ?? {};
+  const { min = -Infinity, max = Infinity } = plot.scales['x'] ?? {};
   ctx.save();
   ctx.font = `${11 * ratio}px ${drawing.colours.font}`;
   ctx.textBaseline = 'top';
+  ctx.textAlign = 'left';
   let free = -Infinity;
   for (const marker of drawing.markers()) {
-    if (marker.x < (min ?? -Infinity) || marker.x > (max ?? Infinity)) continue;
+    if (marker.x < min || marker.x > max) continue;
     const x = Math.round(plot.valToPos(marker.x, 'x', true));
-    const colour = { plain: drawing.colours.soft, warn: drawing.colours.warn, bad: drawing.colours.bad }[
-      marker.tone ?? 'plain'
-    ];
-    ctx.strokeStyle = ctx.fillStyle = colour;
+    const tone = marker.tone ?? 'plain';
+    const { soft, warn, bad } = drawing.colours;
+    ctx.strokeStyle = ctx.fillStyle = { plain: soft, tick: soft, warn, bad }[tone];
     ctx.lineWidth = ratio;
-    ctx.setLineDash(marker.tone === undefined || marker.tone === 'plain' ? [2 * ratio, 3 * ratio] : []);
+    ctx.setLineDash(tone === 'plain' ? [2 * ratio, 3 * ratio] : []);
     ctx.beginPath();
-    ctx.moveTo(x, bbox.top);
+    ctx.moveTo(x, tone === 'tick' ? bbox.top + bbox.height - 6 * ratio : bbox.top);
     ctx.lineTo(x, bbox.top + bbox.height);
     ctx.stroke();
     const wide = ctx.measureText(marker.label).width;
-    if (x + 4 * ratio > free && x + wide + 4 * ratio < bbox.left + bbox.width) {
+    if (wide > 0 && x + 4 * ratio > free && x + wide + 4 * ratio < bbox.left + bbox.width) {
       ctx.fillText(marker.label, x + 4 * ratio, bbox.top + 2 * ratio);
       free = x + wide + 10 * ratio;
     }
@@ -187,6 +190,7 @@ function drawEnds(plot: uPlot, drawing: ChartDrawing): void {
   ctx.save();
   ctx.font = `600 ${11 * ratio}px ${drawing.colours.font}`;
   ctx.textBaseline = 'middle';
+  ctx.textAlign = 'left';
   let free = bbox.top;
   for (const end of ends) {
     const y = Math.min(Math.max(end.y, free + 6 * ratio), bbox.top + bbox.height);

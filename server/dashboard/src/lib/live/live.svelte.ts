@@ -22,6 +22,7 @@ import type {
   SampleMessage,
   ServiceEvent,
 } from '../api/types';
+import { stop } from '../stop/stop.svelte';
 import { ServiceClock, STALE_AFTER } from './age';
 import { Recording } from './recording';
 
@@ -121,8 +122,9 @@ class Live {
       showRobot(robot.robot);
       this.me = me;
       const machine = await ask(api.GET('/api/v1/robots/{robot}/machine', { params: { path: here() } }));
-      this.machine = machine as Machine;
+      this.machine = machine;
       this.recording = new Recording(jointsOf(machine.joints.length), PERIOD, KEPT);
+      stop.port = (await ask(api.GET('/api/v1/system'))).stop_port;
       this.problem = null;
     } catch (error) {
       this.problem = asProblem(error);

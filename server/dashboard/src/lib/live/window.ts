@@ -11,24 +11,28 @@ export interface Shown {
   columns: Column[];
 }
 
-/** Rows of `signal` in [from, to] for these joints (places in the recording), plus one row on either side. */
-export function shownPart(
-  recording: Recording,
-  signals: readonly (readonly [Signal, number])[],
-  from: number,
-  to: number,
-): Shown {
+/** A signal of a joint (its place in the recording), and what its values are multiplied with. */
+export type Asked = readonly [signal: Signal, place: number, factor: number];
+
+/** These signals in [from, to], plus one row on either side. */
+export function shownPart(recording: Recording, asked: readonly Asked[], from: number, to: number): Shown {
   const first = Math.max(0, recording.rowAt(from) - 1);
   const last = Math.min(recording.time.length, recording.rowAt(to) + 1);
-  const columns = signals.map(([signal, place]) => recording.columns[signal][place] ?? []);
+  const columns = asked.map(([signal, place]) => recording.columns[signal][place] ?? []);
+  const factors = asked.map(([, , factor]) => factor);
   const every = Math.ceil((last - first) / MOST_ROWS);
   if (every <= 1) {
+    const part = columns.map((column) => column.slice(first, last));
     return {
       time: recording.time.slice(first, last),
-      columns: columns.map((column) => column.slice(first, last)),
+      columns: part.map((column, index) => scaled(column, factors[index] ?? 1)),
     };
   }
-  return thinned(recording, columns, first, last, 2 * every);
+  const part = thinned(recording, columns, first, last, 2 * every);
+  return {
+    time: part.time,
+    columns: part.columns.map((column, index) => scaled(column, factors[index] ?? 1)),
+  };
 }
 
 /**
@@ -74,4 +78,14 @@ function extremes(column: Column, begin: number, end: number): [number | null, n
     }
   }
   return lowFirst ? [low, high] : [high, low];
+}
+
+/** In place: the column is a copy. */
+function scaled(column: Column, factor: number): Column {
+  if (factor === 1) return column;
+  for (let row = 0; row < column.length; row += 1) {
+    const value = column[row] ?? null;
+    if (value !== null) column[row] = value * factor;
+  }
+  return column;
 }

@@ -1,17 +1,21 @@
 /** Stop, for the whole page: `stop.press()` from anywhere, `stop.state` tells what became of it. */
 
 import { api, ask, here } from '../api/client';
+import { currentToken } from '../api/token';
+import type { StopResult } from '../api/types';
 import { isStopKey, StopCall, type StopState } from './stop';
 
 class Stop {
   state = $state.raw<StopState>({ kind: 'none' });
+  /** The port of the listener that takes stops alone; null until the service has told it. */
+  port: number | null = null;
   private call: StopCall | null = null;
 
   /** At once, and without a question. */
   press(): void {
     this.call?.leave();
     this.call = new StopCall({
-      send: () => ask(api.POST('/api/v1/robots/{robot}/stop', { params: { path: here() } })),
+      doors: this.port === null ? [sendToService] : [sendToService, () => sendToListener(this.port ?? 0)],
       after: (seconds, call) => {
         const timer = setTimeout(call, seconds * 1000);
         return () => clearTimeout(timer);
@@ -42,6 +46,19 @@ class Stop {
       { capture: true },
     );
   }
+}
+
+function sendToService(): Promise<StopResult> {
+  return ask(api.POST('/api/v1/robots/{robot}/stop', { params: { path: here() } }));
+}
+
+async function sendToListener(port: number): Promise<StopResult> {
+  const token = currentToken();
+  const headers: HeadersInit = token === null ? {} : { Authorization: `Bearer ${token}` };
+  const address = `${location.protocol}//${location.hostname}:${port}/api/v1/robots/${here().robot}/stop`;
+  const answer = await fetch(address, { method: 'POST', headers });
+  if (!answer.ok) throw new Error(`the stop listener answered ${answer.status}`);
+  return (await answer.json()) as StopResult;
 }
 
 export const stop = new Stop();

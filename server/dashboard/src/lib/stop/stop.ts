@@ -1,16 +1,17 @@
 /**
  * One press of Stop: sent at once, sent again while nothing answers, and told in so many words within a second.
  *
- * Knows nothing about a browser: what sends, and what tells the time, is handed in.
+ * The service has two doors for it: its own, and a listener that opens also while the rest of the service hangs. Knows
+ * nothing about a browser: what sends, and what tells the time, is handed in.
  */
 
 import type { StopResult } from '../api/types';
 
-/** s after which an answer that has not come is told as none. The request stays on its way. */
-export const TELL_AFTER = 1;
-/** s between two requests while none is answered, and how many there are. */
-export const AGAIN_AFTER = 1;
-export const ATTEMPTS = 5;
+/** s after which an answer that has not come is told as none. Requests stay on their way. */
+export const TELL_AFTER = 0.8;
+/** s between two requests while none is answered, each through the next door, and how many there are. */
+export const AGAIN_AFTER = 0.25;
+export const ATTEMPTS = 12;
 export const EMERGENCY = 'Use the emergency stop.';
 
 export type StopState =
@@ -18,12 +19,13 @@ export type StopState =
   | { kind: 'sending' }
   /** The board has said that its set points are frozen. */
   | { kind: 'confirmed'; text: string; seconds: number }
-  /** On the line, and nothing has come back. */
+  /** On the line, and the board has not said so. */
   | { kind: 'delivered'; text: string; seconds: number }
   | { kind: 'not delivered'; text: string };
 
 export interface StopParts {
-  send(): Promise<StopResult>;
+  /** Each sends one request. */
+  doors: readonly (() => Promise<StopResult>)[];
   after(seconds: number, call: () => void): () => void;
   told(state: StopState): void;
 }
@@ -38,6 +40,7 @@ export function stateOf(result: StopResult): StopState {
 export class StopCall {
   private timers: (() => void)[] = [];
   private attempts = 0;
+  private failures = 0;
   private ended = false;
 
   constructor(private readonly parts: StopParts) {}
@@ -48,15 +51,17 @@ export class StopCall {
     this.attempt();
   }
 
-  /** Nothing more is told: another press has taken over. */
+  /** Nothing more is sent or told: another press has taken over, or the message was read. */
   leave(): void {
     this.ended = true;
     for (const cancel of this.timers) cancel();
   }
 
   private attempt(): void {
+    if (this.ended) return;
+    const door = this.parts.doors[this.attempts % this.parts.doors.length];
     this.attempts += 1;
-    this.parts.send().then(
+    door?.().then(
       (result) => this.answered(result),
       (error: unknown) => this.failed(error),
     );
@@ -69,17 +74,22 @@ export class StopCall {
     this.parts.told(stateOf(result));
   }
 
+  /** One door that is closed is no answer: what counts is whether all are. */
   private failed(error: unknown): void {
-    if (this.ended) return;
+    this.failures += 1;
+    if (this.ended || this.failures < this.parts.doors.length) return;
     const why = error instanceof Error ? error.message : String(error);
-    const more = this.attempts < ATTEMPTS ? ' It is being sent again.' : '';
-    this.parts.told({ kind: 'not delivered', text: `${sentence(why)} ${EMERGENCY}${more}` });
+    this.parts.told({ kind: 'not delivered', text: `${sentence(why)} ${EMERGENCY}${this.more()}` });
   }
 
   private silent(): void {
     if (this.ended) return;
-    const text = `No answer within ${TELL_AFTER} s. ${EMERGENCY} It is being sent again.`;
+    const text = `The service has not answered within ${TELL_AFTER} s. ${EMERGENCY}${this.more()}`;
     this.parts.told({ kind: 'not delivered', text });
+  }
+
+  private more(): string {
+    return this.failures < ATTEMPTS && this.attempts < ATTEMPTS ? ' It is being sent again.' : '';
   }
 }
 
@@ -89,12 +99,6 @@ function sentence(text: string): string {
 }
 
 /** Keys that stop, wherever the focus is, also in a form: F8, Pause. */
-export function isStopKey(event: {
-  key: string;
-  ctrlKey: boolean;
-  altKey: boolean;
-  metaKey: boolean;
-}): boolean {
-  if (event.altKey || event.metaKey) return false;
-  return event.key === 'F8' || event.key === 'Pause';
+export function isStopKey(event: { key: string; altKey: boolean; metaKey: boolean }): boolean {
+  return !event.altKey && !event.metaKey && (event.key === 'F8' || event.key === 'Pause');
 }
