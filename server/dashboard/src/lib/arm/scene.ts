@@ -24,8 +24,10 @@ import { cameraAt, fittingDistance, turned, viewFrom, viewNamed, type View, type
 import { WayLine } from './way_line';
 
 const FIELD_OF_VIEW = 32;
-/** What has to be in the picture, as a share of the reach: the arm in any posture would be 1. */
-const SHOWN = 1.02;
+/** What has to be in the picture around its middle, as a share of the reach: arm and hand in nearly any posture. */
+const SHOWN = 1.12;
+/** How high the hand reaches, as a share of the reach. */
+const TOP = 1.25;
 /** m. */
 const GRID_SQUARE = 0.1;
 const FINEST_PIXELS = 2;
@@ -79,7 +81,7 @@ export class ArmScene {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'low-power' });
     const reach = this.reach;
     this.floor = floor ?? -0.6 * reach;
-    this.target = [0, 0, 0.1 * reach];
+    this.target = [0, 0, (this.floor + TOP * reach) / 2];
     this.materials = { links: chain.map(() => new MeshLambertMaterial()), body: new MeshLambertMaterial() };
     this.arm = new ArmFigure(chain, this.materials, this.floor);
     this.ghost = new ArmFigure(chain, all(chain, this.ghostMaterial), null);
@@ -156,9 +158,9 @@ export class ArmScene {
   }
 
   private build(reach: number): void {
-    const sun = new DirectionalLight(0xffffff, 2.2);
+    const sun = new DirectionalLight(0xffffff, 2.8);
     sun.position.set(-1, -2, 3);
-    this.scene.add(new HemisphereLight(0xffffff, 0x8090a0, 1.5), sun);
+    this.scene.add(new HemisphereLight(0xffffff, 0xb0b8c4, 2.4), sun);
     this.scene.add(this.ground, this.shadow.group, this.arm.group, this.trail.line, this.wayLine.group);
     this.scene.add(this.ghost.group);
     const disc = new Mesh(new CircleGeometry(1.35 * reach, 72), this.groundMaterial);

@@ -38,7 +38,7 @@ const SCHEMA: Schema = {
         },
       },
     },
-    settle: number({ minimum: 0, maximum: 3600 }),
+    settle: number({ minimum: 0, maximum: 3600, default: 0.5 }),
     hold: number({ minimum: 0, maximum: 3600 }),
     repeats: { type: 'integer', minimum: 1, maximum: 1000 },
   },
@@ -92,6 +92,11 @@ describe('a form filled with a specification', () => {
     const { spec } = specOf(form, RULES);
     expect(spec!.trajectory.amplitude).toEqual({ 1: Math.PI / 2, 3: expect.closeTo(-Math.PI / 6, 12) });
     expect([spec!.start, spec!.gains]).toEqual([{ 2: Math.PI / 4 }, { 1: [2, 0, 1] }]);
+  });
+
+  it('fills in what is usual where nothing is said', () => {
+    const { settle, ...without } = RAMP;
+    expect([settle, formOf(without, RULES).settle]).toEqual([0.5, '0.5']);
   });
 
   it('keeps a sequence as it is', () => {

@@ -48,6 +48,8 @@ export interface SpecRules {
   readonly settle: NumberRule;
   readonly hold: NumberRule;
   readonly repeats: NumberRule;
+  /** What a specification has where nothing is said. */
+  readonly standard: Readonly<Record<string, unknown>>;
 }
 
 export interface FormResult {
@@ -67,22 +69,26 @@ const ANGLE: NumberRule = {
 };
 
 export function rulesOf(schema: Schema): SpecRules {
+  const properties = schema.properties ?? {};
   const rule = (name: string, unit: string): NumberRule => ({
-    bounds: boundsOf(schema.properties?.[name] ?? {}),
+    bounds: boundsOf(properties[name] ?? {}),
     unit,
     scale: 1,
-    integer: schema.properties?.[name]?.type === 'integer',
+    integer: properties[name]?.type === 'integer',
   });
+  const withDefault = Object.entries(properties).filter(([, property]) => property.default !== undefined);
   return {
     kinds: kindsOf(schema),
     settle: rule('settle', 's'),
     hold: rule('hold', 's'),
     repeats: rule('repeats', ''),
+    standard: Object.fromEntries(withDefault.map(([name, property]) => [name, property.default])),
   };
 }
 
-/** The fields filled with a specification. */
-export function formOf(spec: Spec, rules: SpecRules): SpecForm {
+/** The fields filled with a specification; what it leaves out is as usual. */
+export function formOf(given: Partial<Spec>, rules: SpecRules): SpecForm {
+  const spec = { ...rules.standard, ...given } as Spec;
   const kind = rules.kinds.find((one) => one.kind === spec.trajectory.kind);
   const values = valuesOf(kind, spec.trajectory);
   const amplitude = spec.trajectory.amplitude;

@@ -1,0 +1,138 @@
+/** What waits, what runs, what has ended, and what is scheduled: asked for again whenever the service says it changed. */
+
+import { api, ask, asProblem, here, type Experiment, type Problem, type Schedule } from '../../lib/api';
+import { live } from '../../lib/live/live.svelte';
+import { reordered } from '../../lib/trajectory/order';
+
+/** Topics after which the lists may have changed. */
+const TOPICS = new Set(['queue', 'event', 'robot']);
+/** ms in which several changes are taken together. */
+const TOGETHER = 150;
+const ENDED_SHOWN = 12;
+const ENDS = ['done', 'failed', 'cancelled', 'interrupted'] as const;
+
+export class QueueLists {
+  waiting = $state.raw<readonly Experiment[]>([]);
+  running = $state.raw<Experiment | null>(null);
+  ended = $state.raw<readonly Experiment[]>([]);
+  schedules = $state.raw<readonly Schedule[]>([]);
+  problem = $state.raw<Problem | null>(null);
+  /** What could not be done: cancel, reorder, pause. */
+  refused = $state.raw<Problem | null>(null);
+  loaded = $state(false);
+  busy = $state(false);
+  private timer: ReturnType<typeof setTimeout> | undefined;
+
+  /** Follows the service until the returned function is called. */
+  follow(): () => void {
+    void this.load();
+    const end = live.onMessage((message) => {
+      if (TOPICS.has(message.topic)) this.loadSoon();
+    });
+    return () => {
+      end();
+      clearTimeout(this.timer);
+    };
+  }
+
+  async load(): Promise<void> {
+    const path = here();
+    try {
+      const [waiting, running, ended, schedules] = await Promise.all([
+        ask(api.GET('/api/v1/robots/{robot}/queue/experiments', { params: { path } })),
+        ask(
+          api.GET('/api/v1/robots/{robot}/experiments', { params: { path, query: { state: ['running'] } } }),
+        ),
+        ask(
+          api.GET('/api/v1/robots/{robot}/experiments', {
+            params: { path, query: { state: [...ENDS], limit: ENDED_SHOWN } },
+          }),
+        ),
+        ask(api.GET('/api/v1/robots/{robot}/schedules', { params: { path } })),
+      ]);
+      this.waiting = waiting;
+      this.running = running.items[0] ?? null;
+      this.ended = ended.items;
+      this.schedules = schedules.items;
+      this.problem = null;
+    } catch (error) {
+      this.problem = asProblem(error);
+    }
+    this.loaded = true;
+  }
+
+  /** Moves what waits at one place to another. */
+  async move(from: number, to: number): Promise<void> {
+    const changes = reordered(this.waiting, from, to);
+    if (changes === null) {
+      await this.change(() =>
+        Promise.reject(new Error('no priority above 100 is left: lower another one first')),
+      );
+      return;
+    }
+    await this.change(async () => {
+      for (const { id, priority } of changes) {
+        const params = { path: { ...here(), experiment: id } };
+        await ask(
+          api.PATCH('/api/v1/robots/{robot}/experiments/{experiment}', { params, body: { priority } }),
+        );
+      }
+    });
+  }
+
+  async cancel(id: string): Promise<void> {
+    const params = { path: { ...here(), experiment: id } };
+    await this.change(() =>
+      ask(api.POST('/api/v1/robots/{robot}/experiments/{experiment}/cancel', { params })),
+    );
+  }
+
+  async pause(): Promise<void> {
+    await this.change(() =>
+      ask(api.POST('/api/v1/robots/{robot}/queue/pause', { params: { path: here() } })),
+    );
+  }
+
+  /** `movesRealArm`: the operator's word that the workspace of a real arm is clear. */
+  async resume(movesRealArm: boolean): Promise<void> {
+    const body = { moves_real_arm: movesRealArm };
+    await this.change(() =>
+      ask(api.POST('/api/v1/robots/{robot}/queue/resume', { params: { path: here() }, body })),
+    );
+  }
+
+  async attend(): Promise<void> {
+    await this.change(() =>
+      ask(api.POST('/api/v1/robots/{robot}/queue/attend', { params: { path: here() } })),
+    );
+  }
+
+  async switchSchedule(schedule: string, active: boolean): Promise<void> {
+    const params = { path: { ...here(), schedule } };
+    await this.change(() =>
+      ask(api.PATCH('/api/v1/robots/{robot}/schedules/{schedule}', { params, body: { active } })),
+    );
+  }
+
+  async deleteSchedule(schedule: string): Promise<void> {
+    const params = { path: { ...here(), schedule } };
+    await this.change(() => ask(api.DELETE('/api/v1/robots/{robot}/schedules/{schedule}', { params })));
+  }
+
+  private async change(order: () => Promise<unknown>): Promise<void> {
+    this.busy = true;
+    this.refused = null;
+    try {
+      await order();
+    } catch (error) {
+      this.refused = asProblem(error);
+    }
+    await this.load();
+    this.busy = false;
+  }
+
+  private loadSoon(): void {
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => void this.load(), TOGETHER);
+  }
+}

@@ -1,0 +1,95 @@
+/** When an experiment is to be run, and handing it to the service: once, however often the button is pressed. */
+
+import { api, ask, asProblem, here, type ExperimentSpec, type Problem } from '../../lib/api';
+import { typedNumber, type NumberRule } from '../../lib/trajectory/numbers';
+import { interval, localMoment, momentOf, UNITS, type Unit } from '../../lib/trajectory/when';
+
+export type When = 'now' | 'at' | 'every';
+
+const whole = (low: number, high: number): NumberRule => ({
+  bounds: { low, high, above: false },
+  unit: '',
+  scale: 1,
+  integer: true,
+});
+const PRIORITY = whole(-100, 100);
+const COUNT = whole(1, 1_000_000);
+const SHORTEST = 10;
+const LONGEST = 366 * UNITS.d;
+
+export class Sending {
+  when = $state<When>('now');
+  /** Value of a `datetime-local` field. */
+  at = $state(localMoment(new Date(Date.now() + 10 * 60_000)));
+  every = $state('30');
+  unit = $state<Unit>('min');
+  count = $state('10');
+  priority = $state('0');
+  busy = $state(false);
+  problem = $state.raw<Problem | null>(null);
+  /** What became of the last one. */
+  done = $state('');
+  problems: Readonly<Record<string, string>> = $derived.by(() => this.wrong());
+  private key = newKey();
+
+  /** Sends it. Whether it was taken; `problem` says why not. */
+  async send(spec: ExperimentSpec): Promise<boolean> {
+    if (this.busy) return false;
+    this.busy = true;
+    this.problem = null;
+    this.done = '';
+    try {
+      this.done = this.when === 'every' ? await this.schedule(spec) : await this.submit(spec);
+      this.key = newKey();
+      return true;
+    } catch (error) {
+      this.problem = asProblem(error);
+      // Only a request without an answer is the same one when it is sent again.
+      if (this.problem.status !== 0) this.key = newKey();
+      return false;
+    } finally {
+      this.busy = false;
+    }
+  }
+
+  private async submit(spec: ExperimentSpec): Promise<string> {
+    const at = this.when === 'at' ? momentOf(this.at) : null;
+    const params = { path: here(), header: { 'idempotency-key': this.key } };
+    const body = { spec, priority: Number(this.priority), ...(at === null ? {} : { at }) };
+    const made = await ask(api.POST('/api/v1/robots/{robot}/experiments', { params, body }));
+    return `${made.spec.name ?? made.spec.trajectory.kind} is in the queue, number ${made.id}`;
+  }
+
+  private async schedule(spec: ExperimentSpec): Promise<string> {
+    const every = this.seconds();
+    const count = this.count.trim() === '' ? null : Number(this.count);
+    const body = { spec, every, count, priority: Number(this.priority) };
+    const made = await ask(api.POST('/api/v1/robots/{robot}/schedules', { params: { path: here() }, body }));
+    return `scheduled every ${interval(every)}, number ${made.id}`;
+  }
+
+  private seconds(): number {
+    return Number(this.every.replace(',', '.')) * UNITS[this.unit];
+  }
+
+  private wrong(): Record<string, string> {
+    const problems: Record<string, string> = {};
+    const { problem } = typedNumber(this.priority, PRIORITY);
+    if (problem) problems.priority = problem;
+    if (this.when === 'at' && momentOf(this.at) === null) problems.at = 'a day and a time are needed';
+    if (this.when === 'every') {
+      const every = this.seconds();
+      if (!(every >= SHORTEST && every <= LONGEST)) problems.every = 'allowed: 10 s to 366 d';
+      const count = this.count.trim() === '' ? '' : typedNumber(this.count, COUNT).problem;
+      if (count) problems.count = count;
+    }
+    return problems;
+  }
+}
+
+/** Not `randomUUID`: that one exists only on pages that came over TLS or from this computer. */
+function newKey(): string {
+  return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) =>
+    byte.toString(16).padStart(2, '0'),
+  ).join('');
+}
