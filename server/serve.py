@@ -21,16 +21,18 @@ from server.app import make_app
 from server.listening import listening
 from server.services import Services
 from server.stop_listener import StopListener
+from server.store.lock import sole_use
 
 GRACE = 1
 """s for requests under way when the service ends; streams are told to end before."""
 
 
 def serve(settings: Settings, ready: Callable[[str], None]) -> None:
-    """Serves until a signal ends it. `ready` is called with the address. Raises ListenError, StoreError, SpecError."""
+    """Serves until a signal ends it. `ready` is called with the address. Raises ListenError, InUseError, StoreError,
+    SpecError."""
     logs.begin()
     section = settings.server
-    with listening(section) as (listener, beside):
+    with sole_use(section.database_url), listening(section) as (listener, beside):
         services = Services(settings)
         gate = _gate(services, section, beside.getsockname()[1])
         app = make_app(services, gate)

@@ -21,6 +21,8 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "serve": ("daq.cli.serve", "Serve experiments and traces to people and programs."),
     "queue": ("daq.cli.queue", "The queue of a server's robot: show, pause, resume."),
     "token": ("daq.cli.token", "Tokens of the service: make, list, revoke."),
+    "backup": ("daq.cli.backup", "Everything that a service keeps, in one file."),
+    "restore": ("daq.cli.restore", "Bring a backup back."),
     "traces": ("daq.cli.traces", "List, show, plot, convert and verify traces."),
     "config": ("daq.cli.config", "Show and check the configuration."),
     "mock": ("daq.cli.mock", "Start a mock controller that others can connect to."),
@@ -35,7 +37,9 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("daq.cli.demo", "The ramp step on the mock, from command to plot."),
 }
 
-HERE = frozenset({"ports", "serve", "token", "config", "mock", "simulate", "design", "thesis", "blind", "demo"})
+HERE = frozenset(
+    {"ports", "serve", "token", "backup", "restore", "config", "mock", "simulate", "design", "thesis", "blind", "demo"}
+)
 """Subcommands that are about this computer alone: `--server` is refused, DAQ_SERVER does not concern them."""
 
 

@@ -1,0 +1,48 @@
+"""The database as a file of its own: copied while a service writes it, and looked at before it is trusted."""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+from alembic.script import ScriptDirectory
+
+from server.backup.places import BackupError
+from server.store.engine import BUSY_TIMEOUT_MS, migrations
+
+
+def copy_database(source: Path, target: Path) -> None:
+    """One moment of the database, whatever is written meanwhile (SQLite's online backup). Raises BackupError."""
+    if not source.is_file():
+        raise BackupError(f"database {source}: is not there: no service has run with this configuration yet")
+    try:
+        with (
+            closing(sqlite3.connect(source, timeout=BUSY_TIMEOUT_MS / 1e3)) as here,
+            closing(sqlite3.connect(target)) as there,
+        ):
+            here.backup(there)
+            there.execute("PRAGMA journal_mode=DELETE")  # one file, with nothing beside it
+    except sqlite3.Error as error:
+        raise BackupError(f"database {source}: cannot be copied: {error}") from error
+
+
+def revision_of(database: Path) -> str | None:
+    """Of its tables; None for one without any. Raises BackupError when it is damaged."""
+    try:
+        with closing(sqlite3.connect(f"file:{database}?mode=ro", uri=True)) as connection:
+            found = connection.execute("PRAGMA integrity_check").fetchone()[0]
+            if found != "ok":
+                raise BackupError(f"database {database.name}: is damaged: {str(found).splitlines()[0]}")
+            known = connection.execute("SELECT count(*) FROM sqlite_master WHERE name = 'alembic_version'").fetchone()
+            row = connection.execute("SELECT version_num FROM alembic_version").fetchone() if known[0] else None
+    except sqlite3.Error as error:
+        raise BackupError(f"database {database.name}: is damaged: {error}") from error
+    return None if row is None else str(row[0])
+
+
+def require_known(revision: str | None) -> None:
+    """Raises BackupError for tables of a newer version than this program's."""
+    known = {script.revision for script in ScriptDirectory.from_config(migrations()).walk_revisions()}
+    if revision is not None and revision not in known:
+        raise BackupError(f"the backup's tables are of a newer version ({revision}): install that version first")

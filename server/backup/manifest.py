@@ -1,0 +1,128 @@
+"""What a backup says about itself, and whether it is true."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+from typing import IO, Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from server.backup.places import DATABASE, NAMES, BackupError
+
+FORMAT = 1
+MANIFEST = "manifest.json"
+LARGEST_MANIFEST = 256 << 20
+PIECE = 1 << 20
+"""Bytes read at once."""
+DAMAGED = (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, UnicodeDecodeError, struct.error)
+"""What the reader of ZIP files raises for one whose structure is not as it should be."""
+Progress = Callable[[float, str], None]
+
+
+class Entry(BaseModel):
+    """One file of a backup."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str
+    size: Annotated[int, Field(ge=0)]
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+
+
+class Manifest(BaseModel):
+    """The whole backup. `revision` is that of the database's tables; `left_out` were deleted while it was made."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    format: int
+    software: str
+    created: datetime
+    robot: str
+    revision: str | None
+    files: tuple[Entry, ...]
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Bytes of all files."""
+        return sum(entry.size for entry in self.files)
+
+    def count(self, kind: str) -> int:
+        """How many traces, models, jobs' files."""
+        return sum(entry.name.startswith(f"{kind}/") for entry in self.files)
+
+
+@contextmanager
+def opened(archive: Path) -> Iterator[tuple[zipfile.ZipFile, Manifest]]:
+    """A backup, whose list of files is in order. Raises BackupError."""
+    try:
+        with archive.open("rb") as stream, zipfile.ZipFile(stream) as pack:
+            yield pack, _manifest(pack, archive)
+    except DAMAGED as error:
+        raise BackupError(f"{archive}: is damaged, or no backup: {error}; nothing was changed") from error
+
+
+def verify(archive: Path, progress: Progress = lambda _fraction, _text: None) -> Manifest:
+    """Reads every byte of a backup. Raises BackupError unless all is there, and as it was written."""
+    try:
+        with opened(archive) as (pack, manifest):
+            done = 0
+            for entry in manifest.files:
+                progress(done / max(1, manifest.size), f"checking {entry.name}")
+                with pack.open(entry.name) as stream:
+                    check(entry, _digest(stream), archive)
+                done += entry.size
+            return manifest
+    except OSError as error:
+        raise BackupError(f"{archive}: cannot be read: {error.strerror or error}; nothing was changed") from error
+
+
+def check(entry: Entry, found: str, archive: Path) -> None:
+    """Raises BackupError when a file is not as it was written."""
+    if found != entry.sha256:
+        raise BackupError(f"{archive}: {entry.name} is not as it was written: the backup is damaged")
+
+
+def pieces(stream: IO[bytes]) -> Iterator[bytes]:
+    """A file, piece by piece."""
+    while piece := stream.read(PIECE):
+        yield piece
+
+
+def _digest(stream: IO[bytes]) -> str:
+    digest = hashlib.sha256()
+    for piece in pieces(stream):
+        digest.update(piece)
+    return digest.hexdigest()
+
+
+def _manifest(pack: zipfile.ZipFile, archive: Path) -> Manifest:
+    there = {info.filename: info for info in pack.infolist()}
+    if MANIFEST not in there or there[MANIFEST].file_size > LARGEST_MANIFEST:
+        raise BackupError(f"{archive}: is no backup of a service: it has no {MANIFEST}; nothing was changed")
+    try:
+        manifest = Manifest.model_validate_json(pack.read(MANIFEST))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        line = f"{archive}: {MANIFEST}: {where}: {first['msg']}; nothing was changed"
+        raise BackupError(line) from error
+    if manifest.format > FORMAT:
+        line = f"{archive}: is a backup of format {manifest.format}, this version knows {FORMAT}; nothing was changed"
+        raise BackupError(line)
+    listed = {entry.name: entry for entry in manifest.files}
+    strange = next((name for name in listed if not NAMES.fullmatch(name)), None)
+    if strange is not None:
+        raise BackupError(f"{archive}: {strange!r}: is no name of a file of a backup; nothing was changed")
+    wrong = sorted(set(listed) ^ (set(there) - {MANIFEST}))
+    wrong += [name for name, entry in listed.items() if name in there and there[name].file_size != entry.size]
+    if wrong or DATABASE not in listed or len(there) != len(pack.infolist()) or len(listed) != len(manifest.files):
+        line = f"{archive}: its files are not those of its list ({', '.join(wrong[:3]) or DATABASE}): it is damaged"
+        raise BackupError(f"{line}; nothing was changed")
+    return manifest

@@ -1,0 +1,152 @@
+"""Brings a backup back: checked to its last byte before anything is touched.
+
+What was there is put aside, and never deleted.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import zipfile
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from daq.traces import disk
+from daq.traces.layout import PART_SUFFIX, SUFFIX
+from server.backup.database import require_known, revision_of
+from server.backup.manifest import Entry, Manifest, Progress, check, opened, pieces, verify
+from server.backup.places import DATABASE, BackupError, Places
+from server.backup.write import RESERVE
+from server.store.lock import sole_use
+
+STAGING = ".restoring"
+CHECK_SHARE, WRITE_SHARE = 0.4, 0.98
+
+
+@dataclass(frozen=True)
+class Restored:
+    """What was brought back, and the folders into which was put what had been there."""
+
+    manifest: Manifest
+    put_aside: tuple[Path, ...]
+
+
+def restore(archive: Path, places: Places, now: datetime, progress: Progress, *, overwrite: bool = False) -> Restored:
+    """Brings everything of a backup to the places of this configuration.
+
+    Raises BackupError when the backup is damaged or another robot's, or something is there and `overwrite` is False;
+    InUseError while a service runs. Nothing has been changed then.
+    """
+    manifest = verify(archive, lambda fraction, text: progress(CHECK_SHARE * fraction, text))
+    if manifest.robot != places.robot:
+        line = f"{archive}: is of robot {manifest.robot!r}, this configuration's is {places.robot!r}"
+        raise BackupError(f"{line}; nothing was changed")
+    require_known(manifest.revision)
+    with sole_use(places.url):
+        there = occupied(places)
+        if there and not overwrite:
+            names = ", ".join(str(path) for path in there[:3]) + (", …" if len(there) > 3 else "")
+            line = f"{len(there)} files or folders are there already ({names})"
+            raise BackupError(f"{line}: with --overwrite they are put aside; nothing was changed")
+        staged = _Staged(archive, places)
+        try:
+            staged.write(manifest, lambda f, text: progress(CHECK_SHARE + (WRITE_SHARE - CHECK_SHARE) * f, text))
+            aside = _put_aside(there, now)
+            staged.move_in()
+        except OSError as error:
+            raise BackupError(f"restore: {error.filename or archive}: {error.strerror or error}") from error
+        finally:
+            staged.clear()
+    return Restored(manifest, aside)
+
+
+def occupied(places: Places) -> list[Path]:
+    """What a restore would replace: the database and what belongs to it, traces, models, results of jobs."""
+    beside = [places.database.with_name(places.database.name + end) for end in ("", "-wal", "-shm")]
+    traces = [path for path in _entries(places.traces) if path.name.endswith((SUFFIX, PART_SUFFIX))]
+    folders = [folder for name in ("models", "jobs") if _entries(folder := places.service / name)]
+    return [path for path in (*beside, *traces, *folders) if path.exists()]
+
+
+class _Staged:
+    """Files on their way: beside their places, on the same disk, so that moving them in is renaming."""
+
+    def __init__(self, archive: Path, places: Places) -> None:
+        self._archive = archive
+        self._places = places
+        self._moves: list[tuple[Path, Path]] = []
+        self._folders = {folder / STAGING for folder in (places.database.parent, places.traces, places.service)}
+
+    def write(self, manifest: Manifest, progress: Progress) -> None:
+        """All files, each with its digest looked at once more. Raises BackupError, OSError."""
+        self.clear()
+        for folder in self._folders:
+            folder.mkdir(parents=True)
+        self._require_room(manifest)
+        done = 0
+        with opened(self._archive) as (pack, _):
+            for entry in manifest.files:
+                progress(done / max(1, manifest.size), entry.name)
+                self._extract(pack, entry)
+                done += entry.size
+        if revision_of(self._staged(DATABASE)) != manifest.revision:
+            raise BackupError(f"{self._archive}: its database is not the one that its list tells of")
+
+    def move_in(self) -> None:
+        """Every file to its place, and the names to the disk."""
+        for staged, target in self._moves:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            staged.replace(target)
+        for folder in {target.parent for _, target in self._moves}:
+            disk.sync_folder(folder)
+
+    def clear(self) -> None:
+        """Nothing is left on its way."""
+        for folder in self._folders:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def _staged(self, name: str) -> Path:
+        target = self._places.target(name)
+        homes = (self._places.database.parent, self._places.traces, self._places.service)
+        home = homes[0] if name == DATABASE else homes[1] if name.startswith("traces/") else homes[2]
+        return home / STAGING / target.relative_to(home)
+
+    def _extract(self, pack: zipfile.ZipFile, entry: Entry) -> None:
+        path = self._staged(entry.name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        digest = hashlib.sha256()
+        with pack.open(entry.name) as source, path.open("xb") as copy:
+            for piece in pieces(source):
+                digest.update(piece)
+                copy.write(piece)
+            disk.sync(copy)
+        check(entry, digest.hexdigest(), self._archive)
+        self._moves.append((path, self._places.target(entry.name)))
+
+    def _require_room(self, manifest: Manifest) -> None:
+        for folder in self._folders:
+            free = shutil.disk_usage(folder).free
+            if free < manifest.size + RESERVE:
+                needed = (manifest.size + RESERVE) / 1e6
+                raise BackupError(f"{folder.parent}: {free / 1e6:.0f} MB are free, {needed:.0f} MB are needed")
+
+
+def _put_aside(there: list[Path], now: datetime) -> tuple[Path, ...]:
+    stamp = now.astimezone(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
+    made = []
+    for path in there:
+        folder = path.parent / f"before-restore-{stamp}"
+        if folder not in made:
+            folder.mkdir()
+            made.append(folder)
+        path.replace(folder / path.name)
+    return tuple(made)
+
+
+def _entries(folder: Path) -> list[Path]:
+    with suppress(FileNotFoundError):
+        return [Path(entry) for entry in os.scandir(folder)]
+    return []

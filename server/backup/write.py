@@ -1,0 +1,90 @@
+"""Makes a backup, also while the service runs."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+import zipfile
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+
+from daq.traces import disk
+from server.backup.database import copy_database, revision_of
+from server.backup.manifest import FORMAT, MANIFEST, Entry, Manifest, Progress, pieces
+from server.backup.places import DATABASE, BackupError, Places
+
+RESERVE = 20_000_000
+"""Bytes that stay free beside a backup."""
+
+
+def back_up(places: Places, target: Path, now: datetime, progress: Progress) -> Manifest:
+    """Writes a backup to `target`, whole or not at all, for nobody else to read: hashes of tokens are in it.
+
+    The database is taken first, in one moment: every file that it names is there by then, and is taken after it. What
+    is deleted meanwhile is left out, and told. Raises BackupError.
+    """
+    if target.exists():
+        raise BackupError(f"{target}: is there already; a backup is never written over")
+    try:
+        with tempfile.TemporaryDirectory(prefix=".backup-", dir=target.absolute().parent) as folder:
+            database = Path(folder) / "service.sqlite"
+            copy_database(places.database, database)
+            revision = revision_of(database)
+            files = [(DATABASE, database), *places.files()]
+            _require_room(target.absolute().parent, files)
+            part = Path(folder) / "backup.zip"
+            entries, left_out = _pack(part, files, progress)
+            manifest = Manifest(
+                format=FORMAT,
+                software=f"ma2000-daq {version('ma2000-daq')}",
+                created=now,
+                robot=places.robot,
+                revision=revision,
+                files=tuple(entries),
+                left_out=tuple(left_out),
+            )
+            with zipfile.ZipFile(part, "a") as pack:
+                pack.writestr(MANIFEST, manifest.model_dump_json(indent=1))
+            with part.open("rb") as stream:
+                os.fsync(stream.fileno())
+            if target.exists():
+                raise BackupError(f"{target}: was made by somebody else meanwhile; it was not written over")
+            part.replace(target)
+            disk.sync_folder(target.absolute().parent)
+    except OSError as error:
+        raise BackupError(f"{target}: cannot be written: {error.strerror or error}") from error
+    return manifest
+
+
+def _pack(part: Path, files: list[tuple[str, Path]], progress: Progress) -> tuple[list[Entry], list[str]]:
+    """What was put in, and what had gone."""
+    entries, left_out = [], []
+    descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o600)
+    with os.fdopen(descriptor, "w+b") as stream, zipfile.ZipFile(stream, "w") as pack:
+        for number, (name, path) in enumerate(files):
+            progress(number / len(files), name)
+            try:
+                entries.append(_put(pack, name, path))
+            except FileNotFoundError:
+                left_out.append(name)
+    return entries, left_out
+
+
+def _put(pack: zipfile.ZipFile, name: str, path: Path) -> Entry:
+    digest, size = hashlib.sha256(), 0
+    with path.open("rb") as source, pack.open(zipfile.ZipInfo(name), "w", force_zip64=True) as copy:
+        for piece in pieces(source):
+            digest.update(piece)
+            size += len(piece)
+            copy.write(piece)
+    return Entry(name=name, size=size, sha256=digest.hexdigest())
+
+
+def _require_room(folder: Path, files: list[tuple[str, Path]]) -> None:
+    needed = sum(path.stat().st_size for _, path in files if path.is_file()) + RESERVE
+    free = shutil.disk_usage(folder).free
+    if free < needed:
+        raise BackupError(f"{folder}: {free / 1e6:.0f} MB are free, a backup needs {needed / 1e6:.0f} MB")

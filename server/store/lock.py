@@ -1,0 +1,48 @@
+"""One service a database: a lock of the operating system's, which ends with the process that holds it."""
+
+from __future__ import annotations
+
+import fcntl
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sqlalchemy.engine import make_url
+
+from daq.contracts.errors import DaqError
+
+
+class InUseError(DaqError):
+    """A service uses this database now."""
+
+    exit_code = 3
+
+
+def sqlite_file(url: str) -> Path | None:
+    """The file of a SQLite database; None for any other, and for one in memory."""
+    parsed = make_url(url)
+    return Path(parsed.database) if parsed.get_backend_name() == "sqlite" and parsed.database else None
+
+
+@contextmanager
+def sole_use(url: str) -> Iterator[None]:
+    """No other service, and no restore, uses this database within. Raises InUseError.
+
+    A database that is no file has a server of its own; nothing is locked then.
+    """
+    file = sqlite_file(url)
+    if file is None:
+        yield
+        return
+    path = file.with_name(f"{file.name}.lock")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        stream = path.open("ab")
+    except OSError as error:
+        raise InUseError(f"{path}: cannot be made: {error.strerror}") from error
+    with stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InUseError(f"database {file}: a service uses it; end that one first") from None
+        yield
