@@ -24,7 +24,7 @@ INSTALLED_FROM = DASHBOARD / "node_modules" / "installed-from.txt"
 LOCK_FILES = ("package.json", "package-lock.json")
 COMPRESSIBLE = (".html", ".js", ".css", ".svg", ".json", ".webmanifest")
 TOOLS = {
-    "build": [["vite/bin/vite.js", "build", "--logLevel", "warn"]],
+    "build": [["vite/bin/vite.js", "build", "--logLevel", "error"]],
     "check": [
         ["svelte-check/bin/svelte-check", "--fail-on-warnings", "--output", "human", "--threshold", "warning"],
         ["prettier/bin/prettier.cjs", "--check", "--log-level", "warn", "."],

@@ -186,19 +186,40 @@ function drawEnds(plot: uPlot, drawing: ChartDrawing): void {
     const last = lastValue(plot.data[index + 1] as ArrayLike<number | null> | undefined);
     if (last !== null) ends.push({ y: plot.valToPos(last, 'y', true), text: one.end, colour: one.colour });
   });
-  ends.sort((one, other) => one.y - other.y);
+  const places = apart(
+    ends.map((end) => end.y),
+    13 * ratio,
+    bbox.top,
+    bbox.top + bbox.height,
+  );
   ctx.save();
   ctx.font = `600 ${11 * ratio}px ${drawing.colours.font}`;
   ctx.textBaseline = 'middle';
   ctx.textAlign = 'left';
-  let free = bbox.top;
-  for (const end of ends) {
-    const y = Math.min(Math.max(end.y, free + 6 * ratio), bbox.top + bbox.height);
+  ends.forEach((end, index) => {
     ctx.fillStyle = end.colour;
-    ctx.fillText(end.text, bbox.left + bbox.width + 6 * ratio, y);
-    free = y + 7 * ratio;
-  }
+    ctx.fillText(end.text, bbox.left + bbox.width + 6 * ratio, places[index] ?? end.y);
+  });
   ctx.restore();
+}
+
+/** Places near `wanted`, in the same order of height, at least `distance` apart and within [low, high] if there is room. */
+export function apart(wanted: readonly number[], distance: number, low: number, high: number): number[] {
+  const order = wanted
+    .map((_, index) => index)
+    .sort((one, other) => (wanted[one] ?? 0) - (wanted[other] ?? 0));
+  const places = [...wanted];
+  let free = low;
+  for (const index of order) {
+    places[index] = Math.max(places[index] ?? 0, free);
+    free = (places[index] ?? 0) + distance;
+  }
+  let limit = high;
+  for (const index of order.reverse()) {
+    places[index] = Math.min(places[index] ?? 0, limit);
+    limit = (places[index] ?? 0) - distance;
+  }
+  return places;
 }
 
 function lastValue(column: ArrayLike<number | null> | undefined): number | null {

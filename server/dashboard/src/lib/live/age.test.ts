@@ -1,0 +1,38 @@
+import { describe, expect, it } from 'vitest';
+import { ageText, ServiceClock } from './age';
+
+describe('the age of a value', () => {
+  it('is told by the service and grows by this clock', () => {
+    const clock = new ServiceClock();
+    expect(clock.age(100, 5)).toBeNull();
+    clock.heard(100.02, 5);
+    expect(clock.age(100, 5)).toBeCloseTo(0.02);
+    expect(clock.age(100, 7.5)).toBeCloseTo(2.52);
+    expect(clock.silence(7.5)).toBeCloseTo(2.5);
+  });
+
+  it('is never negative', () => {
+    const clock = new ServiceClock();
+    clock.heard(100, 5);
+    expect(clock.age(101, 5)).toBe(0);
+  });
+
+  it('tells a computer that was started anew from a clock that jitters', () => {
+    const clock = new ServiceClock();
+    expect(clock.wentBack(3, 1)).toBe(false);
+    clock.heard(1000, 5);
+    expect(clock.wentBack(999.5, 1)).toBe(false);
+    expect(clock.wentBack(12, 1)).toBe(true);
+  });
+
+  it.each([
+    [null, 'never'],
+    [0.0204, '20 ms'],
+    [3.42, '3.4 s'],
+    [61, '61 s'],
+    [600, '10 min'],
+    [86400, '24 h'],
+  ])('reads %s as %s', (age, text) => {
+    expect(ageText(age)).toBe(text);
+  });
+});
