@@ -10,7 +10,7 @@ from fastapi import APIRouter, FastAPI
 from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
 
-from server import problems
+from server import description, problems
 from server.access.gate import Gate
 from server.api import controller, experiments, jobs, live, presets, queue, robots, system, teaching, traces
 from server.page import page_router
@@ -63,6 +63,7 @@ def bare_app(services: Services | None) -> FastAPI:
     app.include_router(api)
     app.include_router(system.plain)
     app.include_router(page_router())
+    description.install(app)
     return app
 
 

@@ -27,7 +27,7 @@ from daq.traces.summary import joint_figures
 from server.api.parts import CursorOf, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
 from server.catalogue.thinning import thinned
 from server.catalogue.upload import store_upload
-from server.problems import PROBLEMS
+from server.problems import PROBLEMS, TITLES
 from server.store.traces import TraceSearch
 
 router = APIRouter(prefix="/robots/{robot}/traces", tags=["traces"], responses=PROBLEMS)
@@ -65,6 +65,7 @@ def list_traces(
 @router.post(
     "",
     status_code=201,
+    responses={415: PROBLEMS[422] | {"description": TITLES[415]}},
     openapi_extra={"requestBody": {"required": True, "content": {MCAP: _BINARY, CSV: _BINARY}}},
 )
 async def upload_trace(request: Request, one: RobotPart, found: ServicesPart, who: Operator) -> CatalogueEntry:

@@ -1,0 +1,81 @@
+"""One example of every kind of problem, and the addresses at which it is met."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from daq.contracts.service.problems import FieldProblem, ProblemDetails
+from server.problems import ProblemError, details_of
+
+CHANGES = "(post|put|patch|delete) "
+MOVES = f"{CHANGES}.*/(teaching/.*|gains|process/.*|gripper)"
+
+
+@dataclass(frozen=True)
+class Met:
+    """A problem, and which operations (`method /path`) may answer with it."""
+
+    problem: ProblemError
+    where: re.Pattern[str]
+
+    @property
+    def details(self) -> ProblemDetails:
+        """As it is told."""
+        return details_of(self.problem, request_id="0f3c9a1be4d27788")
+
+
+def _met(where: str, status: int, kind: str, detail: str, advice: str, *fields: FieldProblem) -> Met:
+    return Met(ProblemError(status, kind, detail, advice, fields), re.compile(where))
+
+
+_AMPLITUDE = FieldProblem(field="spec.trajectory.ramp.amplitude", message="Input should be a valid number (got 'far')")
+PROBLEM_EXAMPLES: tuple[Met, ...] = (
+    _met(".*", 400, "http", "There was an error parsing the body", "/api/v1/openapi.json lists every address"),
+    _met(".*", 401, "token-needed", "this service needs a token", "send the header Authorization: Bearer TOKEN"),
+    _met(".*", 401, "token-unknown", "this token is not known, or was revoked", "`daq token ls` lists tokens by name"),
+    _met(".*", 403, "unknown-name", "this service is not called 'attacker.example'", "use its address"),
+    _met(CHANGES, 403, "other-origin", "a page of another origin may not do this", "use the page that is served here"),
+    _met(f"{CHANGES}(?!.*/stop)", 403, "operator-needed", "anna may look, and stop the robot; this needs the role "
+         "operator", "ask for a token with the role operator"),
+    _met(".*", 404, "not-found", "there is no robot 'other'", "this service has ma2000"),
+    _met(".*", 409, "not-safe", "not while the arm is busy (experiment)", "remove the cause, then try again"),
+    _met("post .*/(experiments|jobs)$", 409, "idempotency-key", "Idempotency-Key 'a' was used for another request",
+         "use a new key for a new request"),
+    _met(f"{CHANGES}.*/experiments/", 409, "experiment-state", "an experiment that is done cannot be cancelled",
+         "see its state: only what is queued or running can end"),
+    _met(".*/jobs/", 409, "job-state", "job 77be01d3aa42 is running", "only a job that is done has a result"),
+    _met("post .*/traces$", 409, "trace-exists", "trace 3fa1c5d20b77 is there already", "nothing needs to be done"),
+    _met("delete .*/traces/", 409, "trace-in-use", "trace 3fa1c5d20b77 is what model 9d2f4b6c8e10 was made from",
+         "delete that one first"),
+    _met("delete .*/models/", 409, "model-in-use", "model 9d2f4b6c8e10 was made from 0a1b2c3d4e5f",
+         "delete that one first"),
+    _met(MOVES, 409, "control-needed", "this moves the robot and needs its control", "take it with POST …/control"),
+    _met(f"{MOVES}|put .*/control|post .*/(control|reset|disconnect)$", 409, "control-held",
+         "bert has the control, for 8 s more unless it is renewed", "ask for it again when it is given back"),
+    _met(f"{MOVES}|(put|delete) .*/control", 409, "control-lost", "this lease has lapsed: there was no heartbeat",
+         "take the control again"),
+    _met("post .*/(control|queue/resume)$", 409, "consent-needed",
+         "serial:///dev/ttyUSB0 is a real arm: it moves only with the operator's word",
+         "is its workspace clear? then ask again with moves_real_arm"),
+    _met("post .*/teaching/", 409, "arm-busy", "the arm is busy: lead", "wait for its end, or stop it"),
+    _met("post .*/(teaching/.*|queue/resume)$", 409, "arm-stopped", "the arm is stopped: stopped by a person",
+         "reset the robot when it is safe"),
+    _met(MOVES, 409, "stopped", "the arm has been stopped: stopped by a person", "reset the robot when it is safe"),
+    _met("post .*/connect$", 409, "port-in-use", "/dev/ttyUSB0: in use by another program",
+         "end the other program, then connect again"),
+    _met(".*", 413, "too-large", "a body may have 16 MB", "send less at once"),
+    _met("post .*/traces$", 415, "not-a-trace", "Content-Type 'image/png' is not taken",
+         "send application/octet-stream or text/csv"),
+    _met(".*", 422, "not-valid", f"{_AMPLITUDE.field}: {_AMPLITUDE.message}", "correct the fields named", _AMPLITUDE),
+    _met("post .*/(experiments|experiments/preview|schedules)$", 422, "beyond-limits",
+         "spec.trajectory: joint 2 reaches 12.0° at 0.64 s, below its limit of 20.0°",
+         "POST …/experiments/preview shows the motion and its violations"),
+    _met("post .*/traces$", 422, "not-a-trace", "the body is empty", "send a trace"),
+    _met("post .*/models$", 422, "not-a-model", "the body is not JSON", "send a file as `daq fit` writes it"),
+    _met(".*", 429, "too-many", "too many requests", "ask less often"),
+    _met(".*", 503, "database", "the database: database is locked", "try again"),
+    _met(f"{MOVES}|get .*/(gains|process)$|post .*/(connect|reset)$", 503, "not-reached",
+         "robot ma2000 is not connected", "check cable and supply, then connect again"),
+    _met(".*", 507, "no-room", "the disk of the database is full", "make room on it"),
+)  # fmt: skip
