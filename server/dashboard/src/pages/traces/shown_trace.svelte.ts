@@ -1,0 +1,75 @@
+/** One trace that is shown: its signals, finer where it is zoomed to, what it says about itself, and its simulation. */
+
+import { api, ask, asProblem, here, type Problem, type TraceDetails, type TraceSignals } from '../../lib/api';
+import { isThinned, refined, type Range, type Signals } from '../../lib/traces/columns';
+import { serves, toAsk } from '../../lib/traces/zoom';
+import { Simulating } from './simulating.svelte';
+
+/** Points of a plot. */
+const POINTS = 3000;
+/** Points between two cursors: measures are taken of every sample. */
+const EXACT = 20_000;
+
+export class ShownTrace {
+  details = $state.raw<TraceDetails | null>(null);
+  problem = $state.raw<Problem | null>(null);
+  readonly simulating: Simulating;
+  private whole = $state.raw<Signals | null>(null);
+  private part = $state.raw<Signals | null>(null);
+  private asked: Range | null = null;
+  private turn = 0;
+  /** What is drawn: the whole, finer where it is zoomed to. */
+  signals: Signals | null = $derived(this.whole && this.part ? refined(this.whole, this.part) : this.whole);
+
+  constructor(readonly id: string) {
+    this.simulating = new Simulating(id);
+  }
+
+  get name(): string {
+    return this.details?.entry.name ?? this.details?.entry.kind ?? this.id;
+  }
+
+  async load(): Promise<void> {
+    this.problem = null;
+    try {
+      const params = { path: { ...here(), trace: this.id } };
+      const [details, signals] = await Promise.all([
+        ask(api.GET('/api/v1/robots/{robot}/traces/{trace}', { params })),
+        this.ask(POINTS),
+      ]);
+      this.details = details;
+      this.whole = signals;
+    } catch (error) {
+      this.problem = asProblem(error);
+    }
+  }
+
+  /** Asks for every sample of a part, where samples were left out and it is not there yet. */
+  async refine(shown: Range): Promise<void> {
+    const { whole } = this;
+    if (whole === null || !isThinned(whole) || serves(this.asked, shown)) return;
+    const turn = ++this.turn;
+    this.asked = toAsk(shown, [whole.time[0]!, whole.time.at(-1)!]);
+    try {
+      const part = await this.ask(POINTS, this.asked);
+      if (turn === this.turn) this.part = part;
+    } catch (error) {
+      if (turn !== this.turn) return;
+      this.asked = null;
+      this.problem = asProblem(error);
+    }
+  }
+
+  /** Every sample between two moments, for measures. Throws a Problem. */
+  async exactly(between: Range): Promise<Signals> {
+    return this.whole !== null && !isThinned(this.whole) ? this.whole : this.ask(EXACT, between);
+  }
+
+  private async ask(points: number, range?: Range): Promise<TraceSignals> {
+    const query = { points, ...(range ? { start: range[0], end: range[1] } : {}) };
+    const params = { path: { ...here(), trace: this.id }, query };
+    return ask(
+      api.GET('/api/v1/robots/{robot}/traces/{trace}/data.json', { params }),
+    ) as Promise<TraceSignals>;
+  }
+}
