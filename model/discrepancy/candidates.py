@@ -143,8 +143,7 @@ def _candidate(
             wider = model.with_effect(law, joints)
         except SpecError:
             return None  # the model refuses the pair, such as backlash beside compliance
-        new = [p for p in wider.parameters if p.name not in model.by_name]
-        free = tuple(p for p in new if not p.name.endswith(".damping"))
+        free = tuple(p for p in wider.parameters if p.name not in model.by_name)
     full = tuple(_full(free, trial) for trial in trials)
     return Candidate(name, joints, wider, free, full, proportional, _full_bounds(free, bounds or {}))
 

@@ -38,9 +38,3 @@ def decide(ranking: Ranking, thresholds: Thresholds, collected: float = 0.0) -> 
 def same_answer(one: Refitted, other: Refitted) -> bool:
     """Whether two candidates say the same of the machine."""
     return one.candidate.name == other.candidate.name and one.candidate.joints == other.candidate.joints
-
-
-def explained_share(before: float, after: float, floor: float = 1.0) -> float:
-    """Share of the misfit above what noise leaves that is gone."""
-    excess = before - floor
-    return 1.0 if excess <= 0 else (before - after) / excess

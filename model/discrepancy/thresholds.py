@@ -14,12 +14,11 @@ class Thresholds:
         echo: share of the evidence already collected that a further effect must bring besides: where the law of an
             effect that has been added is not exactly the arm's, what is left of it is no effect of its own.
         margin: evidence over the next answer from which one name is given, instead of a group.
-        unexplained: misfit (mean square of the weighted residual) above which something is missing that none of the
-            known effects is.
-        least_share: share of the excess misfit that an answer must explain, or it only resembles what is missing.
-        worse: rise of the held-out sum of squares, in its own standard deviations, at which a step is rejected.
-        convincing: evidence below which the held-out error must fall, however little; above it, it must not rise beyond
-            its scatter, for a trace held out need not excite the effect.
+        unexplained: variance of a joint's error above its floor, in floors, above which something is missing that none
+            of the known effects is. unnamed: the same on the traces fitted to, while no effect has been added.
+        least_share: share of a joint's excess that effects must explain, or they only resemble what is missing.
+        worse: rise of the held-out sum of squares, in its own standard deviations, at which a step is rejected. It is
+            also rejected where the rise takes the evidence below what is significant.
         close: evidence within which rivals are fitted to their ends before they are compared.
         quiet_joint: misfit of a joint up to which, once an effect has been added, nothing more is looked for there.
         interesting: gain of a probe from which a candidate is worth a fit.
@@ -28,10 +27,10 @@ class Thresholds:
     significant: float = 12.0
     echo: float = 0.05
     margin: float = 4.0
-    unexplained: float = 1.12
-    least_share: float = 0.8
+    unexplained: float = 0.3
+    unnamed: float = 0.12
+    least_share: float = 0.88
     worse: float = 2.0
-    convincing: float = 100.0
     close: float = 40.0
     quiet_joint: float = 1.08
     interesting: float = 12.0

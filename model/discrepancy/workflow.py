@@ -27,7 +27,7 @@ from model.discrepancy.answer import (
 )
 from model.discrepancy.candidates import OF_THE_CONTROLLER
 from model.discrepancy.controller_check import ControllerFinding, check_controller, with_used_set_points
-from model.discrepancy.decision import Decision, decide, explained_share
+from model.discrepancy.decision import Decision, decide
 from model.discrepancy.distortion import sum_of_contributions
 from model.discrepancy.holdout import HeldOut, errors, excess_removed, held_out
 from model.discrepancy.next_experiment import Asked, Asker, rivals_of
@@ -42,6 +42,7 @@ from model.discrepancy.remaining import shapes
 from model.discrepancy.search import Point, point_at, searched, settled
 from model.discrepancy.thresholds import THRESHOLDS, Thresholds
 from model.discrepancy.torque_space.diagnose import diagnose_torques
+from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn
 from model.discrepancy.where import located
 from model.fitting.fit import INTERVAL
 from model.fitting.unknowns import Unknown
@@ -96,11 +97,11 @@ def diagnose(
     point = _tolerances(observation, given)
     case = _case(observation, held_out(known, holdout), point, traces, options)
     steps = [_controller_step(model, observation, f) for f in findings]
-    current, verdict = judge(observation, point), None
-    first = current
+    current, answered = judge(observation, point), None
+    first, passed = current, [current] * len(findings)
     rivals: tuple[Refitted, ...] = ()
     probes: tuple[Probed, ...] = ()
-    while verdict is None:
+    while answered is None:
         number = len(steps) - len(findings)
         share = 0.1 + 0.8 * number / options.most_steps
         joints = _to_search(case, current, number)
@@ -111,16 +112,22 @@ def diagnose(
         step, following = _turn(case, current, turn, decision)
         if step is not None:
             steps.append(step)
+            passed.append(current)
             rivals = rivals_of(turn, decision) or rivals
-        verdict = _verdict(case, steps, step, first, following, number + 1)
         current = following
+        if step is None or not step.adopted or step.group or number + 1 == options.most_steps:
+            left = _unexplained(case, model, first, current, steps)
+            answered = verdict(steps, step, left)
     progress(0.95, "writing the answer")
     remaining: tuple[RemainingShape, ...] = ()
-    if verdict == "unknown-effect":
+    if answered == "unknown-effect":
+        wrong = first_to_withdraw(steps, left, len(findings))
+        if wrong is not None:
+            current, steps = passed[wrong], [*steps[:wrong], *(withdrawn(s, left) for s in steps[wrong:])]
         remaining = _remaining(case, current.point)
-    asked = Asked(None) if ask is None else ask.after(verdict, observation, current.point, rivals, traces)
+    asked = Asked(None) if ask is None else ask.after(answered, observation, current.point, rivals, traces)
     answer = Diagnosis(
-        verdict=verdict, summary=_summary(verdict, steps, remaining), steps=tuple(steps), remaining=remaining,
+        verdict=answered, summary=_summary(answered, steps, remaining), steps=tuple(steps), remaining=remaining,
         model_before=model, model_after=_adopted(model, current.point, case.names),
         traces=case.names, holdout=tuple(t.record.trace_id for t in holdout),
         rmse_fit=errors(observation, model, given.residuals, current.point.residuals, case.floor),
@@ -247,8 +254,7 @@ def _rejected(case: _Case, best: Refitted, before: Signals, after: Signals) -> s
     if case.held is None:
         return None
     rise, deviation = case.held.rise(before, after)
-    bearable = case.thresholds.worse * deviation if best.evidence >= case.thresholds.convincing else 0.0
-    if rise > bearable:
+    if rise > min(case.thresholds.worse * deviation, best.evidence - case.thresholds.significant):
         return (
             f"the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} variances of "
             "a reading"
@@ -256,22 +262,12 @@ def _rejected(case: _Case, best: Refitted, before: Signals, after: Signals) -> s
     return None
 
 
-def _verdict(
-    case: _Case, steps: Sequence[Step], step: Step | None, first: Judged, current: Judged, turns: int
-) -> Verdict | None:
-    """The verdict, or None to go on."""
-    adopted = [s for s in steps if s.adopted]
-    if step is not None and step.adopted and not step.group and turns < case.options.most_steps:
-        return None
-    unexplained = current.point.misfit > case.thresholds.unexplained
-    share = explained_share(first.point.misfit, current.point.misfit)
-    if unexplained and share < case.thresholds.least_share:
-        return "unknown-effect"
-    if step is not None and step.group:
-        return "ambiguous"
-    if adopted:
-        return "named"
-    return "unknown-effect" if unexplained else "nothing-significant"
+def _unexplained(case: _Case, model: Model, first: Judged, current: Judged, steps: Sequence[Step]) -> tuple[int, ...]:
+    """Joints on which something is left, on fitted or held-out traces."""
+    before, after = first.point, current.point
+    fitted = errors(case.observation, model, before.residuals, after.residuals, case.floor)
+    held = _held_errors(case, model, *_held(case, before, after))
+    return unexplained(fitted, held, case.thresholds, named=any(s.adopted for s in steps))
 
 
 def _left(observation: Observation, point: Point) -> Left:

@@ -8,13 +8,12 @@ from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.machine import Machine
 from model.discrepancy.answer import Diagnosis, SignalError, Step, Verdict
+from model.discrepancy.holdout import LEAST_EXCESS
 from model.trial.conventions import true_parameters
 from model.trial.truth import Detectability, HiddenEffect, Kind, Truth, merged
 
 FIRST = 3
 """Names that are looked at for "among the first three"."""
-LEAST_EXCESS = 0.1
-"""Held-out variance above the floor, in floors, from which on a share of it that was removed means anything."""
 
 Place = Literal["named", "group", "unknown-effect", "nothing-significant", "failed"]
 

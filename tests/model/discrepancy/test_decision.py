@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 
-from model.discrepancy.decision import decide, explained_share
+from model.discrepancy.decision import decide
 from model.discrepancy.ranking import Ranking
 from model.discrepancy.thresholds import Thresholds
 
@@ -49,8 +49,3 @@ def test_an_echo_of_what_was_found_is_no_effect() -> None:
     small = ranking(("dead_zone", 3, 30.0))
     assert decide(small, LINES).kind == "named"
     assert decide(small, LINES, collected=1000.0).kind == "nothing"
-
-
-def test_share_of_the_excess() -> None:
-    assert explained_share(3.0, 1.5) == pytest.approx(0.75)
-    assert explained_share(0.98, 0.97) == 1.0

@@ -1,0 +1,58 @@
+"""What is answered once no further effect is found, and what an answer that only resembles the truth takes back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from model.discrepancy.answer import SignalError, Step, Verdict
+from model.discrepancy.thresholds import Thresholds
+
+
+def unexplained(
+    fitted: Sequence[SignalError], held: Sequence[SignalError], thresholds: Thresholds, *, named: bool
+) -> tuple[int, ...]:
+    """Joints on which more is left than noise leaves, and than a law that is only nearly the arm's may leave.
+
+    Args:
+        fitted, held: errors before any effect was added, and now, on fitted and on held-out traces.
+        named: whether effects have been added.
+    """
+    found = []
+    for errors, least in (
+        (fitted, thresholds.unexplained if named else thresholds.unnamed),
+        (held, thresholds.unexplained),
+    ):
+        for e in errors:
+            before, after = ((size / e.floor) ** 2 - 1.0 for size in (e.before, e.after))
+            if after > max(least, (1.0 - thresholds.least_share) * before if named else 0.0):
+                found.append(e.joint)
+    return tuple(dict.fromkeys(found))
+
+
+def verdict(steps: Sequence[Step], last: Step | None, left: Sequence[int]) -> Verdict:
+    """The answer, from the steps, the last of them if the last turn made one, and the joints that stay unexplained."""
+    if left:
+        return "unknown-effect"
+    if last is not None and last.group:
+        return "ambiguous"
+    return "named" if any(s.adopted for s in steps) else "nothing-significant"
+
+
+def first_to_withdraw(steps: Sequence[Step], left: Sequence[int], proved: int) -> int | None:
+    """Index of the first step on a joint that stays unexplained: with it the search took a wrong way.
+
+    Args:
+        proved: steps at the beginning that the controller's own numbers prove; they stay.
+    """
+    for k in range(proved, len(steps)):
+        step = steps[k]
+        if step.adopted and (not step.joints or set(step.joints) & set(left)):
+            return k
+    return None
+
+
+def withdrawn(step: Step, left: Sequence[int]) -> Step:
+    """The step, not taken into the model after all."""
+    where = f"joint{'s' if len(left) > 1 else ''} {', '.join(map(str, left))}"
+    why = f"it only resembles what is missing: with all that was found, {where} still disagrees beyond noise"
+    return step.model_copy(update={"adopted": False, "rejected_because": why}) if step.adopted else step
