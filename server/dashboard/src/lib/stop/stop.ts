@@ -93,6 +93,11 @@ export class StopCall {
   }
 }
 
+/** What the service says beyond what the head of the message says already. */
+export function detailOf(text: string): string {
+  return sentence(text.replace(/^stop[^:]*: /i, '').trim());
+}
+
 function sentence(text: string): string {
   const first = text.charAt(0).toUpperCase() + text.slice(1);
   return /[.!?]$/.test(first) ? first : `${first}.`;

@@ -1,0 +1,136 @@
+"""A real Chromium on a real service, whose robot is a mock in real time that tests can ask behind its back."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from playwright.sync_api import (
+    Browser,
+    BrowserContext,
+    ConsoleMessage,
+    Page,
+    Request,
+    ViewportSize,
+    expect,
+    sync_playwright,
+)
+
+from daq.transport.mock_process import MockProcess
+from tests.server.service import Service
+
+NAMES = ("chromium", "chromium-browser")
+OPTIONS = [
+    "--use-angle=swiftshader",  # 3-D without a graphics card
+    "--enable-unsafe-swiftshader",
+    "--disable-features=SpareRendererForSitePerProcess",  # a process that would be left when a test has ended
+]
+PATIENCE_MS = 30_000
+"""For whatever is waited for: a machine may be busy. Nothing is tested by how long it takes."""
+TABLET: ViewportSize = {"width": 820, "height": 1180}
+TABLET_ON_ITS_SIDE: ViewportSize = {"width": 1024, "height": 768}
+WIDE: ViewportSize = {"width": 1280, "height": 800}
+
+
+def find_chromium() -> str:
+    """Where the system's Chromium is. Skips the test where there is none."""
+    for name in NAMES:
+        if (found := shutil.which(name)) is not None:
+            return found
+    pytest.skip("needs Chromium: apt install chromium (.ci/run does)")
+
+
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """The system's Chromium, without a window."""
+    path = find_chromium()
+    expect.set_options(timeout=PATIENCE_MS)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=OPTIONS)
+        yield browser
+        browser.close()
+
+
+class MockControl:
+    """The control port of the mock: what the board itself says, and the plug of its cable."""
+
+    def __init__(self, mock: MockProcess) -> None:
+        assert mock.control is not None
+        parts = urlsplit(mock.control)
+        assert parts.hostname is not None
+        assert parts.port is not None
+        self._connection = socket.create_connection((parts.hostname, parts.port), timeout=30)
+        self._lines = self._connection.makefile("rb")
+
+    def ask(self, do: str, **more: object) -> dict[str, Any]:
+        """One command; its answer."""
+        self._connection.sendall(json.dumps({"do": do, **more}).encode() + b"\n")
+        answer: dict[str, Any] = json.loads(self._lines.readline())
+        assert answer["ok"], answer
+        return answer
+
+    def close(self) -> None:
+        """Hangs up."""
+        self._lines.close()
+        self._connection.close()
+
+
+@dataclass
+class Dashboard:
+    """One tab of a browser on the service's page."""
+
+    service: Service
+    mock: MockControl
+    page: Page
+    complaints: list[str] = field(default_factory=list)
+    """What the browser complained about: errors on its console, requests to elsewhere. A test fails that leaves any."""
+
+    def open(self, path: str = "live") -> Page:
+        """The page `path` once it is there."""
+        self.page.goto(f"{self.service.url}/#/{path}")
+        expect(self.page.get_by_role("heading", level=1).first).to_be_attached()
+        return self.page
+
+    def until_live(self) -> Page:
+        """The Live page, once samples arrive."""
+        self.open("live")
+        expect(self.page.get_by_role("banner").get_by_text("live 50 Hz").or_(self.degraded)).to_be_visible()
+        return self.page
+
+    @property
+    def degraded(self) -> Any:
+        """What stands in the place of `live 50 Hz` while a busy machine lets requests be repeated."""
+        return self.page.get_by_role("banner").get_by_text("link degraded")
+
+    def forgive(self) -> None:
+        """A lost connection is an error on the console, and is what this test is about."""
+        self.complaints.clear()
+
+
+def watched(context: BrowserContext, service: Service, mock: MockControl) -> Dashboard:
+    """A new tab, with everything noted that the browser complains about."""
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE_MS)
+    tab = Dashboard(service, mock, page)
+    here = urlsplit(service.url).hostname
+
+    def said(message: ConsoleMessage) -> None:
+        if message.type in ("error", "warning"):
+            tab.complaints.append(f"{message.type}: {message.text}")
+
+    def requested(request: Request) -> None:
+        parts = urlsplit(request.url)
+        if parts.scheme not in ("data", "blob") and parts.hostname != here:
+            tab.complaints.append(f"a request to elsewhere: {request.url}")
+
+    page.on("console", said)
+    page.on("pageerror", lambda error: tab.complaints.append(f"exception: {error}"))
+    page.on("request", requested)
+    return tab

@@ -1,0 +1,53 @@
+"""One service, one mock and one Chromium for all tests of the dashboard; a new tab for each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser
+
+from daq.transport.mock_process import start_mock
+from daq.transport.url import MockPort, parse_port_url
+from tests.server.dashboard.browser import WIDE, Dashboard, MockControl, chromium, find_chromium, watched
+from tests.server.service import Service, running_service
+
+
+@pytest.fixture(scope="package")
+def browser() -> Iterator[Browser]:
+    """The system's Chromium; a test that asks for it is skipped where there is none."""
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="package")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Service, MockControl]]:
+    """A service, connected to a mock in real time, and the mock's own control port."""
+    find_chromium()
+    port = parse_port_url("mock://?pty=1&seed=3")
+    assert isinstance(port, MockPort)
+    mock = start_mock(port)
+    control = MockControl(mock)
+    try:
+        with running_service(tmp_path_factory.mktemp("dashboard"), mock.url) as service:
+            service.until_connected()
+            yield service, control
+    finally:
+        control.close()
+        mock.close()
+
+
+@pytest.fixture
+def dashboard(browser: Browser, served: tuple[Service, MockControl]) -> Iterator[Dashboard]:
+    """A tab on a service as every test wants to find it: not stopped, nobody in control, the queue open and empty."""
+    service, mock = served
+    service.until_connected()
+    for one in service.robot.get("/queue/experiments").json():
+        service.robot.post(f"/experiments/{one['id']}/cancel")
+    service.robot.post("/reset", json={})
+    service.robot.post("/queue/resume", json={})
+    context = browser.new_context(viewport=WIDE, color_scheme="light")
+    tab = watched(context, service, mock)
+    yield tab
+    context.close()
+    assert tab.complaints == []

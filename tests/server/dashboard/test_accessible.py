@@ -1,0 +1,68 @@
+"""Every page, light and dark: nothing that axe finds fault with; usable with the keyboard alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.repository.tracked import ROOT
+from tests.server.dashboard.browser import WIDE, Dashboard, MockControl, watched
+from tests.server.dashboard.test_stop import PAGES
+from tests.server.service import Service
+
+pytestmark = pytest.mark.browser
+AXE = ROOT / "server" / "dashboard" / "node_modules" / "axe-core" / "axe.min.js"
+RULES = {
+    "runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"],
+    "resultTypes": ["violations"],
+}
+
+
+def _told(violation: dict[str, Any]) -> str:
+    places = ", ".join(str(node["target"]) for node in violation["nodes"][:4])
+    return f"{violation['id']}: {violation['help']}: {places}: {violation['nodes'][0].get('failureSummary', '')}"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_no_fault_on_any_page(browser: Browser, served: tuple[Service, MockControl], scheme: str) -> None:
+    assert Path(AXE).is_file(), "make page installs it"
+    context = browser.new_context(viewport=WIDE, color_scheme=scheme)  # type: ignore[arg-type]
+    context.add_init_script(path=AXE)
+    tab = watched(context, *served)
+    found = []
+    for path in PAGES:
+        page = tab.open(path)
+        page.wait_for_load_state("networkidle")
+        result = page.evaluate("rules => axe.run(document, rules)", RULES)
+        found += [f"{path}: {_told(violation)}" for violation in result["violations"]]
+    context.close()
+    assert found == []
+    assert tab.complaints == []
+
+
+def test_the_keyboard_reaches_every_page_and_skips_what_is_repeated(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    page.keyboard.press("Tab")
+    expect(page.get_by_role("link", name="Skip to the content")).to_be_focused()
+    page.keyboard.press("Tab")
+    expect(page.get_by_role("link", name="Live")).to_be_focused()
+    for name in ("Experiments", "Traces", "Models", "Diagnosis", "System"):
+        page.keyboard.press("Tab")
+        expect(page.get_by_role("link", name=name, exact=True)).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("heading", level=1, name="System")).to_be_visible()
+
+
+def test_the_theme_is_the_systems_until_it_is_chosen_and_the_choice_is_kept(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    root = page.locator("html")
+    expect(root).to_have_attribute("data-theme", "light")
+    page.emulate_media(color_scheme="dark")
+    expect(root).to_have_attribute("data-theme", "dark")
+    page.get_by_role("button", name="Switch to light").click()
+    expect(root).to_have_attribute("data-theme", "light")
+    page.reload()
+    expect(root).to_have_attribute("data-theme", "light")

@@ -1,0 +1,121 @@
+"""The Live page shows what the service says, and moves the arm for whoever has the control."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.server.dashboard.browser import Dashboard
+
+pytestmark = pytest.mark.browser
+RAMP = {"spec": {"trajectory": {"kind": "ramp", "amplitude": 0.1, "duration": 0.5}, "joints": [1]}}
+
+
+def _cell(page: Page, joint: int, column: int) -> str:
+    row = page.get_by_role("row").filter(has=page.get_by_role("rowheader", name=f"J{joint}"))
+    return row.get_by_role("cell").nth(column).inner_text()
+
+
+def _number(text: str) -> float:
+    return float(text.replace("−", "-"))
+
+
+def test_numbers_are_those_of_the_robot_with_unit_and_age(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    expect(page.get_by_text(re.compile(r"^\d+ ms old · tick \d+"))).to_be_visible()
+    measured = dashboard.service.status()["sample"]["position"][1]
+    assert abs(_number(_cell(page, 2, 1)) - measured * 57.29578) < 0.5
+    expect(page.get_by_role("columnheader", name="Position °")).to_be_visible()
+    page.get_by_role("button", name="rad", exact=True).click()
+    expect(page.get_by_role("columnheader", name="Position rad")).to_be_visible()
+    assert abs(_number(_cell(page, 2, 1)) - measured) < 0.01
+    page.get_by_role("button", name="degrees").click()
+
+
+def test_an_experiment_is_seen_to_run_and_its_motion_in_the_numbers(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    before = _number(_cell(page, 1, 0))
+    sent = dashboard.service.robot.post("/experiments", json=RAMP)
+    assert sent.status_code == 201, sent.text
+    expect(page.get_by_text("An experiment runs")).to_be_visible()
+    ended = dashboard.service.end_of(sent.json()["id"])
+    assert ended["state"] == "done", ended
+    expect(page.get_by_text("Nothing runs, nothing waits.")).to_be_visible()
+    assert abs(_number(_cell(page, 1, 0)) - before) > 2
+
+
+def test_charts_are_drawn_with_the_past_when_the_page_is_loaded(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    for name in ("Position and set point", "Error", "Drive"):
+        chart = page.get_by_role("img", name=name)
+        expect(chart.locator("canvas")).to_be_visible()
+    coloured = (
+        page.get_by_role("img", name="Position and set point")
+        .locator("canvas")
+        .evaluate(
+            """canvas => {
+            const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+            let found = 0;
+            for (let at = 0; at < data.length; at += 4)
+                if (data[at + 3] > 200 && Math.abs(data[at] - data[at + 2]) > 60) found += 1;
+            return found;
+        }"""
+        )
+    )
+    assert coloured > 500
+
+
+def test_a_joint_can_be_hidden_and_the_choice_is_kept(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    page.get_by_role("button", name="Joint 6").click()
+    page.reload()
+    expect(page.get_by_role("button", name="Joint 6")).to_have_attribute("aria-pressed", "false")
+    expect(page.get_by_role("img", name="joints 1, 2, 3, 4, 5 over").first).to_be_visible()
+
+
+def test_a_joint_moves_while_its_key_is_held_and_holds_when_it_is_let_go(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    page.get_by_role("button", name="Take the control").click()
+    before = dashboard.mock.ask("state")["set_points"][0]
+    button = page.get_by_role("button", name="Joint 1 backward while held")
+    button.hover()
+    page.mouse.down()
+    expect(page.get_by_text("Jogged by hand")).to_be_visible()
+    while abs(dashboard.mock.ask("state")["set_points"][0] - before) < 5:
+        page.wait_for_timeout(20)  # lets the page repeat its command; the test's own time limit ends the wait
+    page.mouse.up()
+    page.get_by_role("button", name="Keep this posture").click()
+    expect(page.get_by_text("Move to J1")).to_be_visible()
+    page.get_by_role("button", name="Give it back").click()
+    expect(page.get_by_role("button", name="Take the control")).to_be_visible()
+    assert dashboard.service.robot.get("/control").json()["holder"] == "nobody"
+
+
+def test_the_gripper_closes_for_whoever_has_the_control(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    page.get_by_role("button", name="Take the control").click()
+    page.get_by_role("button", name="Close", exact=True).click()
+    expect(page.get_by_text("Gripper: closed")).to_be_visible()
+    assert dashboard.service.robot.get("/process").json()["gripper"] == "closed"
+    page.get_by_role("button", name="Output 3").click()
+    expect(page.get_by_role("button", name="Output 3")).to_have_attribute("aria-pressed", "true")
+    assert dashboard.service.robot.get("/process").json()["outputs"][3]
+    page.get_by_role("button", name="Open", exact=True).click()
+    page.get_by_role("button", name="Output 3").click()
+    expect(page.get_by_role("button", name="Output 3")).to_have_attribute("aria-pressed", "false")
+    page.get_by_role("button", name="Give it back").click()
+
+
+def test_the_arm_is_shown_in_3d(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    expect(page.get_by_label("The arm now, in 3-D")).to_be_visible()
+
+
+def test_the_system_page_tells_health_storage_and_what_happened(dashboard: Dashboard) -> None:
+    page = dashboard.open("system")
+    expect(page.get_by_role("heading", name="Health")).to_be_visible()
+    expect(page.get_by_text("ready", exact=True)).to_be_visible()
+    expect(page.get_by_text(dashboard.service.client.get("/system").json()["storage"]["traces_folder"])).to_be_visible()
+    expect(page.get_by_role("cell", name="connection").first).to_be_visible()

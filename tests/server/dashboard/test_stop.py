@@ -1,0 +1,89 @@
+"""Stop, from the page: at once, from everywhere, and with the truth about what became of it."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.server.dashboard.browser import TABLET, TABLET_ON_ITS_SIDE, Dashboard
+
+pytestmark = pytest.mark.browser
+CONFIRMED = "[role=alert] [data-stop=confirmed]"
+PAGES = ("live", "experiments", "traces", "models", "diagnosis", "system")
+
+
+@contextmanager
+def hanging(process: int) -> Iterator[None]:
+    """The process does nothing at all meanwhile."""
+    os.kill(process, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(process, signal.SIGCONT)
+
+
+def test_a_pressed_stop_freezes_the_board_before_it_is_let_go(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    assert not dashboard.mock.ask("state")["frozen"]
+    button = page.get_by_role("button", name="STOP")
+    button.hover()
+    page.mouse.down()
+    expect(page.locator(CONFIRMED)).to_be_visible()
+    assert dashboard.mock.ask("state")["frozen"]
+    page.mouse.up()
+    expect(page.locator(CONFIRMED)).to_contain_text("Stopped, confirmed by the board")
+    expect(page.get_by_text("The arm is stopped.")).to_be_visible()
+
+
+def test_the_key_stops_also_while_somebody_types(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    page.get_by_role("button", name="Take the control").click()
+    page.get_by_label("Wait").focus()
+    page.keyboard.press("F8")
+    expect(page.locator(CONFIRMED)).to_be_visible()
+    assert dashboard.mock.ask("state")["frozen"]
+    page.get_by_role("button", name="Give it back").click()
+    expect(page.get_by_role("button", name="Take the control")).to_be_visible()
+
+
+def test_stop_is_on_every_page_also_on_a_tablet(dashboard: Dashboard) -> None:
+    for size in (TABLET, TABLET_ON_ITS_SIDE):
+        dashboard.page.set_viewport_size(size)
+        for path in PAGES:
+            dashboard.open(path)
+            button = dashboard.page.get_by_role("button", name="STOP")
+            expect(button).to_be_in_viewport(ratio=1)
+            dashboard.page.mouse.wheel(0, 2000)
+            expect(button).to_be_in_viewport(ratio=1)
+
+
+def test_a_stop_that_nobody_answers_is_not_called_delivered_and_one_that_arrives_late_is_told(
+    dashboard: Dashboard,
+) -> None:
+    page = dashboard.until_live()
+    with hanging(dashboard.service.process.pid):
+        page.keyboard.press("F8")
+        message = page.locator("[data-stop='not delivered']")
+        expect(message).to_contain_text("Stop NOT DELIVERED")
+        expect(message).to_contain_text("Use the emergency stop")
+        assert not dashboard.mock.ask("state")["frozen"]
+    expect(page.locator(CONFIRMED)).to_be_visible()
+    assert dashboard.mock.ask("state")["frozen"]
+    dashboard.forgive()
+
+
+def test_a_reset_ends_the_stop_and_moves_nothing(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    before = dashboard.mock.ask("state")["set_points"]
+    page.keyboard.press("F8")
+    expect(page.get_by_text("The arm is stopped.")).to_be_visible()
+    page.get_by_role("button", name="Reset").click()
+    expect(page.get_by_text("The arm is stopped.")).not_to_be_attached()
+    state = dashboard.mock.ask("state")
+    assert not state["frozen"]
+    assert all(abs(one - other) <= 2 for one, other in zip(before, state["set_points"], strict=True))

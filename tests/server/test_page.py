@@ -1,0 +1,76 @@
+"""How the page's files reach a browser."""
+
+from __future__ import annotations
+
+import asyncio
+import gzip
+from pathlib import Path
+
+import httpx
+import pytest
+from fastapi import FastAPI
+
+from server.page import FOLDER, NOT_BUILT, is_built, page_router
+
+SCRIPT = "assets/index-1a2b.js"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A page of three files, as the build leaves them."""
+    (tmp_path / "assets").mkdir()
+    (tmp_path / "index.html").write_text("<!doctype html>")
+    (tmp_path / SCRIPT).write_text("let live;")
+    (tmp_path / f"{SCRIPT}.gz").write_bytes(gzip.compress(b"let live;"))
+    (tmp_path / "built-from.txt").write_text("digest")
+    return tmp_path
+
+
+def get(folder: Path, path: str, **headers: str) -> httpx.Response:
+    """The answer of a server of the page in `folder`."""
+    app = FastAPI()
+    app.include_router(page_router(folder))
+
+    async def asked() -> httpx.Response:
+        transport = httpx.ASGITransport(app)
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
+            return await client.get(path, headers={name.replace("_", "-"): value for name, value in headers.items()})
+
+    return asyncio.run(asked())
+
+
+def test_the_page_is_asked_for_again_and_its_parts_are_kept_for_ever(folder: Path) -> None:
+    page, script = get(folder, "/"), get(folder, f"/{SCRIPT}")
+    assert page.headers["content-type"] == "text/html; charset=utf-8"
+    assert page.headers["cache-control"] == "no-cache"
+    assert "immutable" in script.headers["cache-control"]
+    again = get(folder, "/", If_None_Match=page.headers["etag"])
+    assert (again.status_code, again.content) == (304, b"")
+
+
+def test_a_browser_that_takes_it_gets_the_packed_form(folder: Path) -> None:
+    packed = get(folder, f"/{SCRIPT}", Accept_Encoding="gzip")
+    assert packed.headers["content-encoding"] == "gzip"
+    plain = get(folder, f"/{SCRIPT}", Accept_Encoding="identity")
+    assert "content-encoding" not in plain.headers
+    assert packed.text == plain.text == "let live;"
+
+
+@pytest.mark.parametrize("name", ["built-from.txt", f"{SCRIPT}.gz", "nothing.js", "assets"])
+def test_nothing_else_is_served(folder: Path, name: str) -> None:
+    assert get(folder, f"/{name}").status_code == 404
+
+
+def test_a_page_that_is_not_built_says_how_to_build_it(tmp_path: Path) -> None:
+    answer = get(tmp_path, "/")
+    assert (answer.status_code, answer.text) == (503, NOT_BUILT + "\n")
+
+
+def test_the_first_load_is_small() -> None:
+    assert is_built(), NOT_BUILT
+    index = (FOLDER / "index.html").read_text("utf-8")
+    first = [path for path in (FOLDER / "assets").iterdir() if path.name in index and path.suffix in (".js", ".css")]
+    sent = sum(len(path.with_name(f"{path.name}.gz").read_bytes()) for path in first)
+    font = next(FOLDER.glob("assets/inter-latin-wght-normal-*.woff2")).stat().st_size
+    assert len(first) >= 2
+    assert sent + font < 300_000
