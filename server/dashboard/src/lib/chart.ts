@@ -183,7 +183,7 @@ function drawEnds(plot: uPlot, drawing: ChartDrawing): void {
   const ends: { y: number; text: string; colour: string }[] = [];
   drawing.series.forEach((one, index) => {
     if (one.end === undefined || plot.series[index + 1]?.show === false) return;
-    const last = lastValue(plot.data[index + 1] as ArrayLike<number | null> | undefined);
+    const last = lastValue(plot.data[index + 1] as ArrayLike<number | null> | undefined, lastShown(plot));
     if (last !== null) ends.push({ y: plot.valToPos(last, 'y', true), text: one.end, colour: one.colour });
   });
   const places = apart(
@@ -222,8 +222,17 @@ export function apart(wanted: readonly number[], distance: number, low: number, 
   return places;
 }
 
-function lastValue(column: ArrayLike<number | null> | undefined): number | null {
-  for (let row = (column?.length ?? 0) - 1; row >= 0; row -= 1) {
+/** The last row that is in the picture. */
+function lastShown(plot: uPlot): number {
+  const time = plot.data[0];
+  const high = plot.scales['x']?.max ?? Infinity;
+  let row = time.length - 1;
+  while (row > 0 && (time[row] as number) > high) row -= 1;
+  return row;
+}
+
+function lastValue(column: ArrayLike<number | null> | undefined, from: number): number | null {
+  for (let row = from; row >= 0; row -= 1) {
     const value = column?.[row] ?? null;
     if (value !== null) return value;
   }
