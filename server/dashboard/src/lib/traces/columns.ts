@@ -48,10 +48,16 @@ export function refined(whole: Signals, part: Signals): Signals {
   };
 }
 
-/** The column of one signal of one joint (from 1), times `scale`; null where the trace has none. */
-export function columnOf(signals: Signals, name: SignalName, joint: number, scale = 1): number[] | null {
+/** The column of one signal of one joint (from 1), less `begin`, times `scale`; null where the trace has none. */
+export function columnOf(
+  signals: Signals,
+  name: SignalName,
+  joint: number,
+  scale = 1,
+  begin = 0,
+): number[] | null {
   const row = signals[name]?.[signals.joints.indexOf(joint)];
-  return row === undefined ? null : scale === 1 ? [...row] : row.map((value) => value * scale);
+  return row === undefined ? null : row.map((value) => (value - begin) * scale);
 }
 
 /** From the first to the last moment of all of them; null where there is none. */

@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { columnOf, isThinned, refined, rmsDifference, wholeRange, type Signals } from './columns';
+import { linkInWords } from './counters';
 import { moved, serves, toAsk, within, zoomed } from './zoom';
 
 const signals = (time: number[], samples = time.length): Signals => ({
@@ -38,6 +39,7 @@ describe('a finer part of a trace', () => {
 describe('columns', () => {
   it('are found by joint, and scaled', () => {
     expect(columnOf(signals([1, 2]), 'position', 3, 2)).toEqual([-2, -4]);
+    expect(columnOf(signals([1, 2]), 'position', 1, 2, 10)).toEqual([0, 20]);
     expect(columnOf(signals([1, 2]), 'position', 2)).toBeNull();
     expect(columnOf(signals([1, 2]), 'error', 1)).toBeNull();
   });
@@ -82,5 +84,19 @@ describe('zooming', () => {
     expect(serves(asked, [10, 11])).toBe(false);
     expect(serves(null, [10, 11])).toBe(false);
     expect(toAsk([1, 99], WHOLE)).toEqual([0, 100]);
+  });
+});
+
+describe('counters of the link', () => {
+  it('tell what went wrong, and how long an answer took', () => {
+    const counters = {
+      requests: 500,
+      retries: 2,
+      torn: 0,
+      round_trip_p50_s: 0.00717,
+      round_trip_p99_s: 0.0299,
+    };
+    expect(linkInWords(counters)).toBe('500 requests, retries 2, round trip 7.2 ms, 99 % within 30 ms');
+    expect(linkInWords({})).toBe('');
   });
 });

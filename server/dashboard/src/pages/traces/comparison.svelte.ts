@@ -16,6 +16,8 @@ export class Comparison {
   /** What is shown of the record, s; null for all. */
   range = $state.raw<Range | null>(null);
   signals = $state<ShownSignal[]>(['position', 'error']);
+  /** Whether positions are shown less where the trace begins. */
+  fromStart = $state(true);
   /** Chosen by hand; empty for those that moved. */
   chosenJoints = $state.raw<readonly number[]>([]);
   loaded: readonly ShownTrace[] = $derived(this.traces.filter((trace) => trace.signals !== null));

@@ -17,6 +17,8 @@ export interface Drawn {
   /** Joints that slide: their values are lengths. */
   readonly prismatic: ReadonlySet<number>;
   readonly driveUnit: string;
+  /** Positions are drawn less where the trace begins. */
+  readonly fromStart: boolean;
 }
 
 export interface Lines {
@@ -79,8 +81,9 @@ function rowsOf(
   const label = `${trace === null ? '' : `${drawn.name} `}J${joint} ${signal}`;
   const end = trace === null ? `J${joint}` : String(trace);
   const scale = signal === 'drive' ? 1 : scaleOf(drawn, joint);
-  const column = columnOf(drawn.signals, signal, joint, scale);
-  const asked = signal === 'position' ? columnOf(drawn.signals, 'set_point', joint, scale) : null;
+  const begin = signal === 'position' ? beginOf(drawn, joint) : 0;
+  const column = columnOf(drawn.signals, signal, joint, scale, begin);
+  const asked = signal === 'position' ? columnOf(drawn.signals, 'set_point', joint, scale, begin) : null;
   return [
     ...(asked
       ? [[{ label: `${label}, set point`, colour, dash: SET_POINT, width: 1.1 }, asked] as const]
@@ -90,20 +93,24 @@ function rowsOf(
 }
 
 function simulatedRow(
-  { simulation, name, ...drawn }: Drawn,
+  drawn: Drawn,
   signal: 'position' | 'error' | 'drive',
   joint: number,
   trace: number | null,
   colourOf: (number: number) => string,
 ): Row[] {
+  const { simulation } = drawn;
   const row = signal === 'position' ? simulation?.position[simulation.joints.indexOf(joint)] : undefined;
   if (row === undefined) return [];
-  const scale = scaleOf({ simulation, name, ...drawn }, joint);
-  const label = `${name} J${joint}, simulated`;
-  return [
-    [
-      { label, colour: colourOf(trace ?? joint), dash: SIMULATED, width: 2.4 },
-      row.map((value) => value * scale),
-    ],
-  ];
+  const [scale, begin] = [scaleOf(drawn, joint), beginOf(drawn, joint)];
+  const label = `${drawn.name} J${joint}, simulated`;
+  const series = { label, colour: colourOf(trace ?? joint), dash: SIMULATED, width: 2.4 };
+  return [[series, row.map((value) => (value - begin) * scale)]];
+}
+
+/** What is taken off positions: where the joint is told to be at first, or is; 0 where positions are drawn as they are. */
+function beginOf({ fromStart, signals }: Drawn, joint: number): number {
+  if (!fromStart) return 0;
+  const place = signals.joints.indexOf(joint);
+  return signals.set_point?.[place]?.[0] ?? signals.position[place]?.[0] ?? 0;
 }
