@@ -1,4 +1,4 @@
-"""What a user installs is whole: the code, and the data files that the code reads."""
+"""What a user installs is whole: the code, the data files that the code reads, and the dashboard's built page."""
 
 import subprocess
 import sys
@@ -7,6 +7,7 @@ from pathlib import Path
 
 from tests.repository.tracked import ROOT, tracked_files
 
+SOURCES_OF_THE_PAGE = "server/dashboard/"
 PACKAGES = ("firmware_protocol", "daq", "mock_controller", "model", "server")
 
 
@@ -18,6 +19,11 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
         packed = set(archive.namelist())
     tracked = {str(path.relative_to(ROOT)) for path in tracked_files()}
     expected = {name for name in tracked if name.startswith(tuple(f"{package}/" for package in PACKAGES))}
+    expected -= {name for name in expected if name.startswith(SOURCES_OF_THE_PAGE)}
     assert any(name.endswith(".toml") for name in expected)
     assert expected - packed == set()
     assert not any(name.startswith("tests/") for name in packed)
+    page = {name.removeprefix(SOURCES_OF_THE_PAGE) for name in packed if name.startswith(SOURCES_OF_THE_PAGE)}
+    assert "dist/index.html" in page
+    assert any(name.startswith("dist/assets/") and name.endswith(".js.gz") for name in page)
+    assert not any("node_modules" in name or name.startswith("src/") for name in page)

@@ -31,12 +31,3 @@ def test_a_service_that_hangs_is_missed_and_found_again(dashboard: Dashboard) ->
     expect(page.get_by_text("No connection to the service.")).not_to_be_attached()
     expect(page.get_by_role("banner").get_by_text("live 50 Hz").or_(dashboard.degraded)).to_be_visible()
     dashboard.forgive()
-
-
-def test_without_a_network_the_page_says_so_at_once_and_comes_back(dashboard: Dashboard) -> None:
-    page = dashboard.until_live()
-    page.context.set_offline(True)
-    expect(page.get_by_text("No connection to the service.")).to_be_visible()
-    page.context.set_offline(False)
-    expect(page.get_by_text("No connection to the service.")).not_to_be_attached()
-    dashboard.forgive()
