@@ -17,13 +17,14 @@ from daq.cli.model_input import (
     read_model,
     read_traces,
 )  # fmt: skip
+from daq.cli.remote.jobs import numbers_of, require_no_programs
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import shipped_machines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from model.comparison.compare import Comparison
+    from model.comparison.agreement import ModelAgreement
     from model.comparison.difference import ParameterDifference
     from model.machine_model.model import Model
 
@@ -45,33 +46,29 @@ def compare(
 
     A trace counts as held out when none of the models says that it was fitted to it.
     """
-    from daq.cli.agreement_table import agreement_data, print_agreement
     from daq.cli.model_progress import shown_progress
     from model.comparison.compare import compare
     from model.comparison.difference import differences
 
+    call = invocation(context)
+    require_no_programs(effect_file, call)
     load_effects(effect_file)
     models, traces = _told_apart(names)
     if len(models) < 2:
         raise SpecError(f"{len(models)} model named: name at least two models (.json, .toml, ma2000), then traces")
-    found = read_traces(invocation(context), folder, traces)
+    found = read_traces(call, folder, traces)
     read = [read_model(name) for name in models]
+    if call.server is not None:
+        from daq.cli.remote.compare import compare_at_server
+
+        there = compare_at_server(call, models, read, numbers_of(call, traces, found), report)
+        _tell(there.models, there.differences, as_json=json)
+        return
     held_out = _held_out(read, [t.record.trace_id for t in found])
     with shown_progress("comparing") as tell:
         comparison = compare(list(zip(model_labels(models), read, strict=True)), found, held_out, progress=tell)
     differing = differences(read)
-    if json:
-        print_json({
-            "models": agreement_data(comparison.models),
-            "mean_squared_error": _errors(comparison),
-            "differences": [d.model_dump(mode="json") for d in differing],
-        })  # fmt: skip
-    else:
-        print_agreement(comparison.models)
-        for label, by_kind in _errors(comparison).items():
-            told = ", ".join(f"{kind.replace('_', ' ')} {e:.4g} rad²" for kind, e in by_kind.items() if e is not None)
-            print(f"{label}: mean squared error summed over the joints, {told}")
-        _print_differences(differing, model_labels(models))
+    _tell(comparison.models, differing, as_json=json)
     if report is not None:
         from model.reports.comparison_report import comparison_report
         from model.reports.page import write_report
@@ -90,10 +87,27 @@ def _held_out(models: Sequence[Model], traces: Sequence[str]) -> list[str] | Non
     return [trace for trace in traces if trace not in fitted] if fitted else None
 
 
-def _errors(comparison: Comparison) -> dict[str, dict[str, float | None]]:
+def _tell(models: Sequence[ModelAgreement], differing: Sequence[ParameterDifference], *, as_json: bool) -> None:
+    from daq.cli.agreement_table import agreement_data, print_agreement
+
+    if as_json:
+        print_json({
+            "models": agreement_data(models),
+            "mean_squared_error": _errors(models),
+            "differences": [d.model_dump(mode="json") for d in differing],
+        })  # fmt: skip
+        return
+    print_agreement(models)
+    for label, by_kind in _errors(models).items():
+        told = ", ".join(f"{kind.replace('_', ' ')} {e:.4g} rad²" for kind, e in by_kind.items() if e is not None)
+        print(f"{label}: mean squared error summed over the joints, {told}")
+    _print_differences(differing, [model.label for model in models])
+
+
+def _errors(models: Sequence[ModelAgreement]) -> dict[str, dict[str, float | None]]:
     return {
         m.label: {"in_sample": m.mean_squared_error("in_sample"), "held_out": m.mean_squared_error("held_out")}
-        for m in comparison.models
+        for m in models
     }
 
 

@@ -19,6 +19,7 @@ from daq.cli.model_input import (
     read_model,
     read_traces,
 )  # fmt: skip
+from daq.cli.remote.jobs import numbers_of, require_no_programs
 from daq.contracts.errors import SpecError
 
 if TYPE_CHECKING:
@@ -72,11 +73,11 @@ def diagnose(
     """Find where a model and traces disagree, name the effect that is missing, add it, and show the gap shrink."""
     from daq.cli.diagnose_acquire import acquired
     from daq.cli.diagnose_asking import asker
-    from daq.cli.diagnosis_text import answer_text
     from daq.cli.model_progress import shown_progress
     from model.discrepancy.workflow import diagnose as run_diagnosis
 
     call = invocation(context)
+    require_no_programs(effect_file, call)
     load_effects(effect_file)
     options = _options(effects, joints, most)
     fitted_to = read_traces(call, folder, traces)
@@ -87,16 +88,30 @@ def diagnose(
         with shown_progress("diagnosing") as tell:
             return run_diagnosis(begin, traces, held, options, tell, ask=ask)
 
+    if call.server is not None and not acquire:
+        from daq.cli.remote.diagnose import diagnose_at_server
+
+        wanted = (numbers_of(call, traces, fitted_to), numbers_of(call, holdout or [], held))
+        found = diagnose_at_server(call, begin, *wanted, options, out, report)
+        _tell(found, out, None, as_json=json)
+        return
     if acquire:
         found, fitted_to = acquired(call, begin.machine, fitted_to, folder, budget, yes, once)
     else:
         found = once(fitted_to, asker(begin.machine))
     page = None if report is None else _written(found, fitted_to, held, report)
+    _tell(found, out, page, as_json=json)
+
+
+def _tell(found: Diagnosis, out: Path | None, page: Path | None, *, as_json: bool) -> None:
+    """The answer, the model where it is wanted, and where the page is."""
+    from daq.cli.diagnosis_text import answer_text
+
     if out is not None:
         from model.machine_model.model_file import save_model
 
         save_model(found.model_after, out)
-    if json:
+    if as_json:
         print_json(found.model_dump(mode="json"))
     else:
         print(answer_text(found))

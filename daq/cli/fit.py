@@ -21,6 +21,7 @@ from daq.cli.model_input import (
     read_traces,
 )
 from daq.cli.parameter_table import print_parameters
+from daq.cli.remote.jobs import numbers_of, require_no_programs
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from daq.contracts.trace import Trace
-    from model.comparison.compare import Comparison
+    from model.comparison.agreement import ModelAgreement
     from model.fitting.result import FitResult
     from model.machine_model.model import Model
 
@@ -80,6 +81,7 @@ def fit(
     from model.simulation.simulate import Options
 
     call = invocation(context)
+    require_no_programs(effect_file, call)
     load_effects(effect_file)
     if out.suffix != ".json":
         raise SpecError(f"--out {out}: a model is written as .json")
@@ -91,6 +93,16 @@ def fit(
         parameters=patterns(parameters), held=patterns(hold) or (), bounds=bounds(bound or []),
         use_priors=not no_priors, method=method, starts=starts, seed=seed, loop=loop,
     )  # fmt: skip
+    if call.server is not None:
+        from daq.cli.remote.fit import fit_at_server
+
+        if torques:
+            raise SpecError("--torques: is computed here, not by a service; fetch the traces, then leave --server out")
+        wanted = (numbers_of(call, traces, fitted_to), numbers_of(call, holdout or [], held))
+        done = fit_at_server(call, begin, *wanted, options, out, report)
+        done.save(out)
+        _tell(done, done.models, out, as_json=json)
+        return
     if torques:
         from daq.cli.fit_torques import fit_recorded_torques
 
@@ -103,11 +115,7 @@ def fit(
             options=Options(loop=loop or "closed"), progress=lambda f, text: tell(0.9 + 0.1 * f, text),
         )  # fmt: skip
     found.save(out)
-    if json:
-        _print_json(found, comparison, out)
-    else:
-        _print(found, comparison)
-        console().print(f"model {found.model.identity}: {out}")
+    _tell(found, comparison.models, out, as_json=json)
     if report is not None:
         from model.reports.fit_report import fit_report
         from model.reports.page import write_report
@@ -132,7 +140,15 @@ def _beginning(
     return with_effects(base_model(chosen, friction=False), effects)
 
 
-def _print_json(found: FitResult, comparison: Comparison, out: Path) -> None:
+def _tell(found: FitResult, agreement: Sequence[ModelAgreement], out: Path, *, as_json: bool) -> None:
+    if as_json:
+        _print_json(found, agreement, out)
+    else:
+        _print(found, agreement)
+        console().print(f"model {found.model.identity}: {out}")
+
+
+def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path) -> None:
     from daq.cli.agreement_table import agreement_data
 
     print_json({
@@ -140,7 +156,7 @@ def _print_json(found: FitResult, comparison: Comparison, out: Path) -> None:
         "file": out,
         "parameters": [p.model_dump(mode="json") for p in found.parameters],
         "undetermined": [c.model_dump(mode="json") for c in found.identifiability.undetermined],
-        "agreement": agreement_data(comparison.models),
+        "agreement": agreement_data(agreement),
         "whitened_mean_square": found.whitened_mean_square,
         "converged": found.converged,
         "evaluations": found.evaluations,
@@ -148,7 +164,7 @@ def _print_json(found: FitResult, comparison: Comparison, out: Path) -> None:
     })  # fmt: skip
 
 
-def _print(found: FitResult, comparison: Comparison) -> None:
+def _print(found: FitResult, agreement: Sequence[ModelAgreement]) -> None:
     from daq.cli.agreement_table import print_agreement
 
     print_parameters(found.parameters)
@@ -158,6 +174,6 @@ def _print(found: FitResult, comparison: Comparison) -> None:
     for combination in found.identifiability.undetermined:
         print(f"  not determined: {combination.text}")
     print()
-    print_agreement(comparison.models)
+    print_agreement(agreement)
     if not found.converged:
         print(f"the search did not converge: {found.message}")

@@ -19,6 +19,7 @@ from daq.cli.model_input import (
     read_model,
     read_traces,
 )
+from daq.cli.remote.jobs import numbers_of, require_no_programs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -59,9 +60,18 @@ def validate(
     from model.validation.names import names_to_validate
     from model.validation.time_domain import vary_in_time
 
+    call = invocation(context)
+    require_no_programs(effect_file, call)
     load_effects(effect_file)
-    found = read_traces(invocation(context), folder, traces)
+    found = read_traces(call, folder, traces)
     chosen = read_model(model)
+    if call.server is not None:
+        from daq.cli.remote.validate import validate_at_server
+
+        numbers = numbers_of(call, traces, found)
+        done = validate_at_server(call, chosen, model, numbers, patterns(parameters), output, damping_ratio, report)
+        _tell(done.fidelity, done.three_sigma, done.time_domain, as_json=json)
+        return
     names = names_to_validate(chosen, patterns(parameters))
     with shown_progress("validating") as tell:
         fidelity = validate_by_distortion(
@@ -73,7 +83,17 @@ def validate(
             tell(0.7 + 0.3 * number / len(found), f"variation with time: {trace.record.trace_id}")
             in_time.append(vary_in_time(chosen, trace, names))
     three = in_convention(fidelity, chosen, "three_sigma")
-    if json:
+    _tell(fidelity, three, in_time, as_json=json)
+    if report is not None:
+        from model.reports.page import write_report
+        from model.reports.validation_report import validation_report
+
+        page = validation_report(model_label(model), (fidelity, three), in_time)
+        console().print(f"report: {write_report(page, report)}")
+
+
+def _tell(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], *, as_json: bool) -> None:
+    if as_json:
         print_json({
             "fidelity": fidelity.model_dump(mode="json"),
             "three_sigma": {"sum_of_contributions": three.sum_of_contributions},
@@ -81,12 +101,6 @@ def validate(
         })  # fmt: skip
     else:
         _print(fidelity, three, in_time)
-    if report is not None:
-        from model.reports.page import write_report
-        from model.reports.validation_report import validation_report
-
-        page = validation_report(model_label(model), (fidelity, three), in_time)
-        console().print(f"report: {write_report(page, report)}")
 
 
 def _print(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import time
@@ -12,32 +11,20 @@ from pathlib import Path
 
 import pytest
 
-from daq.cli.context import console
 from daq.traces.reader import read_trace
 from tests.daq.cli.invoke import CommandLine, Said
+from tests.server.desk import anothers_desk, environment_in
 from tests.server.service import DAQ, Service
 
 RAMP = ["run", "ramp", "--joints", "1-3", "--amplitude", "3", "--duration", "0.2", "--settle", "0.1", "--hold", "0.1"]
 Daq = Callable[..., Said]
 
 
-def _environment(folder: Path) -> dict[str, str]:
-    kept = {key: value for key, value in os.environ.items() if not key.startswith("DAQ_")}
-    return kept | {"DAQ_RUNTIME_FOLDER": str(folder / "run"), "XDG_CONFIG_HOME": str(folder / "configuration")}
-
-
 @pytest.fixture
 def here(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
     """The command of another user, in a folder of their own, who has no configuration."""
-    for name in [name for name in os.environ if name.startswith("DAQ_")]:
-        monkeypatch.delenv(name)
-    for name, value in _environment(tmp_path).items():
-        monkeypatch.setenv(name, value)
-    monkeypatch.setenv("COLUMNS", "500")
-    monkeypatch.chdir(tmp_path)
-    console.cache_clear()
-    yield CommandLine(capsys, monkeypatch)
-    console.cache_clear()
+    with anothers_desk(tmp_path, capsys, monkeypatch) as daq:
+        yield daq
 
 
 @pytest.fixture
@@ -77,7 +64,7 @@ def test_its_result_as_json_and_a_dry_run_are_the_same_too(
 def test_ctrl_c_stops_the_arm_and_the_partial_trace_is_fetched(service: Service, tmp_path: Path) -> None:
     command = [*DAQ, "--server", service.url, *RAMP, "--hold", "600"]
     running = subprocess.Popen(
-        command, cwd=tmp_path, env=_environment(tmp_path), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        command, cwd=tmp_path, env=environment_in(tmp_path), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
         stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert running.stderr is not None
@@ -97,7 +84,7 @@ def test_ctrl_c_takes_back_what_waits_and_stops_nobody_else(service: Service, tm
     others = service.robot.post("/experiments", json={"spec": spec}).json()["id"]
     service.until_recording(others)
     running = subprocess.Popen(
-        [*DAQ, "--server", service.url, *RAMP], cwd=tmp_path, env=_environment(tmp_path), stdin=subprocess.DEVNULL,
+        [*DAQ, "--server", service.url, *RAMP], cwd=tmp_path, env=environment_in(tmp_path), stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     while not service.robot.get("/queue/experiments").json():

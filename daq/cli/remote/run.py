@@ -178,7 +178,7 @@ def _finished(robot: Robot, ended: Experiment, folder: Path) -> Finished:
     from daq.acquisition.messages import Finished
 
     if ended.outcome is None or ended.trace is None:
-        line = f"experiment {ended.id} was {ended.state}: {ended.reason or 'no reason is known'}"
+        line = f"experiment {ended.id} {ended.state}: {ended.reason or 'no reason is known'}"
         raise AcquisitionFailedError(line, EXIT_CODES.get(ended.state, 1))
     details = robot.traces.get(ended.trace)
     try:

@@ -1,0 +1,68 @@
+"""`daq --server URL fit` and the like: computed by the service, kept by it, told as if it had been done here."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from model.machine_model.model_file import load_model
+from tests.daq.cli.invoke import CommandLine, Said
+from tests.server.desk import anothers_desk
+from tests.server.service import Service
+
+pytestmark = pytest.mark.timeout(600)
+"""The first job of a worker imports, and may compile, the simulation."""
+RAMP = ["run", "ramp", "--joints", "1", "--amplitude", "3", "--duration", "0.2", "--settle", "0.1", "--hold", "0.1"]
+NAME = "joint1.viscous_friction.coefficient"
+Daq = Callable[..., Said]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def worker(sound_service: Service) -> None:
+    """The worker process is there before the tests, which may leave none behind: it has done one job."""
+    spec = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.2}, "settle": 0.1, "hold": 0.1}
+    sound_service.robot.post("/queue/resume", json={})
+    ended = sound_service.end_of(sound_service.robot.post("/experiments", json={"spec": spec}).json()["id"])
+    request = {"kind": "compare", "traces": [ended["trace"]], "models": ["machine"]}
+    job = sound_service.robot.post("/jobs", json=request).json()["id"]
+    while sound_service.robot.get(f"/jobs/{job}", params={"wait": 30}).json()["state"] in ("queued", "running"):
+        pass
+
+
+@pytest.fixture
+def here(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
+    """Another user's command."""
+    with anothers_desk(tmp_path, capsys, monkeypatch) as daq:
+        yield daq
+
+
+@pytest.fixture
+def daq(sound_service: Service, here: CommandLine) -> Daq:
+    """The same, with the service's address."""
+    return lambda *words: here("--server", sound_service.url, *words)
+
+
+def test_fit_validate_and_compare_are_jobs_of_the_service(daq: Daq, sound_service: Service, tmp_path: Path) -> None:
+    assert daq(*RAMP).code == 0
+    one = ["--parameters", NAME, "--effects", "viscous:1"]
+    said = daq("fit", "last", "-o", "found.json", *one, "--report", "fit.html", "--json")
+    assert said.code == 0, said.err
+    found = json.loads(said.out)
+    assert [parameter["name"] for parameter in found["parameters"]] == [NAME]
+    assert len(load_model(tmp_path / "found.json").lineage.traces) == 1
+    assert (tmp_path / "fit.html").read_text().startswith("<!doctype html>")
+    entry = sound_service.robot.get(f"/models/{found['model']}").json()["entry"]
+    assert (entry["name"], len(entry["traces"])) == ("found", 1)
+    said = daq("compare", "ma2000", "found.json", "last")
+    assert said.code == 0, said.err
+    assert f"({found['model']})" in said.out
+    said = daq("validate", "found.json", "last", "--parameters", NAME, "--json")
+    assert said.code == 0, said.err
+    assert json.loads(said.out)["fidelity"]["parameters"][0]["name"] == NAME
+    kinds = [job["request"]["kind"] for job in sound_service.robot.get("/jobs").json()["items"]]
+    assert kinds[:3] == ["validate", "compare", "fit"]
+    daq("fit", "last", "-o", "x.json", "--effect-file", "own.py").complains(2, "runs no programs")
+    daq("fit", "last", "-o", "x.json", "--torques").complains(2, "--torques", "not by a service")
