@@ -25,7 +25,7 @@ import { WayLine } from './way_line';
 
 const FIELD_OF_VIEW = 32;
 /** What has to be in the picture around its middle, as a share of the reach: arm and hand in nearly any posture. */
-const SHOWN = 1.12;
+const SHOWN = 1.03;
 /** How high the hand reaches, as a share of the reach. */
 const TOP = 1.25;
 /** m. */
