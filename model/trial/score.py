@@ -7,8 +7,8 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.machine import Machine
-from model.discrepancy.answer import Diagnosis, SignalError, Step, Verdict
-from model.discrepancy.holdout import LEAST_EXCESS
+from model.discrepancy.answer import Diagnosis, Step, Verdict
+from model.discrepancy.holdout import excess_removed as share_removed
 from model.trial.conventions import true_parameters
 from model.trial.truth import Detectability, HiddenEffect, Kind, Truth, merged
 
@@ -167,29 +167,20 @@ def group_of(answer: Diagnosis) -> tuple[str, ...]:
 
 
 def excess_removed(answer: Diagnosis) -> float | None:
-    """Share of the held-out variance above the noise floor that all adopted steps removed; each joint in its floors.
+    """Share of the held-out variance above the noise floor that all adopted steps removed.
 
-    None without a held-out trace, an adopted step, or an excess of LEAST_EXCESS before.
+    None without a held-out trace or an adopted step, and where no joint showed enough of it before.
     """
     adopted = [step for step in answer.steps if step.adopted and step.rmse_holdout]
     if not adopted:
         return None
-    return _removed(adopted[0].rmse_holdout, adopted[-1].rmse_holdout)
+    first, last = adopted[0].rmse_holdout, adopted[-1].rmse_holdout
+    return share_removed([b.model_copy(update={"after": a.after}) for b, a in zip(first, last, strict=True)])
 
 
 def excess_removed_whole(answer: Diagnosis) -> float | None:
     """The same from the model as it was given to the one that came out, tolerance parameters fitted."""
-    return _removed(answer.rmse_holdout, answer.rmse_holdout)
-
-
-def _removed(before: tuple[SignalError, ...], after: tuple[SignalError, ...]) -> float | None:
-    excess = _excess(before, after=False)
-    return None if excess < LEAST_EXCESS else 1.0 - _excess(after, after=True) / excess
-
-
-def _excess(errors: tuple[SignalError, ...], *, after: bool) -> float:
-    ratios = [((e.after if after else e.before) / e.floor) ** 2 - 1.0 for e in errors if e.floor > 0.0]
-    return sum(ratios) / max(len(ratios), 1)
+    return share_removed(answer.rmse_holdout)
 
 
 def _place(answer: Diagnosis, named: tuple[str, ...], group: tuple[str, ...]) -> Place:
