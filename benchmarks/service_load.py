@@ -31,6 +31,7 @@ from benchmarks.mock_control import MockControl
 from benchmarks.mock_process import started_mock
 from benchmarks.service_clients import Clients, Seen, clients
 from benchmarks.service_process import ROBOT, RunningService, child, dice, ramp, started_service, sway
+from daq.contracts.service.system import stop_port_after
 from daq.traces.reader import read_trace
 
 BAUD = 115200
@@ -43,6 +44,7 @@ FROZEN_TARGET_MS = 30.0
 USED_TARGET_MS = 55.0
 GET_TARGET_MS = 25.0
 LONGEST_WAIT_S = 5.0
+OWN_DOOR, STOP_DOOR = "through the service", "through the stop listener"
 FIT = {"kind": "fit", "method": "nelder_mead", "starts": 20}
 EMPTY_APP = """
 import sys, uvicorn
@@ -66,8 +68,8 @@ class Measured:
     loaded: list[float] = field(default_factory=list)
     lost: tuple[int, int] = (0, 0)
     """Ticks lost, of how many, under load."""
-    frozen: list[float] = field(default_factory=list)
-    used: list[float] = field(default_factory=list)
+    frozen: dict[str, list[float]] = field(default_factory=lambda: {OWN_DOOR: [], STOP_DOOR: []})
+    used: dict[str, list[float]] = field(default_factory=lambda: {OWN_DOOR: [], STOP_DOOR: []})
     unconfirmed: int = 0
     fitting: int = 0
     """How many of the stops found the fit still running."""
@@ -119,23 +121,11 @@ def _processor_time(process: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-class Stopper:
-    """A client that stops by REST, on a connection that is open already."""
-
-    def __init__(self, url: str) -> None:
-        where = urlsplit(url)
-        self._line = http.client.HTTPConnection(where.hostname or "", where.port, timeout=10)
-        self._line.connect()
-
-    def stop(self) -> tuple[float, bool]:
-        """When it was asked for, and whether the board confirmed it."""
-        at = time.monotonic()
-        self._line.request("POST", f"{API}/stop")
-        return at, bool(json.loads(self._line.getresponse().read())["confirmed"])
-
-    def close(self) -> None:
-        """Hangs up."""
-        self._line.close()
+def stop(line: http.client.HTTPConnection) -> tuple[float, bool]:
+    """When the stop was asked for, and whether the board confirmed it."""
+    at = time.monotonic()
+    line.request("POST", f"{API}/stop")
+    return at, bool(json.loads(line.getresponse().read())["confirmed"])
 
 
 def record_of_stop(control: MockControl, number: int) -> tuple[float, float]:
@@ -151,22 +141,34 @@ def record_of_stop(control: MockControl, number: int) -> tuple[float, float]:
 
 
 def stop_again_and_again(service: RunningService, control: MockControl, fit: str, times: int, found: Measured) -> None:
-    """Stops experiments while they are recorded, at moments that have nothing to do with the control period."""
-    random, stopper = dice(1991), Stopper(service.url)
-    for _ in range(times):
+    """Stops experiments while they are recorded, at moments that have nothing to do with the control period.
+
+    Through the service's own door, on a connection that is open already, and through the stop listener's beside it,
+    which hangs up after every stop.
+    """
+    random, where = dice(1991), urlsplit(service.url)
+    assert where.port is not None
+    doors = {
+        OWN_DOOR: http.client.HTTPConnection(where.hostname or "", where.port, timeout=10),
+        STOP_DOOR: http.client.HTTPConnection(where.hostname or "", stop_port_after(where.port), timeout=10),
+    }
+    doors[OWN_DOOR].connect()
+    for number in range(times):
+        door = (OWN_DOOR, STOP_DOOR)[number % 2]
         service.until_recording(experiment := service.submit(sway(60.0)))
         before = control.ask("state")["stop"]["count"]
         time.sleep(random.uniform(0.0, 0.1))
-        at, confirmed = stopper.stop()
+        at, confirmed = stop(doors[door])
         frozen, used = record_of_stop(control, before + 1)
-        found.frozen.append(frozen - at)
-        found.used.append(used - at)
+        found.frozen[door].append(frozen - at)
+        found.used[door].append(used - at)
         found.unconfirmed += not confirmed
         found.fitting += service.ask("GET", f"/jobs/{fit}")["state"] == "running"
         service.ended("experiments", experiment)
         service.ask("POST", "/reset", json={})
         service.ask("POST", "/queue/resume", json={})
-    stopper.close()
+    for line in doors.values():
+        line.close()
 
 
 @contextlib.contextmanager
@@ -241,11 +243,18 @@ def figures_of(found: Measured) -> list[Figure]:
     seen = found.seen
     gets, floor, late = ([1e3 * one for one in times]
                          for times in (seen.latencies, found.floor.latencies, seen.own_lateness))  # fmt: skip
-    frozen, used = ([1e3 * one for one in times] for times in (found.frozen, found.used))
 
     def spread(times: list[float]) -> str:
         return f"p50 {quantile(times, 0.5):.1f}, max {max(times):.1f} ms"
 
+    stops = []
+    for what, target, doors in (
+        ("frozen in memory", FROZEN_TARGET_MS, found.frozen), ("first used", USED_TARGET_MS, found.used)
+    ):  # fmt: skip
+        for door, times in doors.items():
+            ms = [1e3 * one for one in times]
+            beside = f"{spread(ms)}, {len(ms)} stops"
+            stops.append(at_most(f"stop {door}: {what}, p99", quantile(ms, 0.99), target, "ms", beside))
     busy = ", ".join(f"{name} {100 * share:.0f} %" for name, share in found.busy.items())
     own = f"the clients' own lateness p99 {quantile(late, 0.99):.1f} ms"
     return [
@@ -253,11 +262,9 @@ def figures_of(found: Measured) -> list[Figure]:
         Figure("ticks lost", f"{lost}", "0", lost == 0, f"of {count}"),
         at_most("tick jitter added, p99", loaded - idle, JITTER_TARGET_MS, "ms",
                 f"p99 {loaded:.2f} ms, alone {idle:.2f} ms"),
-        at_most("stop by REST, frozen in memory, p99", quantile(frozen, 0.99), FROZEN_TARGET_MS, "ms",
-                f"{spread(frozen)}, {len(frozen)} stops"),
-        at_most("stop by REST, first used, p99", quantile(used, 0.99), USED_TARGET_MS, "ms", spread(used)),
+        *stops,
         Figure("stops without confirmation", f"{found.unconfirmed}", "0", found.unconfirmed == 0,
-               f"a fit ran beside {found.fitting} of {len(frozen)}"),
+               f"a fit ran beside {found.fitting} of {sum(map(len, found.used.values()))}"),
         at_most("plain GET, p99", quantile(gets, 0.99), GET_TARGET_MS, "ms", f"{spread(gets)}, {len(gets)} requests"),
         Figure("an empty FastAPI application, alone, p99", f"{quantile(floor, 0.99):.3g} ms", beside=spread(floor)),
         Figure("requests refused", f"{seen.refused}", "0", seen.refused == 0, own),

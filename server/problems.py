@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -35,6 +36,9 @@ TITLES = {
     503: "The robot cannot be reached",
     507: "No room",
 }
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""What the system says when nothing more can be written."""
 
 
 class ProblemError(Exception):
@@ -72,7 +76,15 @@ def of_error(error: DaqError) -> ProblemError:
     """The problem that an error of the host side is."""
     if isinstance(error, PortBusyError):
         return conflict("port-in-use", str(error), "end the other program, then connect again")
+    if isinstance(error.__cause__, OSError) and error.__cause__.errno in NO_ROOM:
+        return no_room(error.__cause__)
     return of_exit_code(error.exit_code, str(error))
+
+
+def no_room(error: OSError) -> ProblemError:
+    """A 507: the disk takes no more."""
+    log.error("disk: %s", error)
+    return ProblemError(507, "no-room", f"the disk: {error.strerror}", "make room on it")
 
 
 def of_exit_code(exit_code: int, line: str) -> ProblemError:
@@ -139,6 +151,12 @@ def install(app: FastAPI) -> None:
                 request, ProblemError(507, "no-room", "the disk of the database is full", "make room on it")
             )
         return response(request, ProblemError(503, "database", f"the database: {error.orig}", "try again"))
+
+    @app.exception_handler(OSError)
+    async def disk(request: Request, error: OSError) -> JSONResponse:
+        if error.errno in NO_ROOM:
+            return response(request, no_room(error))
+        return await fault(request, error)
 
     @app.exception_handler(Exception)
     async def fault(request: Request, error: Exception) -> JSONResponse:

@@ -23,6 +23,9 @@ from server.services import Services
 from server.stop_listener import StopListener
 from server.store.lock import sole_use
 
+KEEP_ALIVE = 60
+"""s that a silent connection stays open. Clients hang up after a few seconds of their own accord (httpx: 5 s); were the
+service as quick, a request could meet its hanging up."""
 GRACE = 1
 """s for requests under way when the service ends; streams are told to end before."""
 
@@ -42,6 +45,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
             access_log=False,
             lifespan="on",
             timeout_graceful_shutdown=GRACE,
+            timeout_keep_alive=KEEP_ALIVE,
             ws="websockets-sansio",
             ws_per_message_deflate=False,
             ws_max_size=65536,

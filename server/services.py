@@ -155,6 +155,7 @@ class Services:
                 clock=self.clock,
                 told=told,
                 recorded=recorded,
+                unfinished=lambda: self._take_in(catalogue),
                 unattended=settings.server.unattended,
             )
         )

@@ -65,6 +65,8 @@ class QueueParts:
     told: Told
     recorded: Callable[[Answer], None]
     """Called with the answer of every run that left a trace."""
+    unfinished: Callable[[], None]
+    """Called after a run whose trace could not be closed: what was written of it is there."""
     unattended: bool
 
 
@@ -315,9 +317,12 @@ class QueueDesk:
             found = self._await(answer)
         except DaqError as error:
             return Ending(Event.LOST, str(error))
+        ending = ending_of(found)
         if found.finished is not None:
             parts.recorded(found)
-        return ending_of(found)
+        elif ending.event is not Event.REFUSED:
+            parts.unfinished()
+        return ending
 
     def _await(self, answer: Future[Answer]) -> Answer:
         """The answer; on a real arm that must be attended, an operator's absence ends the run with a stop."""

@@ -126,7 +126,8 @@ class ExperimentStore:
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             row.state = advance(_state(row), event)
-            row.ended, row.reason, row.outcome = now, reason, outcome
+            row.ended, row.reason = now, reason
+            row.outcome = outcome or row.outcome  # its trace may have been found before its end was told
             session.flush()
             return as_experiment(row)
 

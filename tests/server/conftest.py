@@ -1,4 +1,4 @@
-"""One service for most tests: starting one costs more than most of them."""
+"""One service for most tests, and one for jobs: starting one costs more than most of them."""
 
 from __future__ import annotations
 
@@ -13,6 +13,14 @@ from tests.server.service import Service, running_service
 def shared_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     """A service on a mock behind a pseudo-terminal, connected."""
     with running_service(tmp_path_factory.mktemp("service")) as service:
+        service.until_connected()
+        yield service
+
+
+@pytest.fixture(scope="session")
+def sound_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    """A service of the tests of jobs: its arm is as its machine file says, and none of the others moves it."""
+    with running_service(tmp_path_factory.mktemp("jobs")) as service:
         service.until_connected()
         yield service
 

@@ -50,10 +50,10 @@ class Service:
             assert self.process.poll() is None
         return found
 
-    def end_of(self, experiment: str) -> dict[str, Any]:
-        """Waits until an experiment has ended; the test's own time limit ends the wait."""
+    def end_of(self, number: str, kind: str = "experiments") -> dict[str, Any]:
+        """Waits until an experiment (or one of `jobs`) has ended; the test's own time limit ends the wait."""
         while True:
-            found: dict[str, Any] = self.robot.get(f"/experiments/{experiment}", params={"wait": 30}).json()
+            found: dict[str, Any] = self.robot.get(f"/{kind}/{number}", params={"wait": 30}).json()
             if found["state"] not in ("queued", "running"):
                 return found
             self.seen.append(found)

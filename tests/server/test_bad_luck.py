@@ -1,29 +1,30 @@
-"""What becomes of queue, trace and states when things break: each test has a service of its own."""
+"""What becomes of queue, trace and states when things break."""
 
 from __future__ import annotations
 
+import json
 import os
+import resource
 import select
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from daq.link import Link
 from daq.traces.reader import read_trace
 from daq.transport import MockPort, parse_port_url
 from daq.transport.mock_process import MockProcess, start_mock
+from server.jobs.mailbox import PROGRESS
 from tests.server.service import Service, running_service
 
 pytestmark = pytest.mark.timeout(600)
 LONG = {"trajectory": {"kind": "pause", "duration": 3000}, "joints": [1], "settle": 0, "hold": 0}
-SHORT = {"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1], "settle": 0, "hold": 0}
-
-
-def _mock() -> MockProcess:
-    """In real time: a port in lock-step cannot be named by a URL."""
-    port = parse_port_url("mock://?pty=1&seed=3")
-    assert isinstance(port, MockPort)
-    return start_mock(port)
+SHORT = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.2}, "settle": 0.1, "hold": 0.1}
+LONG_FIT = {"kind": "fit", "method": "nelder_mead", "starts": 20, "seed": 1}
 
 
 def _left_behind(service: Service) -> tuple[str, str]:
@@ -35,7 +36,17 @@ def _left_behind(service: Service) -> tuple[str, str]:
     return running, waiting
 
 
-def test_after_kill_9_what_ran_is_interrupted_and_what_waits_waits_for_a_person(tmp_path: Path) -> None:
+def _partial_trace(service: Service, experiment: dict[str, Any], outcome: str) -> None:
+    """What was recorded of an experiment is kept, and says how it ended."""
+    entry = service.robot.get(f"/traces/{experiment['trace']}").json()["entry"]
+    assert (entry["outcome"], entry["experiment"]) == (outcome, experiment["id"])
+    assert len(read_trace(service.folder / "traces" / entry["file"])) > 0
+
+
+# ---- a process is killed
+
+
+def test_whatever_process_is_killed_its_work_is_interrupted_and_what_waits_waits_for_a_person(tmp_path: Path) -> None:
     with running_service(tmp_path) as service:
         running, waiting = _left_behind(service)
         owner = _owner_of(service.process.pid)
@@ -43,67 +54,133 @@ def test_after_kill_9_what_ran_is_interrupted_and_what_waits_waits_for_a_person(
         _until_gone(owner)  # it freezes the arm, records a second more and closes the trace by itself
     with running_service(tmp_path) as service:
         service.until_connected()
-        found = service.robot.get(f"/experiments/{running}").json()
-        assert (found["state"], found["outcome"]) == ("interrupted", "interrupted")
-        assert "does not run again by itself" in found["reason"]
-        entry = service.robot.get(f"/traces/{found['trace']}").json()["entry"]
-        assert (entry["outcome"], entry["experiment"]) == ("interrupted", running)
-        assert len(read_trace(tmp_path / "traces" / entry["file"])) > 0
-        queue = service.robot.get("/queue").json()
-        assert (queue["paused"], queue["queued"]) == (True, 1)
-        assert "1 waiting and 1 interrupted" in queue["reason"]
-        assert service.robot.post("/queue/resume", json={}).status_code == 200
-        assert service.end_of(waiting)["state"] == "done"
-        assert service.robot.get(f"/experiments/{running}").json()["state"] == "interrupted"
+        trace = _after_the_server(service, running, waiting)
+        _without_the_acquisition_process(service)
+        _without_the_worker(service, trace)
 
 
-def test_the_loss_of_the_acquisition_process_interrupts_and_keeps_what_was_recorded(tmp_path: Path) -> None:
-    with running_service(tmp_path) as service:
-        running, waiting = _left_behind(service)
-        os.kill(_owner_of(service.process.pid), signal.SIGKILL)
-        ended = service.end_of(running)
-        assert ended["state"] == "interrupted", ended
-        queue = service.robot.get("/queue").json()
-        assert queue["paused"], queue
-        assert service.robot.get(f"/experiments/{waiting}").json()["state"] == "queued"
+def _after_the_server(service: Service, running: str, waiting: str) -> str:
+    found = service.robot.get(f"/experiments/{running}").json()
+    assert (found["state"], found["outcome"]) == ("interrupted", "interrupted")
+    assert "does not run again by itself" in found["reason"]
+    _partial_trace(service, found, "interrupted")
+    queue = service.robot.get("/queue").json()
+    assert (queue["paused"], queue["queued"]) == (True, 1)
+    assert "1 waiting and 1 interrupted" in queue["reason"]
+    assert service.robot.post("/queue/resume", json={}).status_code == 200
+    ended = service.end_of(waiting)
+    assert ended["state"] == "done"
+    assert service.robot.get(f"/experiments/{running}").json()["state"] == "interrupted"
+    trace: str = ended["trace"]
+    return trace
 
 
-def test_a_clean_end_freezes_the_arm_and_closes_the_trace(tmp_path: Path) -> None:
-    with running_service(tmp_path) as service:
-        running, _ = _left_behind(service)
-        service.end(signal.SIGTERM)
-    with running_service(tmp_path) as service:
-        found = service.robot.get(f"/experiments/{running}").json()
-        assert found["state"] == "interrupted"
-        assert service.robot.get("/queue").json()["paused"]
-        (entry,) = service.robot.get("/traces").json()["items"]
-        assert entry["experiment"] == running
+def _without_the_acquisition_process(service: Service) -> None:
+    running, waiting = _left_behind(service)
+    os.kill(_owner_of(service.process.pid), signal.SIGKILL)
+    ended = service.end_of(running)
+    assert ended["state"] == "interrupted", ended
+    queue = service.robot.get("/queue").json()
+    assert queue["paused"], queue
+    assert service.robot.get(f"/experiments/{waiting}").json()["state"] == "queued"
 
 
-def test_a_second_owner_of_the_port_is_told_so(tmp_path: Path) -> None:
-    mock = _mock()
+def _without_the_worker(service: Service, trace: str) -> None:
+    fit = service.robot.post("/jobs", json=LONG_FIT | {"traces": [trace]}).json()
+    compare = {"kind": "compare", "traces": [trace], "models": ["machine"]}
+    following = service.robot.post("/jobs", json=compare).json()
+    progress = service.folder / "service" / "jobs" / fit["id"] / PROGRESS
+    while not progress.exists():
+        assert service.robot.get(f"/jobs/{fit['id']}", params={"wait": 0.1}).json()["state"] in ("queued", "running")
+    os.kill(json.loads(progress.read_text())["process"], signal.SIGKILL)
+    ended = service.end_of(fit["id"], "jobs")
+    told = "its worker process ended: it was killed, or the memory did not suffice"
+    assert (ended["state"], ended["reason"]) == ("interrupted", told)
+    assert service.end_of(following["id"], "jobs")["state"] == "done"
+
+
+# ---- the robot
+
+
+@contextmanager
+def _on_a_cable(folder: Path) -> Iterator[tuple[Service, MockProcess]]:
+    """A service that is not connected, and the robot at the other end of its port: in real time, since a port in
+    lock-step cannot be named by a URL."""
+    port = parse_port_url("mock://?pty=1&seed=3")
+    assert isinstance(port, MockPort)
+    mock = start_mock(port)
+    (folder / "daq.toml").write_text("[server]\nconnect_at_start = false\n")
     try:
-        (tmp_path / "one").mkdir()
-        (tmp_path / "two").mkdir()
-        with running_service(tmp_path / "one", mock.url) as first:
-            first.until_connected()
-            with running_service(tmp_path / "two", mock.url) as second:
-                answer = second.robot.post("/connect")
-                assert (answer.status_code, answer.json()["type"]) == (409, "docs/service.md#port-in-use")
-                assert "is in use by another program" in second.status()["connection_problem"]
+        with running_service(folder, mock.url) as service:
+            yield service, mock
     finally:
         mock.close()
 
 
-def test_disconnected_the_robot_says_so_and_can_be_connected_again(tmp_path: Path) -> None:
-    with running_service(tmp_path) as service:
-        service.until_connected()
-        assert service.robot.post("/disconnect").status_code == 200
-        status = service.status()
-        assert (status["connection"], status["arm"], status["sample"]) == ("disconnected", "disconnected", None)
-        answer = service.robot.get("/gains")
-        assert (answer.status_code, answer.json()["type"]) == (503, "docs/service.md#not-reached")
-        assert service.until_connected()["connection"] == "connected"
+def test_a_port_that_another_program_has_and_a_robot_that_is_pulled_out(tmp_path: Path) -> None:
+    with _on_a_cable(tmp_path) as (service, mock):
+        with Link.open(mock.url):
+            _port_in_use(service)
+        while (answer := service.robot.post("/connect")).status_code == 409:  # by an attempt that began before
+            assert answer.json()["type"] == "docs/service.md#port-in-use"
+        _disconnected(service)
+        running, waiting = _left_behind(service)
+        mock.close()
+        ended = service.end_of(running)
+        assert (ended["state"], ended["outcome"]) == ("interrupted", "interrupted"), ended
+        _partial_trace(service, ended, "interrupted")
+        assert service.robot.get("/queue").json()["paused"]
+        assert service.robot.get(f"/experiments/{waiting}").json()["state"] == "queued"
+        assert service.status()["connection"] in ("lost", "disconnected")
+        assert not service.robot.post("/stop").json()["confirmed"]
+
+
+def _port_in_use(service: Service) -> None:
+    answer = service.robot.post("/connect")
+    assert (answer.status_code, answer.json()["type"]) == (409, "docs/service.md#port-in-use")
+    assert "is in use by another program" in service.status()["connection_problem"]
+
+
+def _disconnected(service: Service) -> None:
+    assert service.robot.post("/disconnect").status_code == 200
+    status = service.status()
+    assert (status["connection"], status["arm"], status["sample"]) == ("disconnected", "disconnected", None)
+    answer = service.robot.get("/gains")
+    assert (answer.status_code, answer.json()["type"]) == (503, "docs/service.md#not-reached")
+    assert service.until_connected()["connection"] == "connected"
+
+
+# ---- the disk
+
+
+@contextmanager
+def _no_file_grows(process: int, size: int) -> Iterator[None]:
+    """The system refuses a process every byte beyond `size` of a file, as with a full disk."""
+    before = resource.prlimit(process, resource.RLIMIT_FSIZE)
+    resource.prlimit(process, resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.prlimit(process, resource.RLIMIT_FSIZE, before)
+
+
+def test_a_disk_that_fills_up_ends_the_run_and_keeps_what_was_written(service: Service) -> None:
+    running = service.robot.post("/experiments", json={"spec": LONG}).json()["id"]
+    service.until_recording(running)
+    (part,) = (service.folder / "traces").glob("*.part")
+    begun = part.stat().st_size
+    while part.stat().st_size == begun:  # nothing of it has been synced yet
+        assert service.process.poll() is None
+    with _no_file_grows(_owner_of(service.process.pid), part.stat().st_size):
+        ended = service.end_of(running)
+    assert ended["state"] == "failed", ended
+    assert "the run was ended and the arm frozen" in ended["reason"]
+    assert service.status()["arm"] in ("stopped", "fault")
+    assert service.robot.get("/queue").json()["paused"]
+    _partial_trace(service, ended, "interrupted")
+
+
+# ---- helpers
 
 
 def _owner_of(service: int) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from typing import Any, get_args
 
 import numpy as np
@@ -17,7 +16,7 @@ from server.jobs.diagnosis_data import diagnosis_data
 from server.jobs.overlays import LEAST_POINTS, overlay, overlays
 from server.jobs.results import DiagnosisData, JobResult
 from tests.model.discrepancy.answers import an_answer
-from tests.server.service import Service, running_service
+from tests.server.service import Service
 
 RAMP: dict[str, Any] = {"spec": {"name": "ramp"}}
 RESULTS: TypeAdapter[Any] = TypeAdapter(JobResult)
@@ -82,14 +81,6 @@ def test_headlines_name_what_was_found() -> None:
 
 
 @pytest.fixture(scope="module")
-def sound_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
-    """A service whose arm is as its machine file says."""
-    with running_service(tmp_path_factory.mktemp("results")) as service:
-        service.until_connected()
-        yield service
-
-
-@pytest.fixture(scope="module")
 def ramps(sound_service: Service) -> tuple[str, str]:
     """Two traces of a ramp; the worker process is there before the tests, which may leave none behind."""
     ended = [sound_service.end_of(sound_service.robot.post("/experiments", json=RAMP).json()["id"]) for _ in range(2)]
@@ -133,6 +124,7 @@ def test_a_sound_arm_is_called_sound_and_the_queue_takes_what_the_diagnosis_asks
     cancelled = sound_service.robot.post(f"/experiments/{queued.json()['id']}/cancel")
     assert cancelled.json()["state"] == "cancelled"
     assert [s.held_out for s in found.signals] == [False, True]
+    assert {cell.joint for cell in found.given.where.cells} == {1, 2, 3}
 
 
 @pytest.mark.timeout(600)

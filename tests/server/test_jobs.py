@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from server.jobs.mailbox import PROGRESS
-from tests.server.service import Service, running_service
+from tests.server.service import Service
 
 LONG_FIT = {"kind": "fit", "method": "nelder_mead", "starts": 20}
 pytestmark = pytest.mark.timeout(600)
@@ -21,20 +16,19 @@ pytestmark = pytest.mark.timeout(600)
 SHORT = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.2}, "settle": 0.1, "hold": 0.1}
 
 
-@pytest.fixture(scope="module")
-def shared_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
-    """A service of these tests' own, whose worker process is there before each of them."""
-    with running_service(tmp_path_factory.mktemp("jobs")) as service:
-        service.until_connected()
-        warm_up(service)
-        yield service
+@pytest.fixture(scope="module", autouse=True)
+def worker(sound_service: Service) -> None:
+    """The worker process is there before the tests, which may leave none behind: it has done one job."""
+    ended = sound_service.end_of(sound_service.robot.post("/experiments", json={"spec": SHORT}).json()["id"])
+    job = _submitted(sound_service, {"kind": "compare", "traces": [ended["trace"]], "models": ["machine"]})
+    assert _ended(sound_service, job["id"])["state"] == "done"
 
 
-def warm_up(service: Service) -> None:
-    """One job, so that there is a worker."""
-    ended = service.end_of(service.robot.post("/experiments", json={"spec": SHORT}).json()["id"])
-    job = _submitted(service, {"kind": "compare", "traces": [ended["trace"]], "models": ["machine"]})
-    assert _ended(service, job["id"])["state"] == "done"
+@pytest.fixture
+def service(sound_service: Service) -> Service:
+    """The one for jobs, its queue open."""
+    sound_service.robot.post("/queue/resume", json={})
+    return sound_service
 
 
 @pytest.fixture
@@ -108,28 +102,6 @@ def test_a_job_that_is_not_possible_is_refused(service: Service, request_: dict[
     answer = service.robot.post("/jobs", json=request_)
     assert answer.status_code == status, answer.text
     assert answer.headers["Content-Type"] == "application/problem+json"
-
-
-def test_a_killed_worker_interrupts_its_job_and_the_next_one_runs(tmp_path: Path) -> None:
-    with running_service(tmp_path) as service:
-        service.until_connected()
-        ended = service.end_of(service.robot.post("/experiments", json={"spec": SHORT}).json()["id"])
-        _kill_the_worker_of_a_job(service, ended["trace"])
-
-
-def _kill_the_worker_of_a_job(service: Service, trace: str) -> None:
-    long = _submitted(service, LONG_FIT | {"traces": [trace], "seed": 1})
-    following = _submitted(service, {"kind": "compare", "traces": [trace], "models": ["machine"]})
-    _until(service, long["id"], "running")
-    progress = service.folder / "service" / "jobs" / long["id"] / PROGRESS
-    while not progress.exists():
-        pass
-    os.kill(json.loads(progress.read_text())["process"], signal.SIGKILL)
-    ended = _ended(service, long["id"])
-    assert (ended["state"], ended["reason"]) == (
-        "interrupted", "its worker process ended: it was killed, or the memory did not suffice",
-    )  # fmt: skip
-    assert _ended(service, following["id"])["state"] == "done"
 
 
 def test_a_job_is_cancelled_before_and_while_it_runs(service: Service, trace: str) -> None:

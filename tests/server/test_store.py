@@ -87,6 +87,16 @@ def test_what_ran_is_interrupted_after_a_restart_and_what_waits_waits(store: Sto
     assert experiments.settle_after_restart("ma2000", NOW) == []
 
 
+def test_a_trace_that_is_found_before_the_end_of_its_experiment_is_told_stays_found(store: Store) -> None:
+    experiments = ExperimentStore(store)
+    made, _ = experiments.submit("ma2000", ExperimentRequest(), NOW, "anna")
+    experiments.begin("ma2000", made.id, NOW)
+    trace = experiments.trace_number(made.id)
+    experiments.traced(trace, "interrupted")
+    ended = experiments.end("ma2000", made.id, Event.LOST, NOW, "its process was killed")
+    assert (ended.outcome, ended.trace) == ("interrupted", trace)
+
+
 def test_a_clock_that_is_set_back_keeps_the_order_of_submission(store: Store) -> None:
     experiments = ExperimentStore(store)
     moments = [NOW, NOW - timedelta(days=3), NOW - timedelta(days=1), NOW + timedelta(hours=1)]

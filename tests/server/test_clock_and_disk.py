@@ -1,0 +1,109 @@
+"""A clock that is set back, and a disk without room: in a service inside the tests' process."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any, NoReturn
+
+import httpx
+import pytest
+
+from tests.server.inside import WrongClock, service_inside
+
+SHORT = {"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1], "settle": 0, "hold": 0}
+
+
+@pytest.fixture
+def clock() -> WrongClock:
+    """Right, until it is set."""
+    return WrongClock()
+
+
+@pytest.fixture
+def api(tmp_path: Path, clock: WrongClock, monkeypatch: pytest.MonkeyPatch) -> Iterator[httpx.Client]:
+    """Of a service with that clock."""
+    with service_inside(tmp_path, clock, monkeypatch) as client:
+        yield client
+
+
+def _submit(api: httpx.Client, **more: Any) -> str:
+    answer = api.post("experiments", json={"spec": SHORT} | more)
+    assert answer.status_code == 201, answer.text
+    number: str = answer.json()["id"]
+    return number
+
+
+def _listed(api: httpx.Client, path: str) -> list[dict[str, Any]]:
+    items: list[dict[str, Any]] = api.get(path).json()["items"]
+    return items
+
+
+@pytest.mark.timeout(300)
+def test_a_clock_that_is_set_back_while_experiments_wait_reorders_and_loses_nothing(
+    api: httpx.Client, clock: WrongClock
+) -> None:
+    api.post("queue/pause")
+    made = [_submit(api), _submit(api)]
+    clock.ahead = timedelta(days=-3)
+    made += [_submit(api), _submit(api)]
+    assert [one["id"] for one in api.get("queue/experiments").json()] == made
+    assert [one["id"] for one in _listed(api, "experiments")] == made[::-1]
+    assert api.post("connect").status_code == 200
+    api.post("queue/resume", json={})
+    for number in made:
+        while (state := api.get(f"experiments/{number}", params={"wait": 10}).json()["state"]) in ("queued", "running"):
+            pass
+        assert state == "done"
+    started = [one["experiment"] for one in _listed(api, "events?limit=200") if one["text"] == "started"]
+    assert started == made[::-1]  # the newest first
+    assert {one["experiment"] for one in _listed(api, "traces")} == set(made)
+    assert api.post("disconnect").status_code == 200
+
+
+def test_what_waits_for_a_moment_waits_longer_when_the_clock_is_set_back(api: httpx.Client, clock: WrongClock) -> None:
+    in_a_minute = datetime.now(UTC) + timedelta(minutes=1)
+    later = _submit(api, at=in_a_minute.isoformat())
+    schedule = api.post("schedules", json={"spec": SHORT, "every": 3600}).json()
+    while not (runs := _listed(api, f"experiments?schedule={schedule['id']}")):
+        pass
+    clock.ahead = timedelta(days=-1)
+    assert api.get(f"experiments/{later}").json()["state"] == "queued"
+    clock.ahead = timedelta(hours=2)
+    while api.get("queue").json()["waiting_for"] == "":  # what was due waits for the robot, and is not lost
+        pass
+    assert {one["id"] for one in api.get("queue/experiments").json()} >= {later, runs[0]["id"]}
+    assert len(_listed(api, f"experiments?schedule={schedule['id']}")) == 1  # the run before still waits
+
+
+def _full(_path: object) -> Any:
+    return shutil._ntuple_diskusage(10**9, 10**9 - 10**6, 10**6)  # type: ignore[attr-defined]
+
+
+def test_a_full_disk_refuses_new_experiments_and_says_so(api: httpx.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    waiting = _submit(api)
+    monkeypatch.setattr(shutil, "disk_usage", _full)
+    refused = api.post("experiments", json={"spec": SHORT})
+    assert (refused.status_code, refused.json()["type"]) == (507, "docs/service.md#no-room")
+    assert refused.json()["detail"] == "1 MB are free for traces, 20 MB stay free"
+    ready = api.get(api.base_url.join("/readyz"))
+    assert (ready.status_code, ready.json()["checks"]["traces"]) == (503, "1 MB are free, 20 MB stay free")
+    assert [one["id"] for one in api.get("queue/experiments").json()] == [waiting]
+
+
+def test_a_file_that_finds_no_room_is_refused_and_leaves_nothing(
+    api: httpx.Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuses(_descriptor: int) -> NoReturn:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", refuses)
+    table = "time,position_1\n" + "\n".join(f"{0.02 * n:.2f},{0.001 * n}" for n in range(50))
+    answer = api.post("traces", content=table, headers={"Content-Type": "text/csv"})
+    assert (answer.status_code, answer.json()["type"]) == (507, "docs/service.md#no-room"), answer.text
+    assert _listed(api, "traces") == []
+    assert list((tmp_path / "traces").glob("*.mcap")) == []

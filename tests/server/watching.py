@@ -1,0 +1,36 @@
+"""A client of the live stream, for tests."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from websockets.sync.client import ClientConnection, connect
+
+from daq.contracts.service.live import LiveFrame
+from tests.server.service import Service
+
+
+@contextmanager
+def watching(service: Service, robot: str = "ma2000", **request: Any) -> Iterator[ClientConnection]:
+    """A WebSocket that has asked for something."""
+    url = f"{service.url.replace('http', 'ws', 1)}/api/v1/robots/{robot}/live"
+    with connect(url, open_timeout=60, close_timeout=10) as socket:
+        socket.send(json.dumps(request))
+        yield socket
+
+
+def frames(socket: ClientConnection) -> Iterator[LiveFrame]:
+    """What comes, as the contract has it."""
+    while True:
+        yield LiveFrame.model_validate_json(socket.recv(60))
+
+
+def messages(socket: ClientConnection, topic: str) -> Iterator[Any]:
+    """Messages of one topic."""
+    for frame in frames(socket):
+        for message in frame.messages:
+            if message.topic == topic:
+                yield message
