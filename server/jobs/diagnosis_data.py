@@ -4,17 +4,26 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from model.comparison.difference import differences
+from model.discrepancy.where import located
 from model.discrepancy.where_statistics import chance_significance
+from model.fitting.records import noise_floor, records_of
+from model.simulation.simulate import Options, simulate
 from server.jobs.overlays import overlays
-from server.jobs.results import DiagnosisData, DiagnosisStep
+from server.jobs.results import DiagnosisData, DiagnosisStep, GivenWhere
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from daq.contracts.trace import Trace
     from model.comparison.compare import Comparison
     from model.discrepancy.answer import Diagnosis, Step
+    from model.machine_model.model import Model
 
 
-def diagnosis_data(found: Diagnosis, comparison: Comparison | None) -> DiagnosisData:
+def diagnosis_data(found: Diagnosis, comparison: Comparison | None, given: GivenWhere | None = None) -> DiagnosisData:
     """The answer, ready for plots. comparison: of the models before and after, where those can be simulated."""
     return DiagnosisData(
         **{
@@ -23,8 +32,24 @@ def diagnosis_data(found: Diagnosis, comparison: Comparison | None) -> Diagnosis
             "models": () if comparison is None else comparison.models,
             "signals": () if comparison is None else overlays(comparison),
             "differences": differences((found.model_before, found.model_after)),
+            "given": given,
         }
     )
+
+
+def where_given(model: Model, traces: Sequence[Trace]) -> GivenWhere | None:
+    """Where a model disagrees with traces before anything is fitted; None where its simulation does not stay finite.
+
+    Raises TraceError, SpecError for traces that cannot be simulated.
+    """
+    records = records_of(traces, model.machine, "position")
+    runs = [simulate(model, record.inputs, Options(quantise=False)) for record in records]
+    left = [record.measured - run.at_samples(run.reading) for record, run in zip(records, runs, strict=True)]
+    if not all(np.isfinite(one).all() for one in left):
+        return None
+    driven = traces if all(trace.drive is not None for trace in traces) else ()
+    where = located(model, records, left, noise_floor(records, model.machine, "position"), traces=driven)
+    return GivenWhere(where=where, chance=chance_significance(len(where.cells)))
 
 
 def _step(step: Step) -> DiagnosisStep:

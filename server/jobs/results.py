@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from model.comparison.agreement import ModelAgreement
 from model.comparison.difference import ParameterDifference
-from model.discrepancy.answer import Candidate, Diagnosis, Step
+from model.discrepancy.answer import Candidate, Diagnosis, Step, Where
 from model.fitting.result import FitResult
 from model.validation.criterion import Fidelity
 from model.validation.variation import TimeDomain
@@ -78,14 +78,23 @@ class DiagnosisStep(Step):
     """Significance of a cell of `where` that noise alone takes one of all cells beyond, in one record of a hundred."""
 
 
+class GivenWhere(_Part):
+    """Where the model that was given disagrees; `chance` as of a step."""
+
+    where: Where
+    chance: float
+
+
 class DiagnosisData(Diagnosis):
     """A diagnosis (docs/diagnosis.md), and the models before and after it beside the traces where those can be
-    simulated. `differences` are the parameters that moved, those of added effects among them."""
+    simulated. `differences` are the parameters that moved, those of added effects among them; `given` is where the
+    model disagreed with the traces as it was given, before anything was fitted."""
 
     steps: tuple[DiagnosisStep, ...]
     models: tuple[ModelAgreement, ...] = ()
     signals: tuple[Overlay, ...] = ()
     differences: tuple[ParameterDifference, ...] = ()
+    given: GivenWhere | None = None
 
 
 class FitJobResult(_Part):

@@ -189,7 +189,7 @@ class _Worker:
         from model.discrepancy.workflow import diagnose
         from model.reports.diagnosis_report import LABELS, diagnosis_report
         from server.jobs.asking import asker
-        from server.jobs.diagnosis_data import diagnosis_data
+        from server.jobs.diagnosis_data import diagnosis_data, where_given
         from server.jobs.results import DiagnosisJobResult
 
         traces, held = self._traces(request.traces), self._traces(request.held_out)
@@ -199,15 +199,17 @@ class _Worker:
             begin, traces, held, options, lambda f, text: self._tell(0, DIAGNOSIS_SHARE, f, text), self.mailbox,
             ask=asker(begin.machine),
         )  # fmt: skip
-        comparison = None
+        comparison, given = None, None
         controlled = not isinstance(begin.machine.controller, NoController)
         if controlled and all(trace.set_point is not None for trace in (*traces, *held)):
             models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
             comparison = self._compared(models, [*traces, *held], request.held_out, DIAGNOSIS_SHARE)
+            self.mailbox.tell(DIAGNOSIS_SHARE, "where the model as it was given disagrees")
+            given = where_given(begin, traces)
         changed = found.model_after.identity != found.model_before.identity
         if changed:
             self._keep_model(found.model_after)
-        result = DiagnosisJobResult(id=self._job, data=diagnosis_data(found, comparison))
+        result = DiagnosisJobResult(id=self._job, data=diagnosis_data(found, comparison, given))
         report = diagnosis_report(found, comparison)
         return self._done(result, report, of_diagnosis(found), found.model_after if changed else None)
 

@@ -1642,7 +1642,8 @@ export interface components {
         /**
          * DiagnosisData
          * @description A diagnosis (docs/diagnosis.md), and the models before and after it beside the traces where those can be
-         *     simulated. `differences` are the parameters that moved, those of added effects among them.
+         *     simulated. `differences` are the parameters that moved, those of added effects among them; `given` is where the
+         *     model disagreed with the traces as it was given, before anything was fitted.
          */
         DiagnosisData: {
             /**
@@ -1713,6 +1714,7 @@ export interface components {
              * @default []
              */
             differences?: components["schemas"]["ParameterDifference"][];
+            given?: components["schemas"]["GivenWhere"] | null;
         };
         /**
          * DiagnosisJobResult
@@ -2356,6 +2358,15 @@ export interface components {
             alpha: components["schemas"]["Quantity"];
             d: components["schemas"]["Quantity"];
             theta: components["schemas"]["Quantity"];
+        };
+        /**
+         * GivenWhere
+         * @description Where the model that was given disagrees; `chance` as of a step.
+         */
+        GivenWhere: {
+            where: components["schemas"]["Where"];
+            /** Chance */
+            chance: number;
         };
         /**
          * Gripper

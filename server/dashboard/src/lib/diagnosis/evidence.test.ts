@@ -1,7 +1,8 @@
 import { describe, expect, it } from 'vitest';
 import type { DiagnosisStep, TriedEffect } from '../api/types';
 import { evidenceBars } from './evidence';
-import { candidateName, effectName, listed, sentence, verdictTitle } from './words';
+import { viewsOf } from './views';
+import { candidateName, effectName, listed, proper, sentence, verdictTitle } from './words';
 
 const tried = (effect: string, joint: number, evidence: number, refitted = true): TriedEffect => ({
   effect,
@@ -58,6 +59,12 @@ describe('words', () => {
     expect(candidateName({ effect: 'input_delay', joints: [1, 3] })).toBe('input delay, joint 1 + 3');
   });
 
+  it('of headlines have their capitals', () => {
+    expect(proper('named: coulomb friction, joint 2; back emf error')).toBe(
+      'named: Coulomb friction, joint 2; back-EMF error',
+    );
+  });
+
   it('make sentences and lists', () => {
     expect(sentence('joint 2 lags')).toBe('Joint 2 lags.');
     expect(sentence('')).toBe('');
@@ -75,5 +82,22 @@ describe('words', () => {
     expect(verdictTitle({ verdict: 'nothing-significant', steps: [] })).toBe(
       'Nothing significant is missing',
     );
+  });
+});
+
+describe('maps of disagreement', () => {
+  const where = (cells: object[]): never => ({ cells }) as never;
+
+  it('are of the model as given and before every step, where there is a map', () => {
+    const steps = [
+      { ...step([]), where: where([{}]), chance: 3 },
+      { ...step([]), effect: 'wrong_gain', where: where([]), chance: 3 },
+    ];
+    const views = viewsOf({ given: { where: where([{}]), chance: 4 }, steps });
+    expect(views.map((one) => [one.name, one.chance])).toEqual([
+      ['the model as given', 4],
+      ['tolerances fitted, before Coulomb friction, joint 2', 3],
+    ]);
+    expect(viewsOf({ given: null, steps }).map((one) => one.chance)).toEqual([3]);
   });
 });

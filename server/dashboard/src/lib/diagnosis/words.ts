@@ -48,6 +48,13 @@ export function candidateName(one: Pick<TriedEffect, 'effect' | 'joints'>): stri
   return `${effectName(one.effect)}, joint ${one.joints.join(' + ')}`;
 }
 
+/** Words of the service's headlines with the capitals that the field gives them. */
+export function proper(text: string): string {
+  return text
+    .replace(/\b(coulomb|stribeck)\b/g, (word) => PROPER[word] ?? word)
+    .replace(/\bback emf\b/g, 'back-EMF');
+}
+
 /** The first letter of a sentence as a capital one, and a full stop at its end. */
 export function sentence(text: string): string {
   if (text === '') return '';

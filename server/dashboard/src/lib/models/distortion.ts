@@ -7,6 +7,8 @@ export type Curve = Fidelity['curves'][number];
 
 export interface Contribution {
   name: string;
+  /** The joint or link that the parameter belongs to; null for others. */
+  joint: number | null;
   value: number;
   /** 0 to 1 along the bar. */
   begin: number;
@@ -29,11 +31,16 @@ export function contributionBar(parameters: readonly Distortion[], most: number)
     .sort((one, other) => other.contribution - one.contribution);
   const total = ranked.reduce((sum, one) => sum + one.contribution, 0);
   const scale = Math.max(1, total);
-  const shown = ranked.slice(0, most).map((one) => ({ name: one.name, value: one.contribution }));
+  const shown = ranked.slice(0, most).map((one) => ({
+    name: one.name,
+    joint: jointOf(one.name),
+    value: one.contribution,
+  }));
   const left = ranked.slice(most);
   if (left.length > 0) {
     shown.push({
       name: `${left.length} more`,
+      joint: null,
       value: left.reduce((sum, one) => sum + one.contribution, 0),
     });
   }
@@ -44,6 +51,12 @@ export function contributionBar(parameters: readonly Distortion[], most: number)
     return { ...one, begin, end: place };
   });
   return { parts, total, scale, one: 1 / scale };
+}
+
+/** `joint2.motor.resistance` and `link2.mass` belong to joint 2. */
+export function jointOf(name: string): number | null {
+  const found = /^(?:joint|link)(\d+)\b/.exec(name);
+  return found === null ? null : Number(found[1]);
 }
 
 /** A curve is drawn up to so many times its least error. */

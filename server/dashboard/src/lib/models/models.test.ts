@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Fidelity, FittedParameter, ModelParameter } from '../api/types';
-import { contributionBar, curvePicture, pathOf, type Distortion } from './distortion';
+import { contributionBar, curvePicture, jointOf, pathOf, type Distortion } from './distortion';
 import { grouped, groupName, ofDiagnosis, ofFit, parameterRows, whisker } from './parameters';
 
 const parameter = (name: string, value: number, deviation: number | null): ModelParameter => ({
@@ -68,6 +68,15 @@ describe('Σλ²', () => {
     expect(bar.parts.map((one) => one.name)).toEqual(['b', 'a']);
     expect(bar.parts.at(-1)?.end).toBeCloseTo(0.4);
     expect([bar.scale, bar.one]).toEqual([1, 1]);
+  });
+
+  it('knows whose parameters they are', () => {
+    expect(['joint2.motor.resistance', 'link3.mass', 'load.mass', '4 more'].map(jointOf)).toEqual([
+      2,
+      3,
+      null,
+      null,
+    ]);
   });
 
   it('beyond 1 fills the bar, and small parts become one', () => {
