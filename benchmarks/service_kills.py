@@ -37,7 +37,7 @@ WHILE_IT_BEGINS = 0.2
 WITH_A_JOB = 0.3
 """Share of the other kills that find a job under way."""
 QUEUED = 3
-BACK_WITHIN_S = 60.0
+BACK_WITHIN_S = 120.0
 WORKER, OWNER = b"spawn_main", b"server.owner"
 
 

@@ -137,9 +137,9 @@ def _sample(tick: int, value: float) -> LiveSample:
     )  # fmt: skip
 
 
-@given(st.integers(1, 400), st.integers(10, 100))
+@given(st.integers(1, 150), st.integers(10, 40))
 def test_history_keeps_the_newest_and_every_extreme(count: int, points: int) -> None:
-    history = History(joints=6, period=0.02, seconds=4.0)
+    history = History(joints=6, period=0.02, seconds=1.5)
     for tick in range(count):
         history.add(_sample(tick, 1.0 if tick == count - 2 else 0.0))
     found = history.since(0.0, points)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
@@ -56,6 +56,7 @@ class ExperimentLife(RuleBasedStateMachine):
 
 
 TestExperimentLife = ExperimentLife.TestCase
+TestExperimentLife.settings = settings(max_examples=50, stateful_step_count=20)  # six states, seven events
 
 
 @pytest.mark.parametrize("event", sorted(set(Event) - {Event.TAKEN, Event.CANCELLED}))
