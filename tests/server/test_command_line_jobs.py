@@ -15,7 +15,7 @@ from tests.server.service import Service
 
 pytestmark = pytest.mark.timeout(600)
 """The first job of a worker imports, and may compile, the simulation."""
-RAMP = ["run", "ramp", "--joints", "1", "--amplitude", "3", "--duration", "0.2", "--settle", "0.1", "--hold", "0.1"]
+RAMP = ["run", "ramp", "--joints", "1-3", "--amplitude", "8", "--hold", "0.6"]
 NAME = "joint1.viscous_friction.coefficient"
 Daq = Callable[..., Said]
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from server.jobs.results import JobResult
 
 LOOK_EVERY = 1.0
+EXIT_PROGRAM_FAULT, PROGRAM_FAULT = 1, "program fault"
+"""As the reason of such a job begins."""
 EXIT_CODES = {"failed": 2, "cancelled": 130, "interrupted": 3}
 
 
@@ -30,7 +32,8 @@ class JobEndedError(DaqError):
 
     def __init__(self, job: Job) -> None:
         super().__init__(f"job {job.id} {job.state}: {job.reason or 'no reason is known'}")
-        self.exit_code = EXIT_CODES[job.state]  # type: ignore[misc]
+        fault = job.reason.startswith(PROGRAM_FAULT)
+        self.exit_code = EXIT_PROGRAM_FAULT if fault else EXIT_CODES[job.state]  # type: ignore[misc]
 
 
 def require_no_programs(effect_files: Sequence[Path] | None, call: Invocation) -> None:
