@@ -17,6 +17,7 @@ from playwright.sync_api import (
     BrowserContext,
     ConsoleMessage,
     Page,
+    Playwright,
     Request,
     ViewportSize,
     expect,
@@ -27,11 +28,12 @@ from daq.transport.mock_process import MockProcess
 from tests.server.service import Service
 
 NAMES = ("chromium", "chromium-browser")
-OPTIONS = [
-    "--use-angle=swiftshader",  # 3-D without a graphics card
-    "--enable-unsafe-swiftshader",
-    "--disable-features=SpareRendererForSitePerProcess",  # a process that would be left when a test has ended
-]
+OPTIONS = ["--disable-features=SpareRendererForSitePerProcess"]  # a process that would be left when a test has ended
+WITHOUT_3D = ["--disable-3d-apis"]
+"""Most tests do not look at the arm, and without a graphics card 3-D takes most of the processor."""
+WITH_3D = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+NO_3D_HERE = ("WebGL", "THREE.WebGLRenderer")
+"""What the console says where there is none."""
 PATIENCE_MS = 30_000
 """For whatever is waited for: a machine may be busy. Nothing is tested by how long it takes."""
 TABLET: ViewportSize = {"width": 820, "height": 1180}
@@ -48,14 +50,20 @@ def find_chromium() -> str:
 
 
 @contextmanager
-def chromium() -> Iterator[Browser]:
-    """The system's Chromium, without a window."""
-    path = find_chromium()
+def playwright() -> Iterator[Playwright]:
+    """What drives browsers; one for all of them."""
+    find_chromium()
     expect.set_options(timeout=PATIENCE_MS)
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=OPTIONS)
-        yield browser
-        browser.close()
+    with sync_playwright() as found:
+        yield found
+
+
+@contextmanager
+def chromium(driver: Playwright, *options: str) -> Iterator[Browser]:
+    """The system's Chromium, without a window."""
+    browser = driver.chromium.launch(executable_path=find_chromium(), args=[*OPTIONS, *options])
+    yield browser
+    browser.close()
 
 
 class MockControl:
@@ -122,7 +130,7 @@ def watched(context: BrowserContext, service: Service, mock: MockControl) -> Das
     here = urlsplit(service.url).hostname
 
     def said(message: ConsoleMessage) -> None:
-        if message.type in ("error", "warning"):
+        if message.type in ("error", "warning") and not any(word in message.text for word in NO_3D_HERE):
             tab.complaints.append(f"{message.type}: {message.text}")
 
     def requested(request: Request) -> None:

@@ -5,18 +5,34 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, Playwright
 
 from daq.transport.mock_process import start_mock
 from daq.transport.url import MockPort, parse_port_url
-from tests.server.dashboard.browser import WIDE, Dashboard, MockControl, chromium, find_chromium, watched
+from tests.server.dashboard.browser import (
+    WIDE,
+    WITHOUT_3D,
+    Dashboard,
+    MockControl,
+    chromium,
+    find_chromium,
+    playwright,
+    watched,
+)
 from tests.server.service import Service, running_service
 
 
 @pytest.fixture(scope="package")
-def browser() -> Iterator[Browser]:
-    """The system's Chromium; a test that asks for it is skipped where there is none."""
-    with chromium() as found:
+def driver() -> Iterator[Playwright]:
+    """What drives browsers. It has an event loop of its own in this thread, and ends before other tests want one."""
+    with playwright() as found:
+        yield found
+
+
+@pytest.fixture(scope="package")
+def browser(driver: Playwright) -> Iterator[Browser]:
+    """The system's Chromium, without 3-D; a test that asks for it is skipped where there is none."""
+    with chromium(driver, *WITHOUT_3D) as found:
         yield found
 
 

@@ -1,8 +1,14 @@
-/** The control of the robot: taken, renewed by heartbeats, given back. Its secret never leaves this tab. */
+/**
+ * The control of the robot: taken, renewed by heartbeats, given back, also when the tab is closed. Its secret never
+ * leaves this tab.
+ */
 
 import { api, ask, here } from '../api/client';
 import { asProblem, type Problem } from '../api/problem';
 import type { ControlLease } from '../api/types';
+
+/** Share of the time between heartbeats that the service asks for: a busy browser is late. */
+const EARLY = 0.6;
 
 class ControlHeld {
   /** The lease, while this tab has the control. */
@@ -11,6 +17,10 @@ class ControlHeld {
   /** Whether the operator's word for a real arm is what is missing. */
   needsConsent: boolean = $derived(this.problem?.kind === 'consent-needed');
   private timer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor() {
+    addEventListener('pagehide', () => this.leave());
+  }
 
   /** The header that goes with every motion. */
   header(): { 'Control-Lease'?: string } {
@@ -41,7 +51,7 @@ class ControlHeld {
   private keep(lease: ControlLease): void {
     this.lease = lease;
     clearTimeout(this.timer);
-    this.timer = setTimeout(() => void this.renew(), lease.heartbeat_every * 1000);
+    this.timer = setTimeout(() => void this.renew(), EARLY * lease.heartbeat_every * 1000);
   }
 
   private async renew(): Promise<void> {
@@ -59,6 +69,13 @@ class ControlHeld {
       this.forget();
       this.problem = problem;
     }
+  }
+
+  /** The tab goes: nobody is left who could renew it. */
+  private leave(): void {
+    if (this.lease === null) return;
+    const params = { path: here(), header: this.header() };
+    void api.DELETE('/api/v1/robots/{robot}/control', { params, keepalive: true }).catch(() => {});
   }
 
   private forget(): void {

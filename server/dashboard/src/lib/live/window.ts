@@ -2,8 +2,8 @@
 
 import type { Column, Recording, Signal } from './recording';
 
-/** Rows above which columns are thinned: more than the pixels of a wide chart. */
-export const MOST_ROWS = 2400;
+/** Rows above which columns are thinned: about the pixels of a chart. */
+export const MOST_ROWS = 1000;
 
 export interface Shown {
   time: number[];
