@@ -1,0 +1,212 @@
+"""The page of experiments: written in a form, seen before it is sent, followed in the queue to its trace."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from tests.server.dashboard.browser import TABLET, Dashboard
+
+pytestmark = pytest.mark.browser
+SHORT = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.2}, "settle": 0.1, "hold": 0.1}
+
+
+@pytest.fixture
+def form(dashboard: Dashboard) -> Page:
+    """The page, once its form can be used."""
+    page = dashboard.open("experiments")
+    expect(page.get_by_role("combobox", name="Begin from")).to_be_visible()
+    return page
+
+
+@pytest.fixture
+def paused(dashboard: Dashboard) -> Iterator[Dashboard]:
+    """The queue takes nothing: what is submitted waits."""
+    dashboard.service.robot.post("/queue/pause")
+    yield dashboard
+    for one in dashboard.service.robot.get("/queue/experiments").json():
+        dashboard.service.robot.post(f"/experiments/{one['id']}/cancel")
+
+
+def _submit(dashboard: Dashboard, **more: Any) -> str:
+    answer = dashboard.service.robot.post("/experiments", json={"spec": SHORT | more})
+    assert answer.status_code == 201, answer.text
+    number: str = answer.json()["id"]
+    return number
+
+
+def _amplitude(page: Page) -> Locator:
+    return page.get_by_role("textbox", name="Amplitude", exact=False).first
+
+
+def _waiting(page: Page) -> Locator:
+    return page.get_by_role("list", name="Experiments that wait, the next one first").get_by_role("listitem")
+
+
+def test_a_ramp_is_started_from_the_form_and_its_trace_appears(dashboard: Dashboard, form: Page) -> None:
+    _amplitude(form).fill("5")
+    form.get_by_role("textbox", name="Hold after").fill("0.2")
+    form.get_by_role("textbox", name="Name").fill("from-the-form")
+    expect(form.get_by_text("within all limits")).to_be_visible()
+    form.get_by_role("button", name="Add to the queue").click()
+    expect(form.get_by_text("from-the-form is in the queue")).to_be_visible()
+    form.get_by_role("link", name="Trace of from-the-form").click()
+    expect(form.get_by_role("img", name=re.compile("Position and set point of joint 1, 2, 3")).first).to_be_visible()
+    entry = dashboard.service.robot.get("/traces").json()["items"][0]
+    assert (entry["name"], entry["outcome"]) == ("from-the-form", "complete")
+    spec = dashboard.service.robot.get(f"/traces/{entry['id']}").json()["record"]["spec"]
+    assert spec["trajectory"]["amplitude"] == pytest.approx(0.0872664626)
+
+
+def test_a_limit_that_would_be_broken_is_marked_and_nothing_is_sent(dashboard: Dashboard, form: Page) -> None:
+    before = len(dashboard.service.robot.get("/experiments").json()["items"])
+    _amplitude(form).fill("200")
+    broken = form.get_by_role("list", name="Limits that the motion breaks")
+    expect(broken.get_by_text(re.compile(r"joint 2: 24\d\.\d\d° at .* allowed are .* to 224\.6"))).to_be_visible()
+    expect(form.get_by_text("this motion would break a limit: see the preview")).to_be_visible()
+    form.get_by_role("button", name="Add to the queue").click()
+    broken.get_by_role("button", name="show").first.click()
+    expect(form.get_by_role("slider", name="Moment of the motion")).not_to_have_value("0")
+    assert len(dashboard.service.robot.get("/experiments").json()["items"]) == before
+    _amplitude(form).fill("5")
+    expect(form.get_by_text("within all limits")).to_be_visible()
+    expect(broken).not_to_be_attached()
+
+
+def test_a_field_says_what_is_allowed_and_the_button_stays_under_the_pointer(form: Page) -> None:
+    button = form.get_by_role("button", name="Add to the queue")
+    duration = form.get_by_role("textbox", name="Duration")
+    button.scroll_into_view_if_needed()
+    place = button.bounding_box()
+    duration.fill("0")
+    expect(form.get_by_text("allowed: more than 0, up to 3600 s")).to_be_visible()
+    assert button.bounding_box() == place
+    button.click()
+    expect(duration).to_be_focused()
+    duration.fill("0.5")
+    duration.blur()
+    expect(form.get_by_text("allowed: more than 0, up to 3600 s")).not_to_be_visible()
+    assert button.bounding_box() == place
+
+
+def test_a_preset_fills_the_form_and_can_be_changed_as_text(form: Page) -> None:
+    form.get_by_role("combobox", name="Begin from").select_option("diagnostic-c")
+    expect(form.get_by_text("staircases of 0.3°, 1° and 3°")).to_be_visible()
+    expect(form.get_by_text("3 pieces, one after the other")).to_be_visible()
+    form.get_by_role("button", name="as text").click()
+    text = form.get_by_role("textbox", name="Specification")
+    expect(text).to_have_value(re.compile('"kind": "sequence"'))
+    text.fill('{"trajectory": {"kind": "spiral"}}')
+    expect(form.get_by_text(re.compile("trajectory: Input tag 'spiral'"))).to_be_visible()
+    text.fill('{"trajectory": {"kind": "cubic", "amplitude": 0.1}, "joints": [2]}')
+    expect(form.get_by_text("within all limits")).to_be_visible()
+    form.get_by_role("button", name="as text").click()
+    expect(form.get_by_role("combobox", name="Motion")).to_have_value("cubic")
+    expect(_amplitude(form)).to_have_value("5.72958")
+    expect(form.get_by_role("checkbox", name="Joint 1 moves")).not_to_be_checked()
+
+
+def test_joints_can_have_amplitudes_starts_and_gains_of_their_own(dashboard: Dashboard, form: Page) -> None:
+    form.get_by_role("checkbox", name="Joint 3 moves").uncheck()
+    form.get_by_role("checkbox", name="An amplitude of its own").check()
+    form.get_by_role("textbox", name="Amplitude of joint 1").fill("4")
+    form.get_by_role("textbox", name="Amplitude of joint 2").fill("-3")
+    form.get_by_role("textbox", name="Start of joint 3").fill("30")
+    form.get_by_text("Gains P, I, D").click()
+    form.get_by_role("textbox", name="P of joint 2").fill("3")
+    form.get_by_role("textbox", name="I of joint 2").fill("0")
+    gain = form.get_by_role("textbox", name="D of joint 2")
+    gain.fill("21")
+    expect(gain).to_have_attribute("aria-invalid", "true")
+    gain.fill("1")
+    expect(form.get_by_text("within all limits")).to_be_visible()
+    dashboard.service.robot.post("/queue/pause")
+    form.get_by_role("button", name="Add to the queue").click()
+    expect(_waiting(form)).to_have_count(1)
+    (sent,) = dashboard.service.robot.get("/queue/experiments").json()
+    degree = 0.017453292519943295
+    assert sent["spec"]["trajectory"]["amplitude"] == pytest.approx({"1": 4 * degree, "2": -3 * degree})
+    assert sent["spec"]["start"] == pytest.approx({"3": 30 * degree})
+    assert sent["spec"]["gains"] == {"2": [3, 0, 1]}
+
+
+def test_the_queue_is_paused_put_in_another_order_taken_back_and_resumed(paused: Dashboard, form: Page) -> None:
+    for name in ("first", "second", "third"):
+        _submit(paused, name=name)
+    rows = _waiting(form)
+    expect(rows).to_have_text([re.compile("first"), re.compile("second"), re.compile("third")])
+    expect(form.get_by_text("Paused:")).to_be_visible()
+    form.get_by_role("button", name="Run third earlier").click()
+    expect(rows).to_have_text([re.compile("first"), re.compile("third"), re.compile("second")])
+    form.get_by_role("button", name="Run first later").click()
+    expect(rows).to_have_text([re.compile("third"), re.compile("first"), re.compile("second")])
+    form.get_by_role("button", name="Take second back").click()
+    expect(rows).to_have_count(2)
+    names = [one["spec"]["name"] for one in paused.service.robot.get("/queue/experiments").json()]
+    assert names == ["third", "first"]
+    form.get_by_role("button", name="Resume the queue").click()
+    expect(form.get_by_text("Nothing waits")).to_be_visible()
+    expect(form.get_by_role("link", name="Trace of third").first).to_be_visible()
+
+
+def test_what_runs_shows_its_progress_and_is_stopped_from_the_queue(dashboard: Dashboard, form: Page) -> None:
+    _submit(dashboard, name="long", trajectory={"kind": "pause", "duration": 120})
+    expect(form.get_by_role("progressbar", name="Progress of long")).to_be_visible()
+    expect(form.get_by_text(re.compile(r"of \d+"))).to_be_visible()
+    form.get_by_role("button", name="Stop it").click()
+    expect(form.get_by_text("The arm is stopped.")).to_be_visible()
+    expect(form.get_by_text("cancelled", exact=True).first).to_be_visible()
+    assert dashboard.mock.ask("state")["frozen"]
+
+
+def test_an_experiment_waits_for_its_time_and_one_is_run_every_so_often(dashboard: Dashboard, form: Page) -> None:
+    form.get_by_role("radio", name="At a time").check()
+    form.get_by_role("button", name="Add to the queue").click()
+    expect(_waiting(form).first).to_contain_text(re.compile(r"in (9|10) min"))
+    form.get_by_role("button", name=re.compile("Take .* back")).click()
+    form.get_by_role("radio", name="Every so often").check()
+    form.get_by_role("textbox", name="Every", exact=True).fill("5")
+    form.get_by_role("combobox", name="Unit").select_option("s")
+    expect(form.get_by_text("allowed: 10 s to 366 d")).to_be_visible()
+    form.get_by_role("combobox", name="Unit").select_option("h")
+    dashboard.service.robot.post("/queue/pause")
+    form.get_by_role("button", name="Schedule it").click()
+    row = form.get_by_role("row", name=re.compile("ramp"))
+    expect(row).to_contain_text("5 h")
+    expect(row).to_contain_text(re.compile(r"[01] / 10"))
+    row.get_by_role("button", name="Switch off").click()
+    expect(row).to_contain_text("off")
+    row.get_by_role("button", name=re.compile("Take the schedule")).click()
+    expect(row).not_to_be_attached()
+    assert dashboard.service.robot.get("/schedules").json()["items"] == []
+
+
+def test_the_queue_says_that_it_waits_for_whoever_has_the_control(dashboard: Dashboard, form: Page) -> None:
+    lease = dashboard.service.robot.post("/control", json={}).json()["lease"]
+    expect(form.get_by_text("local has the control of the arm: the queue waits")).to_be_visible()
+    dashboard.service.robot.request("DELETE", "/control", headers={"Control-Lease": lease})
+    expect(form.get_by_text("has the control of the arm")).not_to_be_attached()
+
+
+def test_the_motion_is_shown_in_3d_and_turned_with_the_keyboard(form: Page) -> None:
+    picture = form.get_by_label("The motion in 3-D")
+    expect(picture).to_have_accessible_description(re.compile(r"End of the arm at x -?\d+.*Joints: 1 waist 180\.0°"))
+    before = picture.screenshot()
+    picture.focus()
+    for _ in range(6):
+        form.keyboard.press("ArrowRight")
+    form.get_by_role("button", name="Top").scroll_into_view_if_needed()
+    assert picture.screenshot() != before
+    form.get_by_role("slider", name="Moment of the motion").fill("2")
+    expect(picture).to_have_accessible_description(re.compile("1 waist 201.6°"))
+
+
+def test_it_fits_a_tablet(form: Page) -> None:
+    form.set_viewport_size(TABLET)
+    expect(form.get_by_text("within all limits")).to_be_visible()
+    assert form.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    expect(form.get_by_role("button", name="Add to the queue")).to_be_in_viewport()
