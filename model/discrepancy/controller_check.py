@@ -95,7 +95,9 @@ def _wrong_gain(traces: Sequence[Trace], machine: Machine, joint: int) -> Contro
     squares = float(wanted @ wanted)
     relative = float(power @ wanted) / squares - 1.0
     spread = float(np.mean((power - (1 + relative) * wanted) ** 2))
-    deviation = float(np.sqrt(max(spread, 1 / 12) / squares))
+    # Equal errors are rounded alike: only different ones are independent.
+    values, counts = np.unique(wanted, return_counts=True)
+    deviation = float(np.sqrt(max(spread, 1 / 12) * np.sum((counts * values) ** 2)) / squares)
     if abs(relative) < max(LEAST_GAIN_DEVIATION, 5 * deviation):
         return None
     half, used = 2 * deviation, len(wanted)
