@@ -11,6 +11,8 @@ from daq.cli.context import Invocation, JsonOption, YesOption, console, invocati
 from daq.cli.model_input import (
     MODEL_HELP,
     EffectFileOption,
+    HoldoutOption,
+    OutOption,
     ReportOption,
     TraceFolderOption,
     TracesArgument,
@@ -34,13 +36,6 @@ if TYPE_CHECKING:
 app = typer.Typer(add_completion=False)
 
 
-def _model_file(path: Path | None) -> Path | None:
-    """Refuses another kind of file before anything is computed."""
-    if path is not None and path.suffix != ".json":
-        raise SpecError(f"--out {path}: a model is written as .json")
-    return path
-
-
 @app.command()
 def diagnose(
     context: typer.Context,
@@ -48,18 +43,14 @@ def diagnose(
     model: Annotated[
         str | None, typer.Option(help=f"The model to doubt (default: the traces' machine). {MODEL_HELP}")
     ] = None,
-    holdout: Annotated[
-        list[str] | None, typer.Option(help="A trace to judge by, not fitted to. May be repeated.")
-    ] = None,
+    holdout: HoldoutOption = None,
     effects: Annotated[
         str | None, typer.Option(help="Candidates: backlash,coulomb and so on (default: every effect known).")
     ] = None,
     joints: Annotated[str | None, typer.Option(help="Look on these joints only: 1-3, 2 (default: all).")] = None,
     load: Annotated[float | None, typer.Option(min=0.0, help="The load that the arm carried, kg.")] = None,
     most: Annotated[int, typer.Option(min=1, max=10, help="Effects to add at most, one after the other.")] = 3,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", callback=_model_file, help="Where the new model goes, a .json file.")
-    ] = None,
+    out: Annotated[Path | None, OutOption] = None,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     effect_file: EffectFileOption = None,

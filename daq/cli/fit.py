@@ -12,6 +12,8 @@ from daq.cli.effect_choice import bounds, patterns, with_effects
 from daq.cli.model_input import (
     MODEL_HELP,
     EffectFileOption,
+    HoldoutOption,
+    OutOption,
     ReportOption,
     TraceFolderOption,
     TracesArgument,
@@ -48,7 +50,7 @@ ParametersOption = Annotated[
 def fit(
     context: typer.Context,
     traces: TracesArgument,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Where the fitted model goes, a .json file.")],
+    out: Annotated[Path, OutOption],
     model: Annotated[str | None, typer.Option(help=f"Begin from this one. {MODEL_HELP}")] = None,
     machine: Annotated[str | None, typer.Option(help="Machine file or name (default: the traces').")] = None,
     effects: EffectsOption = None,
@@ -56,9 +58,7 @@ def fit(
     parameters: ParametersOption = None,
     hold: Annotated[str | None, typer.Option(help="Names or patterns to leave as they are.")] = None,
     bound: Annotated[list[str] | None, typer.Option(help="name=low:high, instead of the model's own bounds.")] = None,
-    holdout: Annotated[
-        list[str] | None, typer.Option(help="A trace to judge the model by, not fitted to. May be repeated.")
-    ] = None,
+    holdout: HoldoutOption = None,
     no_priors: Annotated[bool, typer.Option("--no-priors", help="Leave expected deviations out.")] = False,
     method: Annotated[
         Literal["least_squares", "nelder_mead"], typer.Option(help="nelder_mead is the source's hill climbing.")
@@ -83,8 +83,6 @@ def fit(
     call = invocation(context)
     require_no_programs(effect_file, call)
     load_effects(effect_file)
-    if out.suffix != ".json":
-        raise SpecError(f"--out {out}: a model is written as .json")
     fitted_to = read_traces(call, folder, traces)
     held = read_traces(call, folder, holdout or []) if holdout else []
     begin = _beginning(call, fitted_to, model, machine, effects)

@@ -33,6 +33,19 @@ ReportOption = Annotated[
     Path | None, typer.Option("--report", callback=_page, help="Write a self-contained page, an .html file.")
 ]
 
+
+def _model_file(path: Path | None) -> Path | None:
+    """Refuses another kind of file before anything is computed."""
+    if path is not None and path.suffix != ".json":
+        raise SpecError(f"--out {path}: a model is written as .json")
+    return path
+
+
+OutOption = typer.Option("--out", "-o", callback=_model_file, help="Where the model that is made goes, a .json file.")
+HoldoutOption = Annotated[
+    list[str] | None, typer.Option("--holdout", help="A trace to judge by, not fitted to. May be repeated.")
+]
+
 EffectFileOption = Annotated[
     list[Path] | None,
     typer.Option("--effect-file", help="An effect of your own (.py, docs/own-effect.md). May be repeated."),

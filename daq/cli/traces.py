@@ -102,7 +102,7 @@ def show(
     if json:
         data = found.record.model_dump(mode="json", exclude={"machine", "memory_map"})
         print_json({"path": path, "record": data, "samples": len(found), "missing": found.missing,
-                    "joints": [vars(figure) for figure in figures]})  # fmt: skip
+                    "joints": [figure.model_dump() for figure in figures]})  # fmt: skip
         return
     record = found.record
     what = record.spec.trajectory.kind if record.spec else "import"

@@ -1,44 +1,24 @@
-"""A trace in a few figures a joint: how far, how fast, how much over, how exact."""
+"""The figures of a trace, joint by joint."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from daq.contracts.figures import JointFigureSet
 from daq.contracts.trace import Floats, Trace
 
 RISE_FROM, RISE_TO = 0.1, 0.9
 """Rise time is counted between these shares of the way, as is usual in control."""
 
 
-@dataclass(frozen=True)
-class JointFigures:
-    """Angles in degrees (`unit` °), lengths in mm on a prismatic joint; times in s, drive in the trace's unit.
-
-    `overshoot` is how far beyond the last set point the joint went, in the direction of the motion; `rise_time` that
-    of the position between 10 and 90 % of the way; None where there is no set point, or no way.
-    """
-
-    joint: int
-    unit: str
-    moved: bool
-    start: float
-    end: float
-    overshoot: float | None
-    rise_time: float | None
-    largest_error: float | None
-    final_error: float | None
-    largest_drive: float | None
-
-
-def joint_figures(trace: Trace) -> list[JointFigures]:
+def joint_figures(trace: Trace) -> list[JointFigureSet]:
     """Figures of every joint of a trace; none for one without samples."""
     return [_figures(trace, joint, trace.column(joint)) for joint in trace.joints] if len(trace) else []
 
 
-def _figures(trace: Trace, joint: int, column: int) -> JointFigures:
+def _figures(trace: Trace, joint: int, column: int) -> JointFigureSet:
     machine = trace.record.machine
     prismatic = machine is not None and machine.joint(joint).kind == "prismatic"
     scale = 1e3 if prismatic else math.degrees(1.0)
@@ -48,7 +28,7 @@ def _figures(trace: Trace, joint: int, column: int) -> JointFigures:
     drive = None if trace.drive is None else trace.drive[:, column]
     moved = bool(np.ptp(position if set_point is None else set_point) > 0)
     way = 0.0 if set_point is None else float(set_point[-1] - set_point[0])
-    return JointFigures(
+    return JointFigureSet(
         joint=joint,
         unit="mm" if prismatic else "°",
         moved=moved,

@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from daq.contracts.experiment import ExperimentSpec, Ramp
+from daq.contracts.figures import JointFigureSet
 from daq.contracts.machine import load_machine
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.experiments import (
@@ -62,7 +63,7 @@ from daq.contracts.service.teaching import (
     StepRequest,
     TeachingStatus,
 )
-from daq.contracts.service.traces import CatalogueEntry, JointFigureSet, TraceChange, TraceDetails, TraceSignals
+from daq.contracts.service.traces import CatalogueEntry, TraceChange, TraceDetails, TraceSignals
 from daq.contracts.trace import TraceEvent, TraceRecord
 from daq.teaching import Program
 from daq.teaching.program import Absolute, Gripper, Wait

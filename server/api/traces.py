@@ -14,7 +14,6 @@ from starlette.background import BackgroundTask
 from daq.contracts.service.base import Page
 from daq.contracts.service.traces import (
     CatalogueEntry,
-    JointFigureSet,
     Source,
     TraceChange,
     TraceDetails,
@@ -81,7 +80,7 @@ def get_trace(trace: Identity, one: RobotPart, found: ServicesPart, _: Viewer) -
     return TraceDetails(
         entry=entry,
         record=read.record,
-        figures=tuple(JointFigureSet(**vars(figures)) for figures in joint_figures(read)),
+        figures=tuple(joint_figures(read)),
         events=read.events,
         missing_samples=read.missing,
     )

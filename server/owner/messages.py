@@ -11,7 +11,7 @@ from daq.acquisition.messages import EventHappened, Finished, Progress
 from daq.contracts.experiment import ExperimentSpec, Gain
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
-from daq.contracts.service.robot import Activity, ArmState
+from daq.contracts.service.robot import Activity, ArmState, ControlPeriod
 from daq.teaching import Program
 
 
@@ -162,17 +162,10 @@ class Opened(_Message):
     boots: int
 
 
-class LiveSample(_Message):
-    """One control period, whatever is going on. Columns in the order of `joints`; `host_time` in s, monotonic."""
+class LiveSample(ControlPeriod):
+    """One control period, whatever is going on."""
 
     kind: Literal["live"] = "live"
-    tick: int
-    host_time: float
-    joints: tuple[int, ...]
-    set_point: tuple[float, ...]
-    position: tuple[float, ...]
-    error: tuple[float, ...]
-    drive: tuple[float, ...]
     status: int
     lateness: float
     """s by which it came later than the quickest samples after their ticks."""

@@ -9,7 +9,7 @@ from sqlalchemy import select
 from daq.contracts.service.base import Page
 from daq.contracts.service.events import ServiceEvent
 from server.store.engine import Store
-from server.store.pages import Cursor, page_of
+from server.store.pages import newest_first
 from server.store.tables import EventRow
 
 
@@ -31,14 +31,10 @@ class EventStore:
 
     def page(self, robot: str, experiment: str | None, cursor: str | None, limit: int) -> Page[ServiceEvent]:
         """The newest first."""
-        query = select(EventRow).where(EventRow.robot == robot).order_by(EventRow.sequence.desc())
+        query = select(EventRow).where(EventRow.robot == robot)
         if experiment is not None:
             query = query.where(EventRow.experiment == experiment)
-        if cursor is not None:
-            query = query.where(EventRow.sequence < Cursor.parse(cursor).number)
-        with self._store.reading() as session:
-            rows = list(session.scalars(query.limit(limit + 1)))
-        return page_of(rows, limit, _event, lambda row: Cursor(row.sequence))
+        return newest_first(self._store, query, EventRow.sequence, cursor, limit, _event)
 
 
 def _event(row: EventRow) -> ServiceEvent:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import secrets
 from collections.abc import Sequence
 from datetime import datetime
 
@@ -19,7 +17,8 @@ from server.problems import conflict, not_found
 from server.queue.order import Waiting
 from server.queue.states import Event, IllegalEventError, advance, after_restart
 from server.store.engine import Store
-from server.store.pages import Cursor, page_of
+from server.store.pages import newest_first
+from server.store.submitted import digest_of, made_before, new_columns
 from server.store.tables import ExperimentRow
 
 
@@ -42,26 +41,16 @@ class ExperimentStore:
 
         Raises a 409 when the key was used for something else.
         """
-        digest = hashlib.sha256(request.model_dump_json().encode()).hexdigest()
+        digest = digest_of(request)
         with self._store.writing() as session:
-            if key is not None:
-                found = session.scalar(select(ExperimentRow).filter_by(robot=robot, idempotency_key=key))
-                if found is not None:
-                    _require_same(found.request_digest, digest, key)
-                    return as_experiment(found), False
+            if (found := made_before(session, ExperimentRow, robot, key, digest)) is not None:
+                return as_experiment(found), False
             row = ExperimentRow(
-                id=secrets.token_hex(6),
-                robot=robot,
+                **new_columns(robot, key, digest, now, by),
                 spec=request.spec.model_dump(mode="json"),
-                state="queued",
                 priority=request.priority,
                 at=request.at,
                 schedule=schedule,
-                idempotency_key=key,
-                request_digest=digest,
-                submitted=now,
-                submitted_by=by,
-                reason="",
                 trace=new_trace_id(),
             )
             session.add(row)
@@ -77,16 +66,12 @@ class ExperimentStore:
         self, robot: str, states: Sequence[ExperimentState], schedule: str | None, cursor: str | None, limit: int
     ) -> Page[Experiment]:
         """The newest first."""
-        query = select(ExperimentRow).where(ExperimentRow.robot == robot).order_by(ExperimentRow.sequence.desc())
+        query = select(ExperimentRow).where(ExperimentRow.robot == robot)
         if states:
             query = query.where(ExperimentRow.state.in_(states))
         if schedule is not None:
             query = query.where(ExperimentRow.schedule == schedule)
-        if cursor is not None:
-            query = query.where(ExperimentRow.sequence < Cursor.parse(cursor).number)
-        with self._store.reading() as session:
-            rows = list(session.scalars(query.limit(limit + 1)))
-        return page_of(rows, limit, as_experiment, lambda row: Cursor(row.sequence))
+        return newest_first(self._store, query, ExperimentRow.sequence, cursor, limit, as_experiment)
 
     def waiting(self, robot: str) -> list[Waiting]:
         """All that are queued, in no order."""
@@ -211,9 +196,3 @@ def _row(session: Session, robot: str, identity: str) -> ExperimentRow:
     if row is None:
         raise not_found(f"experiment {identity!r}", "GET …/experiments lists those there are")
     return row
-
-
-def _require_same(before: str | None, now: str, key: str) -> None:
-    if before != now:
-        line = f"Idempotency-Key {key!r} was used for another request"
-        raise conflict("idempotency-key", line, "use a new key for a new request")

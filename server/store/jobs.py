@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import secrets
 from collections.abc import Sequence
 from datetime import datetime
 
@@ -25,7 +23,8 @@ from daq.contracts.service.jobs import (
 from server.problems import conflict, not_found
 from server.queue.states import Event, IllegalEventError, advance
 from server.store.engine import Store
-from server.store.pages import Cursor, page_of
+from server.store.pages import newest_first
+from server.store.submitted import digest_of, made_before, new_columns
 from server.store.tables import JobRow, TraceUseRow
 
 _REQUEST: TypeAdapter[FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest] = TypeAdapter(JobRequest)
@@ -49,26 +48,14 @@ class JobStore:
 
     def submit(self, robot: str, request: JobRequest, now: datetime, by: str, key: str | None) -> tuple[Job, bool]:
         """A new job, queued, and True; or the one that the same key made before, and False. Raises a 409."""
-        digest = hashlib.sha256(request.model_dump_json().encode()).hexdigest()
+        digest = digest_of(request)
         with self._store.writing() as session:
-            if key is not None:
-                found = session.scalar(select(JobRow).filter_by(robot=robot, idempotency_key=key))
-                if found is not None:
-                    if found.request_digest != digest:
-                        line = f"Idempotency-Key {key!r} was used for another request"
-                        raise conflict("idempotency-key", line, "use a new key for a new request")
-                    return as_job(found), False
+            if (found := made_before(session, JobRow, robot, key, digest)) is not None:
+                return as_job(found), False
             row = JobRow(
-                id=secrets.token_hex(6),
-                robot=robot,
+                **new_columns(robot, key, digest, now, by),
                 kind=request.kind,
                 request=request.model_dump(mode="json"),
-                state="queued",
-                idempotency_key=key,
-                request_digest=digest,
-                submitted=now,
-                submitted_by=by,
-                reason="",
                 headline="",
             )
             session.add(row)
@@ -92,18 +79,14 @@ class JobStore:
         model: str | None = None,
     ) -> Page[Job]:
         """The newest first; of a model, those that were given it and the one that made it."""
-        query = select(JobRow).where(JobRow.robot == robot).order_by(JobRow.sequence.desc())
+        query = select(JobRow).where(JobRow.robot == robot)
         if states:
             query = query.where(JobRow.state.in_(states))
         if kind is not None:
             query = query.where(JobRow.kind == kind)
         if model is not None:
             query = query.where(_concerns(model))
-        if cursor is not None:
-            query = query.where(JobRow.sequence < Cursor.parse(cursor).number)
-        with self._store.reading() as session:
-            rows = list(session.scalars(query.limit(limit + 1)))
-        return page_of(rows, limit, as_job, lambda row: Cursor(row.sequence))
+        return newest_first(self._store, query, JobRow.sequence, cursor, limit, as_job)
 
     def waiting(self, robot: str) -> list[Job]:
         """Those queued, the first submitted first."""

@@ -8,10 +8,14 @@ import binascii
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
+
+from sqlalchemy import Select
+from sqlalchemy.orm import InstrumentedAttribute
 
 from daq.contracts.service.base import Page
 from server.problems import ProblemError
+from server.store.engine import Store
 
 Row = TypeVar("Row")
 Item = TypeVar("Item")
@@ -46,3 +50,20 @@ def page_of(
     shown = rows[:limit]
     following = str(place(shown[-1])) if len(rows) > limit and shown else None
     return Page(items=tuple(convert(row) for row in shown), next=following)
+
+
+def newest_first(
+    store: Store,
+    query: Select[Any],
+    number: InstrumentedAttribute[int],
+    cursor: str | None,
+    limit: int,
+    convert: Callable[[Row], Item],
+) -> Page[Item]:
+    """A part of what `query` finds, by falling `number`: one that grows with every row, whatever clocks do."""
+    query = query.order_by(number.desc())
+    if cursor is not None:
+        query = query.where(number < Cursor.parse(cursor).number)
+    with store.reading() as session:
+        rows = list(session.scalars(query.limit(limit + 1)))
+    return page_of(rows, limit, convert, lambda row: Cursor(getattr(row, number.key)))

@@ -14,7 +14,7 @@ from daq.contracts.service.experiments import Schedule, ScheduleRequest
 from server.problems import not_found
 from server.queue.schedule import Plan, following, is_due
 from server.store.engine import Store
-from server.store.pages import Cursor, page_of
+from server.store.pages import newest_first
 from server.store.tables import ScheduleRow
 
 
@@ -53,12 +53,8 @@ class ScheduleStore:
 
     def page(self, robot: str, cursor: str | None, limit: int) -> Page[Schedule]:
         """The newest first."""
-        query = select(ScheduleRow).where(ScheduleRow.robot == robot).order_by(ScheduleRow.sequence.desc())
-        if cursor is not None:
-            query = query.where(ScheduleRow.sequence < Cursor.parse(cursor).number)
-        with self._store.reading() as session:
-            rows = list(session.scalars(query.limit(limit + 1)))
-        return page_of(rows, limit, _schedule, lambda row: Cursor(row.sequence))
+        query = select(ScheduleRow).where(ScheduleRow.robot == robot)
+        return newest_first(self._store, query, ScheduleRow.sequence, cursor, limit, _schedule)
 
     def switch(self, robot: str, identity: str, *, active: bool) -> Schedule:
         """On or off. Raises a 404."""

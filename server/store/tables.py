@@ -36,8 +36,25 @@ class Table(DeclarativeBase):
     type_annotation_map = {datetime: Utc, dict[str, Any]: JSON, list[Any]: JSON, str: String(200)}  # noqa: RUF012
 
 
-class ExperimentRow(Table):
-    """One experiment. `sequence` orders those submitted: clocks may be set back."""
+class Submitted:
+    """What an experiment and a job have in common: columns. `sequence` orders those submitted: clocks may be set
+    back."""
+
+    sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
+    id: Mapped[str] = mapped_column(String(12), unique=True)
+    robot: Mapped[str] = mapped_column(String(32))
+    state: Mapped[str] = mapped_column(String(16))
+    idempotency_key: Mapped[str | None] = mapped_column(String(200))
+    request_digest: Mapped[str | None] = mapped_column(String(64))
+    submitted: Mapped[datetime]
+    submitted_by: Mapped[str]
+    started: Mapped[datetime | None]
+    ended: Mapped[datetime | None]
+    reason: Mapped[str] = mapped_column(Text, default="")
+
+
+class ExperimentRow(Submitted, Table):
+    """One experiment."""
 
     __tablename__ = "experiments"
     __table_args__ = (
@@ -45,22 +62,11 @@ class ExperimentRow(Table):
         Index("experiments_by_state", "robot", "state", "priority", "sequence"),
     )
 
-    sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
-    id: Mapped[str] = mapped_column(String(12), unique=True)
-    robot: Mapped[str] = mapped_column(String(32))
     spec: Mapped[dict[str, Any]]
-    state: Mapped[str] = mapped_column(String(16))
     priority: Mapped[int] = mapped_column(default=0)
     at: Mapped[datetime | None]
     schedule: Mapped[str | None] = mapped_column(String(12))
-    idempotency_key: Mapped[str | None] = mapped_column(String(200))
-    request_digest: Mapped[str | None] = mapped_column(String(64))
-    submitted: Mapped[datetime]
-    submitted_by: Mapped[str]
-    started: Mapped[datetime | None]
-    ended: Mapped[datetime | None]
     outcome: Mapped[str | None] = mapped_column(String(16))
-    reason: Mapped[str] = mapped_column(Text, default="")
     trace: Mapped[str] = mapped_column(String(12), unique=True)
     """Number of its trace, chosen before it runs: after a crash the trace is found by it."""
 
@@ -133,7 +139,7 @@ class TraceTagRow(Table):
     tag: Mapped[str] = mapped_column(String(40), primary_key=True, index=True)
 
 
-class JobRow(Table):
+class JobRow(Submitted, Table):
     """A computation in the background: a fit, a validation, a comparison."""
 
     __tablename__ = "jobs"
@@ -142,19 +148,8 @@ class JobRow(Table):
         Index("jobs_by_state", "robot", "state", "sequence"),
     )
 
-    sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
-    id: Mapped[str] = mapped_column(String(12), unique=True)
-    robot: Mapped[str] = mapped_column(String(32))
     kind: Mapped[str] = mapped_column(String(32))
     request: Mapped[dict[str, Any]]
-    state: Mapped[str] = mapped_column(String(16))
-    idempotency_key: Mapped[str | None] = mapped_column(String(200))
-    request_digest: Mapped[str | None] = mapped_column(String(64))
-    submitted: Mapped[datetime]
-    submitted_by: Mapped[str]
-    started: Mapped[datetime | None]
-    ended: Mapped[datetime | None]
-    reason: Mapped[str] = mapped_column(Text, default="")
     headline: Mapped[str] = mapped_column(Text, default="", server_default="")
     """What it found."""
     model: Mapped[str | None] = mapped_column(String(64))

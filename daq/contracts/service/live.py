@@ -15,7 +15,7 @@ from daq.contracts.service.base import Wire
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.queue import Control, QueueStatus
-from daq.contracts.service.robot import Activity, ArmState, ConnectionState, RobotIdentity
+from daq.contracts.service.robot import Activity, ArmState, ConnectionState, ControlPeriod, RobotIdentity
 from daq.contracts.service.teaching import Velocity
 from daq.contracts.trace import EventKind
 
@@ -23,17 +23,10 @@ Topic = Literal["samples", "robot", "link", "queue", "jobs", "events", "teaching
 SampleRate = Literal[50, 25, 10, 5, 1]
 
 
-class SampleMessage(Wire):
+class SampleMessage(ControlPeriod):
     """One control period."""
 
     topic: Literal["sample"] = "sample"
-    tick: int
-    host_time: float
-    joints: tuple[int, ...]
-    set_point: tuple[float, ...]
-    position: tuple[float, ...]
-    error: tuple[float, ...]
-    drive: tuple[float, ...]
     frozen: bool
     lateness: float
     """s by which it came later than the quickest samples after their ticks: the link's jitter."""

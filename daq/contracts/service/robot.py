@@ -15,19 +15,25 @@ Activity = Literal["none", "experiment", "jog", "step", "program", "lead"]
 ConnectionState = Literal["disconnected", "connecting", "connected", "lost"]
 
 
-class Sample(Wire):
-    """One control period. `host_time` is the monotonic clock (s) of the service's computer, `utc` the wall clock (s
-    since 1970) when it arrived, `age` the s that have passed since."""
+class ControlPeriod(Wire):
+    """Signals of one control period, columns in the order of `joints`. `host_time` is the monotonic clock (s) of the
+    service's computer when they arrived."""
 
     tick: int
     host_time: float
-    utc: float
-    age: float
     joints: tuple[int, ...]
     set_point: tuple[float, ...]
     position: tuple[float, ...]
     error: tuple[float, ...]
     drive: tuple[float, ...]
+
+
+class Sample(ControlPeriod):
+    """One control period. `host_time` is the monotonic clock (s) of the service's computer, `utc` the wall clock (s
+    since 1970) when it arrived, `age` the s that have passed since."""
+
+    utc: float
+    age: float
     frozen: bool
 
 

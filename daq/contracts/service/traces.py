@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AwareDatetime, Field
 
+from daq.contracts.figures import JointFigureSet
 from daq.contracts.service.base import Wire
 from daq.contracts.trace import Outcome, TraceEvent, TraceRecord
 
@@ -38,21 +39,6 @@ class CatalogueEntry(Wire):
     notes: str = ""
     missing: bool = False
     """The catalogue knows it, but its file is gone."""
-
-
-class JointFigureSet(Wire):
-    """Figures of one joint: angles in degrees (`unit`), lengths in mm on a prismatic joint, times in s."""
-
-    joint: int
-    unit: str
-    moved: bool
-    start: float
-    end: float
-    overshoot: float | None
-    rise_time: float | None
-    largest_error: float | None
-    final_error: float | None
-    largest_drive: float | None
 
 
 class TraceDetails(Wire):

@@ -2588,7 +2588,11 @@ export interface components {
         };
         /**
          * JointFigureSet
-         * @description Figures of one joint: angles in degrees (`unit`), lengths in mm on a prismatic joint, times in s.
+         * @description Figures of one joint: angles in degrees (`unit` °), lengths in mm on a prismatic joint; times in s, drive in the
+         *     trace's unit.
+         *
+         *     `overshoot` is how far beyond the last set point the joint went, in the direction of the motion; `rise_time` that
+         *     of the position between 10 and 90 % of the way; None where there is no set point, or no way.
          */
         JointFigureSet: {
             /** Joint */
@@ -3870,10 +3874,6 @@ export interface components {
             tick: number;
             /** Host Time */
             host_time: number;
-            /** Utc */
-            utc: number;
-            /** Age */
-            age: number;
             /** Joints */
             joints: number[];
             /** Set Point */
@@ -3884,6 +3884,10 @@ export interface components {
             error: number[];
             /** Drive */
             drive: number[];
+            /** Utc */
+            utc: number;
+            /** Age */
+            age: number;
             /** Frozen */
             frozen: boolean;
         };
@@ -3892,11 +3896,6 @@ export interface components {
          * @description One control period.
          */
         SampleMessage: {
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            topic: "sample";
             /** Tick */
             tick: number;
             /** Host Time */
@@ -3911,6 +3910,11 @@ export interface components {
             error: number[];
             /** Drive */
             drive: number[];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            topic: "sample";
             /** Frozen */
             frozen: boolean;
             /** Lateness */

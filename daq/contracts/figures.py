@@ -1,0 +1,27 @@
+"""A trace in a few figures a joint: how far, how fast, how much over, how exact."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict
+
+
+class JointFigureSet(BaseModel):
+    """Figures of one joint: angles in degrees (`unit` °), lengths in mm on a prismatic joint; times in s, drive in the
+    trace's unit.
+
+    `overshoot` is how far beyond the last set point the joint went, in the direction of the motion; `rise_time` that
+    of the position between 10 and 90 % of the way; None where there is no set point, or no way.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    joint: int
+    unit: str
+    moved: bool
+    start: float
+    end: float
+    overshoot: float | None
+    rise_time: float | None
+    largest_error: float | None
+    final_error: float | None
+    largest_drive: float | None

@@ -1,0 +1,47 @@
+"""What experiments and jobs have in common: submitted once a key, whoever sends the same request how often."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from datetime import datetime
+from typing import Any, TypeVar
+
+from pydantic import BaseModel
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from server.problems import conflict
+from server.store.tables import ExperimentRow, JobRow
+
+Row = TypeVar("Row", ExperimentRow, JobRow)
+
+
+def digest_of(request: BaseModel) -> str:
+    """Tells whether two requests under one key are the same."""
+    return hashlib.sha256(request.model_dump_json().encode()).hexdigest()
+
+
+def made_before(session: Session, table: type[Row], robot: str, key: str | None, digest: str) -> Row | None:
+    """What the same key made; None where it made nothing. Raises a 409 when it was used for something else."""
+    if key is None:
+        return None
+    found = session.scalar(select(table).filter_by(robot=robot, idempotency_key=key))
+    if found is not None and found.request_digest != digest:
+        line = f"Idempotency-Key {key!r} was used for another request"
+        raise conflict("idempotency-key", line, "use a new key for a new request")
+    return found
+
+
+def new_columns(robot: str, key: str | None, digest: str, now: datetime, by: str) -> dict[str, Any]:
+    """Of something that is queued now."""
+    return {
+        "id": secrets.token_hex(6),
+        "robot": robot,
+        "state": "queued",
+        "idempotency_key": key,
+        "request_digest": digest,
+        "submitted": now,
+        "submitted_by": by,
+        "reason": "",
+    }
