@@ -28,7 +28,21 @@ from daq.transport.mock_process import MockProcess
 from tests.server.service import Service
 
 NAMES = ("chromium", "chromium-browser")
-OPTIONS = ["--disable-features=SpareRendererForSitePerProcess"]  # a process that would be left when a test has ended
+UNWANTED = (
+    "SpareRendererForSitePerProcess",  # a process that would be left when a test has ended
+    # What a browser does for people, beside showing a page:
+    "DialMediaRouteProvider",
+    "GlobalMediaControls",
+    "MediaRouter",
+    "OnDeviceModelPerformanceParams",
+    "OptimizationGuideModelDownloading",
+    "OptimizationGuideModelExecution",
+    "OptimizationGuideOnDeviceModel",
+    "OptimizationHints",
+    "PaintHolding",
+    "Translate",
+)
+OPTIONS = [f"--disable-features={','.join(UNWANTED)}", "--disable-component-update", "--disable-background-networking"]
 WITHOUT_3D = ["--disable-3d-apis"]
 """Most tests do not look at the arm, and without a graphics card 3-D takes most of the processor."""
 WITH_3D = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
@@ -95,7 +109,8 @@ class Dashboard:
     """One tab of a browser on the service's page."""
 
     service: Service
-    mock: MockControl
+    mock: MockControl | None
+    """None where no test asks the mock behind the service's back."""
     page: Page
     complaints: list[str] = field(default_factory=list)
     """What the browser complained about: errors on its console, requests to elsewhere. A test fails that leaves any."""
@@ -122,7 +137,7 @@ class Dashboard:
         self.complaints.clear()
 
 
-def watched(context: BrowserContext, service: Service, mock: MockControl) -> Dashboard:
+def watched(context: BrowserContext, service: Service, mock: MockControl | None = None) -> Dashboard:
     """A new tab, with everything noted that the browser complains about."""
     page = context.new_page()
     page.set_default_timeout(PATIENCE_MS)

@@ -13,7 +13,7 @@ export const SILENT_AFTER = 1.5;
 /** s that it has to answer. */
 export const ANSWER_WITHIN = 1.5;
 /** s for a connection to open. */
-export const OPEN_WITHIN = 4;
+export const OPEN_WITHIN = 6;
 
 export type SocketState =
   | { phase: 'connecting'; attempt: number }

@@ -9,6 +9,8 @@ const event = (kind: RecordEventMessage['kind'], host_time: number): RecordEvent
   tick: null,
   joint: null,
   host_time,
+  time: host_time,
+  experiment: null,
 });
 
 it('marks what matters with a name, what comes often with a tick, and nothing outside the window', () => {

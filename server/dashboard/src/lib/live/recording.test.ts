@@ -101,6 +101,8 @@ describe('the recording', () => {
       tick: 1,
       joint: 2,
       host_time: 1,
+      time: 1,
+      experiment: null,
     } as const;
     made.addEvent(event);
     made.addEvent({ ...event, host_time: 1.01 });

@@ -7,6 +7,7 @@ const CONFIRMED: StopResult = {
   confirmed: true,
   tick: 7,
   seconds: 0.03,
+  note: '',
   text: 'frozen at tick 7',
 };
 const never = (): Promise<StopResult> => new Promise(() => {});
