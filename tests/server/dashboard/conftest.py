@@ -19,6 +19,7 @@ from tests.server.dashboard.browser import (
     playwright,
     watched,
 )
+from tests.server.dashboard.studied import Studied, studied_arm
 from tests.server.service import Service, running_service
 
 
@@ -64,6 +65,25 @@ def dashboard(browser: Browser, served: tuple[Service, MockControl]) -> Iterator
     service.robot.post("/queue/resume", json={})
     context = browser.new_context(viewport=WIDE, color_scheme="light")
     tab = watched(context, service, mock)
+    yield tab
+    context.close()
+    assert tab.complaints == []
+
+
+@pytest.fixture(scope="package")
+def studied(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Studied]:
+    """A service that has studied its arm: traces, a fit, a validation, a diagnosis."""
+    find_chromium()
+    with studied_arm(tmp_path_factory.mktemp("studied")) as found:
+        yield found
+
+
+@pytest.fixture
+def studied_dashboard(browser: Browser, studied: Studied) -> Iterator[Dashboard]:
+    """A tab on that service, its queue paused: what is queued stays there."""
+    studied.service.robot.post("/queue/pause", json={})
+    context = browser.new_context(viewport=WIDE, color_scheme="light")
+    tab = watched(context, studied.service)
     yield tab
     context.close()
     assert tab.complaints == []

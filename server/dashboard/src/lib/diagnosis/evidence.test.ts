@@ -79,6 +79,9 @@ describe('words', () => {
     expect(verdictTitle({ verdict: 'ambiguous', steps: [step(candidates.slice(0, 2))] })).toBe(
       'Either Stribeck friction, joint 2 or Coulomb friction, joint 2',
     );
+    expect(verdictTitle({ verdict: 'unknown-effect', steps: [step([])] })).toBe(
+      'Coulomb friction, joint 2, and something that is not known',
+    );
     expect(verdictTitle({ verdict: 'nothing-significant', steps: [] })).toBe(
       'Nothing significant is missing',
     );

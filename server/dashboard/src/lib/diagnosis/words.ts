@@ -70,15 +70,16 @@ export function listed(names: readonly string[], last = 'and'): string {
 
 /** What was found, as a headline. */
 export function verdictTitle(found: Pick<DiagnosisData, 'verdict' | 'steps'>): string {
+  const names = found.steps
+    .filter((step) => step.adopted && step.effect !== null)
+    .map((step) => candidateName({ effect: step.effect ?? '', joints: step.joints }));
   if (found.verdict === 'named') {
-    const names = found.steps
-      .filter((step) => step.adopted && step.effect !== null)
-      .map((step) => candidateName({ effect: step.effect ?? '', joints: step.joints }));
     return `${capital(listed(names))} ${names.length > 1 ? 'are' : 'is'} missing from the model`;
   }
-  if (found.verdict === 'ambiguous') {
-    const group = found.steps.at(-1)?.group ?? [];
-    if (group.length > 0 && group.length <= 3) return `Either ${listed(group.map(candidateName), 'or')}`;
+  const group = found.verdict === 'ambiguous' ? (found.steps.at(-1)?.group ?? []) : [];
+  if (group.length > 0 && group.length <= 3) return `Either ${listed(group.map(candidateName), 'or')}`;
+  if (found.verdict === 'unknown-effect' && names.length > 0) {
+    return `${capital(listed(names))}, and something that is not known`;
   }
   return VERDICTS[found.verdict].title;
 }

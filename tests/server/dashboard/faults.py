@@ -1,0 +1,27 @@
+"""What axe finds fault with on a page as it is now."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from playwright.sync_api import Page
+
+from tests.repository.tracked import ROOT
+
+AXE = ROOT / "server" / "dashboard" / "node_modules" / "axe-core" / "axe.min.js"
+RULES = {
+    "runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"],
+    "resultTypes": ["violations"],
+}
+
+
+def faults_of(page: Page) -> list[str]:
+    """One line a fault. The page's policy lets no script in from elsewhere: axe comes through the debugger."""
+    page.evaluate(AXE.read_text("utf-8"))
+    found: dict[str, Any] = page.evaluate("rules => axe.run(document, rules)", RULES)
+    return [_told(one) for one in found["violations"]]
+
+
+def _told(violation: dict[str, Any]) -> str:
+    places = ", ".join(str(node["target"]) for node in violation["nodes"][:4])
+    return f"{violation['id']}: {violation['help']}: {places}: {violation['nodes'][0].get('failureSummary', '')}"

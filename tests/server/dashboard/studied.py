@@ -1,0 +1,76 @@
+"""A service that has studied its arm: traces, a fit, a validation and a diagnosis, each made once by the real code."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tests.server.service import Service, running_service
+
+ARM = "mock://?pty=1&lock_step=1&seed=3&modify=coulomb_friction:joint=2,torque=8"
+"""Dry friction on joint 2 that the machine file knows nothing of. In lock-step: results depend on no clock."""
+CANDIDATES = ("coulomb_friction", "stribeck_friction")
+RAMP = {"name": "ramp"}
+
+
+@dataclass(frozen=True)
+class Studied:
+    """Numbers of traces and jobs, and of the model that the fit made."""
+
+    service: Service
+    traces: tuple[str, str]
+    fit: str
+    validation: str
+    diagnosis: str
+    model: str
+
+    def result(self, job: str) -> dict[str, Any]:
+        """What a job found."""
+        found: dict[str, Any] = self.service.robot.get(f"/jobs/{job}/result").json()["data"]
+        return found
+
+
+@contextmanager
+def studied_arm(folder: Path) -> Iterator[Studied]:
+    """Runs and computes all of it, once."""
+    with running_service(folder, ARM) as service:
+        service.until_connected()
+        yield _studied(service)
+
+
+def _studied(service: Service) -> Studied:
+    first, second = _recorded(service), _recorded(service)
+    request = {"kind": "fit", "traces": [first], "held_out": [second], "parameters": ["joint2.*"], "name": "first fit"}
+    fit = done(service, request)
+    validation = done(service, {"kind": "validate", "traces": [second], "model": fit["model"]})
+    diagnosis = done(service, diagnosis_request((first, second)) | {"name": "friction"})
+    return Studied(service, (first, second), fit["id"], validation["id"], diagnosis["id"], fit["model"])
+
+
+def diagnosis_request(traces: tuple[str, str]) -> dict[str, Any]:
+    """A small one: two candidates on one joint, one step."""
+    return {
+        "kind": "diagnose", "traces": [traces[0]], "held_out": [traces[1]], "joints": [2], "most_steps": 1,
+        "effects": list(CANDIDATES),
+    }  # fmt: skip
+
+
+def done(service: Service, request: dict[str, Any]) -> dict[str, Any]:
+    """A job that has come to its end."""
+    sent = service.robot.post("/jobs", json=request)
+    assert sent.status_code == 201, sent.text
+    job: dict[str, Any] = sent.json()
+    while job["state"] in ("queued", "running"):
+        job = service.robot.get(f"/jobs/{job['id']}", params={"wait": 5}).json()
+    assert (job["state"], job["reason"]) == ("done", "")
+    return job
+
+
+def _recorded(service: Service) -> str:
+    ended = service.end_of(service.robot.post("/experiments", json={"spec": RAMP}).json()["id"])
+    assert ended["state"] == "done", ended
+    number: str = ended["trace"]
+    return number

@@ -1,0 +1,117 @@
+"""The page of diagnoses: one begun from chosen traces, followed, told as a story, and its next experiment queued."""
+
+from __future__ import annotations
+
+import re
+from math import degrees
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.server.dashboard.browser import TABLET, Dashboard
+from tests.server.dashboard.faults import faults_of
+from tests.server.dashboard.studied import Studied
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
+"""What `studied` has is computed once, before the first test."""
+
+
+def test_a_diagnosis_is_begun_followed_and_ended(studied: Studied, studied_dashboard: Dashboard) -> None:
+    page = studied_dashboard.open("diagnosis")
+    begin = page.get_by_role("button", name="Diagnose", exact=True)
+    expect(begin).to_be_disabled()
+    first, second = (page.get_by_role("row").filter(has_text=trace) for trace in studied.traces)
+    first.get_by_role("radio", name="Fit to").check()
+    expect(page.get_by_text("Without a trace to judge by")).to_be_visible()
+    second.get_by_role("radio", name="Judge by").check()
+    page.get_by_role("checkbox", name="2", exact=True).check()
+    page.get_by_label("Effects to add at most").fill("1")
+    page.get_by_text("Effects to look for").click()
+    page.get_by_role("checkbox", name=re.compile("^Coulomb friction")).check()
+    begin.click()
+    expect(page.get_by_role("heading", level=1, name="Diagnosing")).to_be_visible()
+    job = page.url.rpartition("/")[2]
+    request = studied.service.robot.get(f"/jobs/{job}").json()["request"]
+    assert (request["traces"], request["held_out"]) == ([studied.traces[0]], [studied.traces[1]])
+    assert (request["joints"], request["effects"], request["most_steps"]) == ([2], ["coulomb_friction"], 1)
+    expect(page.get_by_role("progressbar")).to_be_visible()
+    page.get_by_role("button", name="Cancel").click()
+    expect(page.get_by_role("heading", level=1, name="No answer")).to_be_visible()
+    assert studied.service.robot.get(f"/jobs/{job}").json()["state"] == "cancelled"
+    page.get_by_role("button", name="Take it off the list").click()
+    page.get_by_role("button", name="for good").click()
+    expect(page.get_by_role("link", name=re.compile("friction"))).to_have_count(1)
+
+
+def test_the_answer_is_told_with_the_numbers_that_were_found(studied: Studied, studied_dashboard: Dashboard) -> None:
+    found = studied.result(studied.diagnosis)
+    assert found["verdict"] == "named", found["summary"]
+    (step,) = found["steps"]
+    page = studied_dashboard.open("diagnosis")
+    page.get_by_role("link", name=re.compile("Named: Coulomb friction, joint 2")).click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("Coulomb friction, joint 2 is missing from the model")
+    expect(page.get_by_text(found["summary"][1:]).first).to_be_visible()
+    _see_the_map(page, found["given"])
+    best = page.get_by_role("listitem").filter(has_text="named")
+    expect(best).to_contain_text(f"{step['evidence']:.0f}")
+    expect(page.get_by_text("explains", exact=False).first).to_be_attached()
+    (value,) = step["parameters"].values()
+    expect(page.get_by_text("95 % interval").first).to_contain_text(f"{value['low']:.4g}"[:4])
+    gap = page.get_by_role("region", name="The gap, step by step")
+    gap.get_by_text("As a table").click()
+    after = degrees(next(e["after"] for e in step["rmse_holdout"] if e["joint"] == 2))
+    expect(gap.get_by_role("row").filter(has_text="held out").nth(1)).to_contain_text(f"{after:.3g}"[:5])
+    overlay = page.get_by_role("region", name="Measured, before and after")
+    expect(overlay.get_by_role("img", name=re.compile("^Position of joint 2"))).to_be_visible()
+    overlay.get_by_label("Joint").select_option("3")
+    expect(overlay.get_by_role("img", name=re.compile("^Measured minus simulated of joint 3"))).to_be_visible()
+
+
+def _see_the_map(page: Page, given: dict[str, object]) -> None:
+    where = given["where"]
+    assert isinstance(where, dict)
+    region = page.get_by_role("region", name="Where they disagree")
+    expect(region.get_by_role("img", name=re.compile("^Map of disagreement"))).to_be_visible()
+    region.get_by_text("As a table").click()
+    pairs = {(cell["joint"], cell["phase"]) for cell in where["cells"]}
+    expect(region.get_by_role("row")).to_have_count(1 + len(pairs))
+    region.get_by_role("combobox").select_option(index=1)
+    expect(region).to_contain_text("a window of 0.3 s counts beyond")
+
+
+def test_the_proposed_experiment_is_queued(studied: Studied, studied_dashboard: Dashboard) -> None:
+    asked = studied.result(studied.diagnosis)["next_experiment"]
+    assert asked is not None
+    page = studied_dashboard.open(f"diagnosis/{studied.diagnosis}")
+    page.get_by_role("button", name="Queue this experiment").click()
+    expect(page.get_by_text("waits: the queue is paused")).to_be_visible()
+    (queued,) = studied.service.robot.get("/queue/experiments").json()
+    assert queued["spec"]["name"] == asked["spec"]["name"]
+    assert queued["spec"]["trajectory"] == asked["spec"]["trajectory"]
+    expect(page.get_by_role("link", name=f"Experiment {queued['id']}")).to_be_visible()
+    studied.service.robot.post(f"/experiments/{queued['id']}/cancel")
+
+
+def test_a_diagnosis_that_is_not_there_is_said(studied_dashboard: Dashboard) -> None:
+    page = studied_dashboard.open("diagnosis/000000000000")
+    expect(page.get_by_role("alert")).to_contain_text("000000000000")
+    studied_dashboard.forgive()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_no_fault_in_an_answer(studied: Studied, studied_dashboard: Dashboard, scheme: str) -> None:
+    page = studied_dashboard.page
+    page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+    studied_dashboard.open(f"diagnosis/{studied.diagnosis}")
+    expect(page.get_by_role("region", name="What to know about this answer")).to_be_attached()
+    for summary in page.get_by_text("As a table").all():
+        summary.click()
+    assert faults_of(page) == []
+
+
+def test_on_a_tablet_nothing_is_wider_than_the_page(studied: Studied, studied_dashboard: Dashboard) -> None:
+    page = studied_dashboard.page
+    page.set_viewport_size(TABLET)
+    studied_dashboard.open(f"diagnosis/{studied.diagnosis}")
+    expect(page.get_by_role("region", name="Candidates")).to_be_visible()
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
