@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast
 import httpx
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from daq.client.errors import ServiceError, ServiceNotReachedError
+from daq.client.errors import ServiceError, ServiceNotReachedError, reason_of
 from daq.contracts.errors import SpecError
 from daq.contracts.service.base import Page
 from daq.contracts.service.problems import ProblemDetails
@@ -120,7 +120,7 @@ class Connection:
                         stream.write(piece)
             part.replace(target)
         except httpx.TransportError as error:
-            raise ServiceNotReachedError(f"{self.url}: not reached: {_reason(error)}") from error
+            raise ServiceNotReachedError(f"{self.url}: not reached: {reason_of(error)}") from error
         finally:
             part.unlink(missing_ok=True)
 
@@ -132,7 +132,7 @@ class Connection:
                 response = self._send(request)
             except httpx.TransportError as error:
                 if (wait := next(pauses, None)) is None:
-                    raise ServiceNotReachedError(f"{self.url}: not reached: {_reason(error)}") from error
+                    raise ServiceNotReachedError(f"{self.url}: not reached: {reason_of(error)}") from error
                 self._pause(wait)
                 continue
             if response.is_success:
@@ -206,9 +206,3 @@ def _may_pass(problem: ProblemDetails) -> bool:
 def _retry_after(response: httpx.Response) -> float:
     text = response.headers.get("Retry-After", "")
     return float(text) if text.isdecimal() else 0.0
-
-
-def _reason(error: httpx.TransportError) -> str:
-    if isinstance(error, httpx.TimeoutException):
-        return "no answer in time"
-    return str(error) or type(error).__name__

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import httpx
+
 from daq.contracts.errors import DaqError, ReachError
 from daq.contracts.service.problems import ProblemDetails
 
@@ -30,3 +32,8 @@ class ServiceError(DaqError):
 
 class ServiceNotReachedError(ReachError):
     """The service does not answer, or what answers is no such service."""
+
+
+def reason_of(error: httpx.HTTPError) -> str:
+    """Why a request got no answer, in a few words."""
+    return "no answer in time" if isinstance(error, httpx.TimeoutException) else str(error) or type(error).__name__

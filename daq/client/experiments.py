@@ -10,6 +10,7 @@ from uuid import uuid4
 from daq.client.connection import Connection, Request
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.experiments import (
+    ENDS,
     Experiment,
     ExperimentChange,
     ExperimentRequest,
@@ -23,7 +24,6 @@ from daq.contracts.service.queue import QueueResume, QueueStatus
 
 WAIT = 30.0
 """s that one question about the end of something waits at the service."""
-ENDS: tuple[ExperimentState, ...] = ("done", "failed", "cancelled", "interrupted")
 
 
 def new_key() -> str:

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from daq.client.connection import Connection, Request
-from daq.client.experiments import ENDS, WAIT, new_key
+from daq.client.experiments import WAIT, new_key
 from daq.contracts.errors import SpecError
+from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.jobs import (
     Job,
     JobKind,

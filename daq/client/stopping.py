@@ -10,6 +10,7 @@ import httpx
 from pydantic import ValidationError
 
 from daq.client.connection import API
+from daq.client.errors import reason_of
 from daq.contracts.service.problems import ProblemDetails
 from daq.contracts.service.robot import StopResult
 from daq.contracts.service.system import stop_port_after
@@ -57,7 +58,7 @@ def _ask(url: str, headers: dict[str, str]) -> StopResult:
         timeout = httpx.Timeout(ANSWER_WITHIN, connect=CONNECT_WITHIN)
         response = httpx.post(url, headers=headers, timeout=timeout, trust_env=False)
     except httpx.HTTPError as error:
-        return _undelivered(f"{url}: {_reason(error)}")
+        return _undelivered(f"{url}: {reason_of(error)}")
     try:
         if response.is_success:
             return StopResult.model_validate_json(response.content, extra="ignore")
@@ -70,7 +71,3 @@ def _ask(url: str, headers: dict[str, str]) -> StopResult:
 def _undelivered(why: str) -> StopResult:
     text = f"stop NOT DELIVERED: {why}. Use the emergency stop."
     return StopResult(delivered=False, confirmed=False, seconds=0.0, note=why, text=text)
-
-
-def _reason(error: httpx.HTTPError) -> str:
-    return "no answer in time" if isinstance(error, httpx.TimeoutException) else str(error) or type(error).__name__

@@ -11,6 +11,7 @@ from fastapi import APIRouter, Query, Response
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import (
+    ENDS,
     Experiment,
     ExperimentChange,
     ExperimentRequest,
@@ -26,7 +27,6 @@ from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
 from server.queue.length import LONGEST, longest_length
-from server.queue.states import ENDS
 from server.services import RobotServices
 
 MOST_SHOWN = 5000

@@ -9,6 +9,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
 from daq.contracts.service.base import Page
+from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.jobs import (
     Job,
     JobKind,
@@ -30,7 +31,6 @@ from server.jobs.models import LARGEST_MODEL
 from server.jobs.results import JobResult
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
-from server.queue.states import ENDS
 from server.services import RobotServices, Services
 
 router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)

@@ -34,8 +34,6 @@ class IllegalEventError(Exception):
     """An event that the state does not allow; nothing has changed."""
 
 
-ENDS: frozenset[ExperimentState] = frozenset({"done", "failed", "cancelled", "interrupted"})
-
 _TRANSITIONS: dict[tuple[ExperimentState, Event], ExperimentState] = {
     ("queued", Event.TAKEN): "running",
     ("queued", Event.CANCELLED): "cancelled",

@@ -9,12 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
+from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.robot import RobotIdentity
 from server.owner.messages import ArmReport
 from server.queue.order import Waiting, next_due, next_moment
 from server.queue.readiness import Circumstances, what_is_missing
 from server.queue.schedule import Plan, following, is_due
-from server.queue.states import ENDS, Event, IllegalEventError, advance, after_restart
+from server.queue.states import Event, IllegalEventError, advance, after_restart
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 moments = st.datetimes(datetime(2026, 1, 1), datetime(2027, 1, 1)).map(lambda moment: moment.replace(tzinfo=UTC))

@@ -14,6 +14,7 @@ from daq.cli.run_result import AcquisitionFailedError, ShownRun, shown_run
 from daq.cli.stop_keys import StopKeys
 from daq.client import Robot, ServiceError, ServiceNotReachedError
 from daq.contracts.errors import SafetyError, TraceError
+from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.live import EventMessage, LiveMessage, ProgressMessage, QueueMessage, RecordEventMessage
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from daq.contracts.service.experiments import Experiment
     from daq.contracts.service.robot import RobotStatus
 
-ENDS = ("done", "failed", "cancelled", "interrupted")
 EXIT_CODES = {"failed": 4, "cancelled": 6, "interrupted": 3}
 """Of an experiment that has left no trace."""
 ATTEND_EVERY = 20.0

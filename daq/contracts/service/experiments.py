@@ -14,6 +14,9 @@ ExperimentState = Literal["queued", "running", "done", "failed", "cancelled", "i
 """`done`: the plan was carried out to its end. `failed`: refused, or ended by a guard. `cancelled`: taken back, or
 stopped by somebody. `interrupted`: the link, a process or the power was lost; it never runs again by itself."""
 
+ENDS: frozenset[ExperimentState] = frozenset({"done", "failed", "cancelled", "interrupted"})
+"""States that nothing leaves; those of jobs too."""
+
 Priority = Annotated[int, Field(ge=-100, le=100)]
 """Higher goes first; among equals the one submitted first."""
 Interval = Annotated[float, Field(ge=10, le=366 * 86400)]
