@@ -43,6 +43,19 @@ def lab_data(request: pytest.FixtureRequest) -> Path:
     return folder
 
 
+AGAINST_THE_CLOCK = ("contract", "daq", "server")
+"""Folders whose tests run mock and host in real time."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """For two workers (`-n 2 --dist loadgroup`): tests against the clock stay together on one, so that they do not
+    disturb each other; of all others, each file is a group."""
+    together = [ROOT / "tests" / folder for folder in AGAINST_THE_CLOCK]
+    for item in items:
+        shared = any(item.path.is_relative_to(folder) for folder in together)
+        item.add_marker(pytest.mark.xdist_group("against the clock" if shared else str(item.path)))
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     if item.get_closest_marker("hardware") and not item.config.getoption("--port"):
         pytest.skip("needs a real controller: --port URL")
