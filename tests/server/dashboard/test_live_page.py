@@ -69,9 +69,9 @@ def test_charts_are_drawn_with_the_past_when_the_page_is_loaded(dashboard: Dashb
 
 def test_a_joint_can_be_hidden_and_the_choice_is_kept(dashboard: Dashboard) -> None:
     page = dashboard.until_live()
-    page.get_by_role("button", name="Joint 6").click()
+    page.get_by_role("button", name="J6, roll").click()
     page.reload()
-    expect(page.get_by_role("button", name="Joint 6")).to_have_attribute("aria-pressed", "false")
+    expect(page.get_by_role("button", name="J6, roll")).to_have_attribute("aria-pressed", "false")
     expect(page.get_by_role("img", name="joints 1, 2, 3, 4, 5 over").first).to_be_visible()
 
 
