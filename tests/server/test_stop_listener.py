@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import socket
-import subprocess
 import sys
 import threading
 from collections.abc import Iterator
@@ -24,8 +22,10 @@ from server.access.tokens import KnownTokens, TokenStore
 from server.listening import ListenError, listening
 from server.problems import ProblemError
 from server.store.engine import Store
+from tests.daq.cli.invoke import CommandLine
 from tests.server.clocks import HandClock
-from tests.server.service import DAQ, Service, running_service
+from tests.server.desk import anothers_desk
+from tests.server.service import Service, running_service
 
 LONG = {"trajectory": {"kind": "ramp", "amplitude": 0.1, "duration": 0.5}, "joints": [1, 2], "hold": 600}
 BLOCKING = """
@@ -51,11 +51,11 @@ main()
 """`daq` with a coroutine in its service that does not give the event loop back."""
 
 
-def _daq_stop(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    environment = {key: value for key, value in os.environ.items() if not key.startswith("DAQ_")}
-    environment |= {"DAQ_RUNTIME_FOLDER": str(folder / "run"), "XDG_CONFIG_HOME": str(folder / "configuration")}
-    command = [*DAQ, *words, "stop"]
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=60, check=False)
+@pytest.fixture
+def daq(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
+    """The command of the user whose service it is, who finds the stop sockets of its processes."""
+    with anothers_desk(tmp_path, capsys, monkeypatch) as daq:
+        yield daq
 
 
 def _running(service: Service) -> str:
@@ -81,45 +81,38 @@ def _blocked(service: Service) -> Iterator[None]:
         stuck.join()
 
 
-def test_a_stop_reaches_the_arm_while_the_event_loop_is_blocked(tmp_path: Path) -> None:
+def test_a_stop_reaches_the_arm_through_every_other_door_while_the_event_loop_is_blocked(
+    tmp_path: Path, daq: CommandLine
+) -> None:
     with running_service(tmp_path, program=[sys.executable, "-c", BLOCKING]) as service:
         experiment = _running(service)
         with _blocked(service), Client(service.url) as client:
             stopped = client.robot("ma2000").stop()
             assert stopped.confirmed, stopped
+            for words in (["stop"], ["--server", service.url, "stop"]):
+                said = daq(*words)
+                assert said.code == 0, (words, said)
+                assert said.out.startswith("ma2000: stopped, confirmed by the board"), said
         ended = service.end_of(experiment)
         assert (ended["state"], ended["outcome"]) == ("cancelled", "stopped")
         texts = [event["text"] for event in service.robot.get("/events").json()["items"] if event["kind"] == "stop"]
         assert any("confirmed by the board" in text for text in texts)
 
 
-def test_daq_stop_reaches_it_too_and_through_the_service_from_elsewhere(tmp_path: Path) -> None:
-    with running_service(tmp_path, program=[sys.executable, "-c", BLOCKING]) as service:
-        experiment = _running(service)
-        with _blocked(service):
-            said = _daq_stop(tmp_path)
-            assert said.returncode == 0, said
-            assert "ma2000: stopped, confirmed by the board" in said.stdout
-            said = _daq_stop(tmp_path, "--server", service.url)
-            assert said.returncode == 0, said
-            assert "confirmed by the board" in said.stdout
-        assert service.end_of(experiment)["state"] == "cancelled"
-
-
 def test_when_the_whole_service_hangs_daq_stop_remains_and_a_client_is_told_to_use_the_emergency_stop(
-    tmp_path: Path,
+    tmp_path: Path, daq: CommandLine
 ) -> None:
     with running_service(tmp_path) as service:
         experiment = _running(service)
         service.process.send_signal(signal.SIGSTOP)
         try:
-            said = _daq_stop(tmp_path)
+            said = daq("stop")
             with Client(service.url) as client:
                 not_stopped = client.robot("ma2000").stop()
         finally:
             service.process.send_signal(signal.SIGCONT)
-        assert said.returncode == 0, said
-        assert "ma2000: stopped, confirmed by the board" in said.stdout
+        assert said.code == 0, said
+        assert said.out.startswith("ma2000: stopped, confirmed by the board")
         assert not not_stopped.delivered
         assert "emergency stop" in not_stopped.text
         assert service.end_of(experiment)["state"] == "cancelled"
