@@ -19,12 +19,17 @@ describe('names at the ends of lines', () => {
   });
 
   it('are moved apart, in the order of the lines', () => {
-    const places = apart([50, 50, 49], 12, 0, 100);
+    const places = apart([50, 50, 30], 12, 0, 100);
     expect(places[2]).toBeLessThan(places[0] as number);
     const sorted = [...places].sort((one, other) => one - other);
     sorted
       .slice(1)
       .forEach((place, index) => expect(place - (sorted[index] as number)).toBeGreaterThanOrEqual(12));
+  });
+
+  it('do not change places for noise', () => {
+    expect(apart([50, 51], 12, 0, 100)).toEqual([50, 62]);
+    expect(apart([51, 50], 12, 0, 100)).toEqual([51, 63]);
   });
 
   it('stay within the chart', () => {

@@ -203,11 +203,13 @@ function drawEnds(plot: uPlot, drawing: ChartDrawing): void {
   ctx.restore();
 }
 
-/** Places near `wanted`, in the same order of height, at least `distance` apart and within [low, high] if there is room. */
+/**
+ * Places near `wanted`, at least `distance` apart and within [low, high] if there is room. In the order of height; those
+ * that are nearly as high stay in the order given, so that noise does not make them change places.
+ */
 export function apart(wanted: readonly number[], distance: number, low: number, high: number): number[] {
-  const order = wanted
-    .map((_, index) => index)
-    .sort((one, other) => (wanted[one] ?? 0) - (wanted[other] ?? 0));
+  const step = (index: number): number => Math.round((wanted[index] ?? 0) / distance);
+  const order = wanted.map((_, index) => index).sort((one, other) => step(one) - step(other) || one - other);
   const places = [...wanted];
   let free = low;
   for (const index of order) {
