@@ -6,6 +6,7 @@ What was there is put aside, and never deleted.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import shutil
 import zipfile
@@ -20,6 +21,7 @@ from server.backup.database import require_known, revision_of
 from server.backup.manifest import Entry, Manifest, Progress, check, opened, pieces, verify
 from server.backup.places import DATABASE, BackupError, Places
 from server.backup.write import RESERVE
+from server.jobs.mailbox import REQUEST
 from server.store.lock import sole_use
 
 STAGING = ".restoring"
@@ -124,7 +126,19 @@ class _Staged:
                 copy.write(piece)
             disk.sync(copy)
         check(entry, digest.hexdigest(), self._archive)
+        if path.name == REQUEST:
+            self._lead_to_places(path)
         self._moves.append((path, self._places.target(entry.name)))
+
+    def _lead_to_places(self, request: Path) -> None:
+        """A job says where its traces and models lie: here that is elsewhere, under the same names."""
+        task = json.loads(request.read_text("utf-8"))
+        for kind, folder in (("traces", self._places.traces), ("models", self._places.service / "models")):
+            task[kind] = {number: str(folder / Path(file).name) for number, file in task.get(kind, {}).items()}
+        with request.open("w", encoding="utf-8") as stream:
+            json.dump(task, stream)
+            stream.flush()
+            os.fsync(stream.fileno())
 
     def _require_room(self, manifest: Manifest) -> None:
         for folder in self._folders:

@@ -69,6 +69,8 @@ def filled(folder: Path) -> Places:
     job = places.service / "jobs" / "0123456789ab"
     job.mkdir(parents=True)
     (job / "result.json").write_text('{"found": 1}')
+    task = {"request": {"kind": "fit"}, "traces": {"aaa": str(places.traces / "aaa.mcap")}, "models": {}}
+    (job / "request.json").write_text(json.dumps(task))
     (job / "cancel").touch()
     return places
 
@@ -103,9 +105,10 @@ def test_everything_comes_back_elsewhere_as_it_was(archive: Path, tmp_path: Path
     assert traces_in(places) == ["aaa.mcap", "bbb.mcap"]
     before, after = everything(tmp_path / "here"), everything(tmp_path / "there")
     assert set(before) - set(after) == {"traces/ccc.mcap.part", "service/jobs/0123456789ab/cancel"}
-    assert {name: after[name] for name in after if not name.endswith(".sqlite")} == {
-        name: before[name] for name in after if not name.endswith(".sqlite")
-    }
+    changed = {"service/service.sqlite", "service/jobs/0123456789ab/request.json"}
+    assert {name: after[name] for name in set(after) - changed} == {name: before[name] for name in set(after) - changed}
+    task = json.loads(after["service/jobs/0123456789ab/request.json"])
+    assert task["traces"] == {"aaa": str(places.traces / "aaa.mcap")}
     store = Store(places.url)
     store.migrate()
     assert ExperimentStore(store).count_waiting("ma2000") == 1
