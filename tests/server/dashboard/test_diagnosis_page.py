@@ -63,7 +63,7 @@ def test_the_answer_is_told_with_the_numbers_that_were_found(studied: Studied, s
     expect(gap.get_by_role("row").filter(has_text="held out").nth(1)).to_contain_text(f"{after:.3g}"[:5])
     overlay = page.get_by_role("region", name="Measured, before and after")
     expect(overlay.get_by_role("img", name=re.compile("^Position of joint 2"))).to_be_visible()
-    overlay.get_by_label("Joint").select_option("3")
+    overlay.get_by_role("combobox", name="Joint").select_option("3")
     expect(overlay.get_by_role("img", name=re.compile("^Measured minus simulated of joint 3"))).to_be_visible()
 
 
@@ -94,7 +94,7 @@ def test_the_proposed_experiment_is_queued(studied: Studied, studied_dashboard: 
 
 def test_a_diagnosis_that_is_not_there_is_said(studied_dashboard: Dashboard) -> None:
     page = studied_dashboard.open("diagnosis/000000000000")
-    expect(page.get_by_role("alert")).to_contain_text("000000000000")
+    expect(page.get_by_role("alert").filter(has_text="000000000000")).to_be_visible()
     studied_dashboard.forgive()
 
 

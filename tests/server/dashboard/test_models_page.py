@@ -84,7 +84,7 @@ def test_what_the_service_refuses_is_said_beside_the_form(studied: Studied, stud
     page.get_by_role("row").filter(has_text=studied.traces[0]).get_by_role("radio", name="Fit to").check()
     page.get_by_label("Name of the model that is made").fill("/no/such name/")
     page.get_by_role("button", name="Begin").click()
-    expect(page.get_by_role("alert")).to_contain_text("name")
+    expect(page.get_by_role("alert").filter(has_text="name")).to_be_visible()
     expect(page.get_by_role("button", name="Begin")).to_be_enabled()
     studied_dashboard.forgive()
 
