@@ -35,7 +35,7 @@ MEMORY = 40
 ROUGHEST, SMOOTHEST = 1e-6, 1e6
 """Weights of smoothness between which the right one lies, relative to that of the data."""
 TRIALS = 16
-LEAST_EXCESS = 1.3
+LEAST_EXCESS = 1.1
 """Mean square of the weighted residual from which there is anything to explain."""
 LEAST_EXPLAINED = 0.05
 """Share of the torque's variance below which a dependence is no shape."""

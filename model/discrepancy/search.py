@@ -124,13 +124,18 @@ def with_new_tangents(observation: Observation, point: Point) -> Point:
 
 def settled(observation: Observation, point: Point, steps: int) -> Point:
     """The point to which searches lead, each with derivatives computed where it begins, until one gains nothing more:
-    what two close rivals still differ by then is not the state of their fits."""
+    what two close rivals still differ by then is not the state of their fits.
+
+    Its derivatives are those of the last search's beginning, hardly away, without the corrections made on the way: a
+    correction for a short step is mostly noise, and intervals come from derivatives.
+    """
     for _ in range(MOST_SEARCHES):
         try:
-            following = searched(observation, with_new_tangents(observation, point), steps)
+            begun = with_new_tangents(observation, point)
+            following = searched(observation, begun, steps)
         except SpecError:
             break  # at the brink of instability, where a delay is missing: there is no going on
-        gained, point = point.cost - following.cost, following
+        gained, point = point.cost - following.cost, replace(following, tangents=begun.tangents)
         if gained < SETTLED:
             break
     return point

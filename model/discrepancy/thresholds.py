@@ -29,7 +29,7 @@ class Thresholds:
     margin: float = 4.0
     unexplained: float = 0.3
     unnamed: float = 0.12
-    least_share: float = 0.88
+    least_share: float = 0.8
     worse: float = 2.0
     close: float = 40.0
     quiet_joint: float = 1.08

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +28,7 @@ from model.discrepancy.candidates import OF_THE_CONTROLLER
 from model.discrepancy.controller_check import ControllerFinding, check_controller, with_used_set_points
 from model.discrepancy.decision import Decision, decide
 from model.discrepancy.distortion import sum_of_contributions
+from model.discrepancy.estimates import found_values, listed, only_probed, runner_up
 from model.discrepancy.holdout import HeldOut, errors, excess_removed, held_out
 from model.discrepancy.next_experiment import Asked, Asker, rivals_of
 from model.discrepancy.noise_floor import noise_floor
@@ -44,7 +44,6 @@ from model.discrepancy.thresholds import THRESHOLDS, Thresholds
 from model.discrepancy.torque_space.diagnose import diagnose_torques
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn
 from model.discrepancy.where import located
-from model.fitting.fit import INTERVAL
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
 
@@ -127,7 +126,8 @@ def diagnose(
         remaining = _remaining(case, current.point)
     asked = Asked(None) if ask is None else ask.after(answered, observation, current.point, rivals, traces)
     answer = Diagnosis(
-        verdict=answered, summary=_summary(answered, steps, remaining), steps=tuple(steps), remaining=remaining,
+        verdict=answered, summary=_summary(case, current, answered, steps, remaining),
+        steps=tuple(steps), remaining=remaining,
         model_before=model, model_after=_adopted(model, current.point, case.names),
         traces=case.names, holdout=tuple(t.record.trace_id for t in holdout),
         rmse_fit=errors(observation, model, given.residuals, current.point.residuals, case.floor),
@@ -214,30 +214,29 @@ def _turn(
     best = decision.best
     if decision.kind == "nothing" or best is None:
         return None, current
+    observation, model = case.observation, best.judged.point.model
+    best = replace(best, judged=judge(observation, settled(observation, best.judged.point, LAST_STEPS)))
     held = _held(case, current.point, best.judged.point)
     rejected = _rejected(case, best, *held)
-    observation, model = case.observation, best.judged.point.model
     where = _where(case, current.point)
     values = found_values(best)
     held_errors = _held_errors(case, model, *held)
-    listed = tuple(_listed(r) for r in ranking.fitted) + _only_probed(ranking, observation.samples)
+    candidates = tuple(listed(r) for r in ranking.fitted) + only_probed(ranking, observation.samples)
     reason = reasons.reason(
         best.candidate.name, best.candidate.joints, values, best.evidence, decision.margin,
         model=_with_point(model, best.judged.point), before=_with_point(current.point.model, current.point),
-        records=observation.records, runner_up=_runner_up(listed), left=_left(observation, best.judged.point),
+        records=observation.records, runner_up=runner_up(candidates), left=_left(observation, best.judged.point),
     )  # fmt: skip
     step = Step(
         effect=best.candidate.name, joints=best.candidate.joints, parameters=values, evidence=best.evidence,
-        margin=decision.margin, candidates=listed, group=tuple(_listed(r) for r in decision.group),
+        margin=decision.margin, candidates=candidates, group=tuple(listed(r) for r in decision.group),
         rmse_fit=errors(observation, model, current.point.residuals, best.judged.point.residuals, case.floor),
         rmse_holdout=held_errors, excess_removed_holdout=excess_removed(held_errors),
         sum_lambda2_before=_sum_lambda2(current.point, current.point),
         sum_lambda2_after=_sum_lambda2(best.judged.point, current.point),
         where=where, reason=reason, adopted=rejected is None, rejected_because=rejected,
     )  # fmt: skip
-    if rejected is not None:
-        return step, current
-    return step, judge(observation, settled(observation, best.judged.point, LAST_STEPS))
+    return step, current if rejected is not None else best.judged
 
 
 def _held(case: _Case, before: Point, after: Point) -> tuple[Signals, Signals]:
@@ -263,11 +262,17 @@ def _rejected(case: _Case, best: Refitted, before: Signals, after: Signals) -> s
 
 
 def _unexplained(case: _Case, model: Model, first: Judged, current: Judged, steps: Sequence[Step]) -> tuple[int, ...]:
-    """Joints on which something is left, on fitted or held-out traces."""
-    before, after = first.point, current.point
+    """Joints on which something is left, on fitted or held-out traces. What has been added may raise the floor: noise
+    decides where in its play a joint comes to rest."""
+    before, after, named = first.point, current.point, any(s.adopted for s in steps)
+    if named:
+        floor = np.maximum(case.floor, noise_floor(case.observation, after))
+        held = case.floor_held if case.held is None else np.maximum(case.floor_held, case.held.floor(after))
+        case = replace(case, floor=floor, floor_held=held)
     fitted = errors(case.observation, model, before.residuals, after.residuals, case.floor)
-    held = _held_errors(case, model, *_held(case, before, after))
-    return unexplained(fitted, held, case.thresholds, named=any(s.adopted for s in steps))
+    return unexplained(
+        fitted, _held_errors(case, model, *_held(case, before, after)), case.thresholds, named=named
+    )  # fmt: skip
 
 
 def _left(observation: Observation, point: Point) -> Left:
@@ -296,48 +301,6 @@ def _where(case: _Case, point: Point) -> Where:
 def _remaining(case: _Case, point: Point) -> tuple[RemainingShape, ...]:
     model = _with_point(point.model, point)
     return shapes(model, case.observation.records, point.residuals, case.observation.deviations)
-
-
-def found_values(found: Refitted) -> dict[str, FoundValue]:
-    """Estimates and 95 % intervals of a candidate's parameters, from the curvature at the solution; stretched by what
-    the residual's colour leaves of its samples."""
-    point = found.judged.point
-    covariance = np.linalg.pinv(point.information)
-    stretch = max(1.0, point.misfit)
-    values = {}
-    for p in found.candidate.free:
-        k = [u.name for u in point.unknowns].index(p.name)
-        value, deviation = float(point.values[k]), float(np.sqrt(max(covariance[k, k], 0.0) * stretch))
-        unknown = point.unknowns[k]
-        known = np.isfinite(deviation) and point.tangents[k] @ point.tangents[k] > 0
-        low = max(unknown.low, value - INTERVAL * deviation) if known else None
-        high = min(unknown.high, value + INTERVAL * deviation) if known else None
-        values[p.name] = FoundValue(value=value, low=low, high=high, unit=p.unit)
-    return values
-
-
-def _listed(found: Refitted) -> Candidate:
-    return Candidate(
-        effect=found.candidate.name, joints=found.candidate.joints, evidence=found.evidence, misfit=found.misfit,
-        refitted=True, parameters=found_values(found),
-    )  # fmt: skip
-
-
-def _only_probed(ranking: Ranking, samples: int) -> tuple[Candidate, ...]:
-    """Candidates that were not worth a fit, by what their probe promised less the price of their parameters."""
-    fitted = {(r.candidate.name, r.candidate.joints) for r in ranking.fitted}
-    left = []
-    for probe in ranking.probed:
-        key = probe.candidate.name, probe.candidate.joints
-        if key not in fitted:
-            fitted.add(key)
-            price = len(probe.candidate.free) * math.log(samples)
-            left.append(Candidate(effect=key[0], joints=key[1], evidence=probe.gain - price))
-    return tuple(left)
-
-
-def _runner_up(listed: Sequence[Candidate]) -> Candidate | None:
-    return listed[1] if len(listed) > 1 else None
 
 
 def _with_point(model: Model, point: Point) -> Model:
@@ -375,16 +338,16 @@ def _controller_step(model: Model, observation: Observation, finding: Controller
     )  # fmt: skip
 
 
-def _summary(verdict: Verdict, steps: Sequence[Step], remaining: Sequence[RemainingShape]) -> str:
-    if verdict == "nothing-significant":
+def _summary(
+    case: _Case, current: Judged, answered: Verdict, steps: Sequence[Step], remaining: Sequence[RemainingShape]
+) -> str:
+    if answered == "nothing-significant":
         return "nothing significant: the model explains the traces within noise and stated tolerances"
-    last = steps[-1] if steps else None
-    if verdict == "named":
+    if answered == "named":
         return "; ".join(s.reason for s in steps if s.adopted)
-    if verdict == "ambiguous" and last is not None:
-        return reasons.undecided(last.group, last.where)
-    where = last.where if last is not None else Where(joint=None, phase=None, summary="", cells=(), dependences=())
-    return reasons.unexplained(where, remaining)
+    if answered == "ambiguous":
+        return reasons.undecided(steps[-1].group, steps[-1].where)
+    return reasons.unexplained(_where(case, current.point), remaining)
 
 
 def _notes(case: _Case) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from tests.model.discrepancy.recording import recorded
 HIDDEN = {
     "motor_inductance": ("motor_inductance:joint=2,inductance=0.06", 2),
     "coulomb_friction": ("coulomb_friction:joint=3,torque=1.2", 3),
+    "backlash": ("backlash:joint=2,play=0.012,stiffness=20000,damping=10", 2),
     "wrong_gain": ("wrong_gain:joint=1,factor=1.15", 1),
 }
 
@@ -37,16 +38,16 @@ def test_a_hidden_effect_is_named_at_its_joint_and_the_gap_shrinks(name: str, tm
     assert [(s.effect, s.joints) for s in answer.steps if s.adopted] == [(name, (joint,))]
     gap = {e.joint: e for e in answer.rmse_holdout}[joint]
     assert gap.after < gap.before
-    assert gap.after < 1.35 * gap.floor
+    assert gap.after**2 - gap.floor**2 < 0.3 * (gap.before**2 - gap.floor**2)
     assert name in {u.name for u in answer.model_after.effects}
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(900)
-def test_play_in_a_gear_is_what_is_named_first(tmp_path: Path) -> None:
-    answer = diagnosed(tmp_path, "backlash:joint=2,play=0.012,stiffness=20000,damping=10")
-    assert (answer.steps[0].effect, answer.steps[0].joints) == ("backlash", (2,))
-    assert answer.steps[0].adopted
+@pytest.mark.timeout(400)
+def test_an_effect_that_no_law_of_the_library_describes_is_not_given_a_name(tmp_path: Path) -> None:
+    answer = diagnosed(tmp_path, "drive_coupling:joint=1,onto=2,share=0.2")
+    assert answer.verdict == "unknown-effect", answer.summary
+    assert not [s for s in answer.steps if s.adopted]
+    assert answer.summary.startswith("joint 2")
 
 
 @pytest.mark.timeout(400)
