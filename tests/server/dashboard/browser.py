@@ -48,7 +48,7 @@ WITHOUT_3D = ["--disable-3d-apis"]
 WITH_3D = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 NO_3D_HERE = ("WebGL", "THREE.WebGLRenderer")
 """What the console says where there is none."""
-PATIENCE_MS = 30_000
+PATIENCE_MS = 60_000
 """For whatever is waited for: a machine may be busy. Nothing is tested by how long it takes."""
 TABLET: ViewportSize = {"width": 820, "height": 1180}
 TABLET_ON_ITS_SIDE: ViewportSize = {"width": 1024, "height": 768}

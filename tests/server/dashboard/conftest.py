@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Playwright
@@ -21,6 +22,16 @@ from tests.server.dashboard.browser import (
 )
 from tests.server.dashboard.studied import Studied, studied_arm
 from tests.server.service import Service, running_service
+
+LONGEST_TEST_S = 300
+"""A browser, a service and a mock share two cores: what takes two seconds alone may take a minute beside others."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests of this folder may wait longer than others."""
+    for item in items:
+        if item.path.parent == Path(__file__).parent:
+            item.add_marker(pytest.mark.timeout(LONGEST_TEST_S))
 
 
 @pytest.fixture(scope="package")
