@@ -27,8 +27,10 @@ TRIALS: Mapping[str, tuple[float, ...]] = {
     "stribeck_friction": (0.4, 1.5, 5.0),
     "lost_set_points": (0.1, 0.5, 1.5),
 }
-"""Trial sizes in expected deviations of effects that do not grow in proportion to their parameter; all others get one
-trial, which tells the size by itself."""
+"""Trial sizes in expected deviations of effects that do not grow in proportion to their parameter."""
+SMALL = 0.002
+"""The one trial of all others, which tells the size by itself. It is small, for an effect that does what a tolerance
+parameter does can only be told by the price of that parameter's prior, and a curved response would hide it."""
 STICTION_SPEED = 0.045
 """rad/s: friction that has fallen below this speed belongs to breaking away, above it to the Stribeck curve. At 20 ms
 and 12 bits the joint moves by less than a count a sample there: no reading shows the fall."""
@@ -116,7 +118,7 @@ def _sized(
     trials = []
     for p in plain.main:
         size = p.deviation or 1.0
-        steps = [(1.0,)] if plain.proportional else [(m, -m) for m in TRIALS[law]]
+        steps = [(SMALL,)] if plain.proportional else [(m, -m) for m in TRIALS[law]]
         for step in (s for pair in steps for s in pair):
             value = (p.null if p.effect == "motor_inductance" and p.null is not None else p.value) + step * size
             if not p.low <= value <= p.high and plain.proportional:

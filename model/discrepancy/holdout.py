@@ -21,8 +21,6 @@ Floats = NDArray[np.float64]
 
 BLOCK = 10
 """Samples whose errors may be alike."""
-LEAST_EXCESS = 0.25
-"""Variance of a joint above its floor, in floors, of which a share means anything: 17 s tell it to 0.06."""
 START_STEPS = 8
 """Of the search for where a held-out trace begins: with play in a gear, that is not a smooth problem."""
 
@@ -90,13 +88,3 @@ def errors(
         least = float(floor[column])
         found.append(SignalError(joint=joint, unit=unit, before=sizes[0], after=sizes[1], floor=least))
     return tuple(found)
-
-
-def excess_removed(found: Sequence[SignalError]) -> float | None:
-    """Share of the variance above the floor that is gone, over the joints that showed enough of it, each in its floors.
-
-    None where no joint did: a share of what noise may have made says nothing.
-    """
-    ratios = [((e.before / e.floor) ** 2 - 1.0, (e.after / e.floor) ** 2 - 1.0) for e in found]
-    shown = [(before, after) for before, after in ratios if before >= LEAST_EXCESS]
-    return 1.0 - sum(after for _, after in shown) / sum(before for before, _ in shown) if shown else None

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from model.discrepancy.candidates import Candidate
+from model.discrepancy.candidates import SMALL, Candidate
 from model.discrepancy.observation import Observation
 from model.discrepancy.search import Point
 
@@ -22,8 +22,8 @@ Floats = NDArray[np.float64]
 LARGEST_STRETCH = 2.0
 """A trial may be scaled so far; beyond, the response is no longer in proportion."""
 LEAST_STRETCH = 0.3
-LEAST_RESPONSE = 0.1
-"""Deviations of a reading, over the whole record: a candidate that does less cannot be seen."""
+LEAST_RESPONSE = 0.01
+"""Deviations of a reading, over the whole record: a candidate that does less at its expected size cannot be seen."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +119,9 @@ def _best_trial(
     if not candidate.trials:
         return None
     vector, initials = observation.state(candidate.model, point.unknowns, point.values)
-    vectors = np.tile(vector, (len(candidate.trials), 1))
-    for row, trial in zip(vectors, candidate.trials, strict=True):
+    trials = [_from_here(point, candidate, trial) for trial in candidate.trials]
+    vectors = np.tile(vector, (len(trials), 1))
+    for row, trial in zip(vectors, trials, strict=True):
         for name, value in trial.items():
             row[list(candidate.model.parameter(name).slots)] = value
     starts = [np.tile(i, (len(vectors), 1, 1)) for i in initials]
@@ -130,8 +131,8 @@ def _best_trial(
     responses[~sound] = 0.0
     products, squares = clear.gains(responses)
     best: Probed | None = None
-    for k, trial in enumerate(candidate.trials):
-        if not sound[k] or squares[k] < LEAST_RESPONSE**2:
+    for k, trial in enumerate(trials):
+        if not sound[k] or squares[k] < (LEAST_RESPONSE * (SMALL if candidate.proportional else 1.0)) ** 2:
             continue
         stretch = products[k] / squares[k]
         if not candidate.proportional:
@@ -141,6 +142,20 @@ def _best_trial(
         if best is None or gain > best.gain:
             best = Probed(candidate, gain, start, clear.moves(stretch * responses[k]), responses[k])
     return best
+
+
+def _from_here(point: Point, candidate: Candidate, trial: dict[str, float]) -> dict[str, float]:
+    """A trial of a parameter that the point has found already, with a prior: as far from where it is now."""
+    if not candidate.proportional:
+        return trial
+    held = {u.name: float(v) for u, v in zip(point.unknowns, point.values, strict=True)}
+    moved = dict(trial)
+    for p in candidate.main:
+        if p.name in trial and p.name in held:
+            size = trial[p.name] - p.value
+            inside = p.low <= held[p.name] + size <= p.high
+            moved[p.name] = held[p.name] + (size if inside else -size)
+    return moved
 
 
 def _stretched(

@@ -29,7 +29,8 @@ from model.discrepancy.controller_check import ControllerFinding, check_controll
 from model.discrepancy.decision import Decision, decide
 from model.discrepancy.distortion import sum_of_contributions
 from model.discrepancy.estimates import found_values, listed, only_probed, runner_up
-from model.discrepancy.holdout import HeldOut, errors, excess_removed, held_out
+from model.discrepancy.excess import excess_removed
+from model.discrepancy.holdout import HeldOut, errors, held_out
 from model.discrepancy.next_experiment import Asked, Asker, rivals_of
 from model.discrepancy.noise_floor import noise_floor
 from model.discrepancy.observation import Observation, Signals, observed
