@@ -1,7 +1,6 @@
 /** The arm in 3-D. Draws when something has changed and not otherwise; loaded only where a page shows it. */
 
 import {
-  CircleGeometry,
   DirectionalLight,
   GridHelper,
   Group,
@@ -11,6 +10,7 @@ import {
   MeshBasicMaterial,
   MeshLambertMaterial,
   PerspectiveCamera,
+  PlaneGeometry,
   Scene,
   WebGLRenderer,
 } from 'three';
@@ -87,7 +87,7 @@ export class ArmScene {
     this.ghost = new ArmFigure(chain, all(chain, this.ghostMaterial), null);
     this.shadow = new ArmFigure(chain, all(chain, this.shadowMaterial), null);
     this.wayLine = new WayLine(0.028 * reach);
-    this.build(reach);
+    this.build();
     this.camera.up.set(0, 0, 1);
     this.controls = this.orbit();
     this.setColours(colours);
@@ -153,19 +153,25 @@ export class ArmScene {
     return reachOf(this.chain) || 1;
   }
 
+  /** Along one side of the ground: a little more than the arm reaches. */
+  private get squares(): number {
+    return 2 * Math.ceil((1.1 * this.reach) / GRID_SQUARE);
+  }
+
   private get fitting(): number {
     return fittingDistance(SHOWN * this.reach, (FIELD_OF_VIEW * Math.PI) / 180, this.camera.aspect);
   }
 
-  private build(reach: number): void {
+  private build(): void {
     const sun = new DirectionalLight(0xffffff, 2.8);
     sun.position.set(-1, -2, 3);
     this.scene.add(new HemisphereLight(0xffffff, 0xb0b8c4, 2.4), sun);
     this.scene.add(this.ground, this.shadow.group, this.arm.group, this.trail.line, this.wayLine.group);
     this.scene.add(this.ghost.group);
-    const disc = new Mesh(new CircleGeometry(1.35 * reach, 72), this.groundMaterial);
-    disc.position.z = this.floor - 0.002;
-    this.ground.add(disc);
+    const side = this.squares * GRID_SQUARE;
+    const plane = new Mesh(new PlaneGeometry(side, side), this.groundMaterial);
+    plane.position.z = this.floor - 0.002;
+    this.ground.add(plane);
     this.shadow.group.scale.z = 1e-4;
     this.shadow.group.position.z = this.floor + 0.001;
   }
@@ -213,8 +219,12 @@ export class ArmScene {
   private regrid(): void {
     const before = this.ground.children.find((child) => child instanceof GridHelper);
     if (before) this.ground.remove(disposed(before));
-    const squares = 2 * Math.ceil((0.95 * this.reach) / GRID_SQUARE);
-    const grid = new GridHelper(squares * GRID_SQUARE, squares, this.colours.grid, this.colours.grid);
+    const grid = new GridHelper(
+      this.squares * GRID_SQUARE,
+      this.squares,
+      this.colours.grid,
+      this.colours.grid,
+    );
     grid.rotation.x = Math.PI / 2;
     grid.position.z = this.floor;
     this.ground.add(grid);
