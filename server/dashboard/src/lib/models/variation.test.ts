@@ -11,8 +11,8 @@ const variation = (name: string, varying: number, values: (number | null)[]): Va
     alone_constant: 0,
     alone_varying: varying,
     against: [
-      { regressor: 'speed', joint: 1, value: 0.1, significant: false },
-      { regressor: 'sign of speed', joint: 2, value: 0.9, significant: true },
+      { regressor: 'speed', joint: 1, value: 0.1, noise: 0.1 },
+      { regressor: 'sign of speed', joint: 2, value: -0.9, noise: 0.1 },
     ],
   }) as unknown as Variation;
 

@@ -21,6 +21,9 @@ export interface VariationPicture {
   goesWith: string;
 }
 
+/** Times what independent signals would show, beyond which a correlation counts. */
+const SIGNIFICANT = 3;
+
 /** The parameters that explain most by moving, at most so many. */
 export function variationPictures(found: TimeDomain, most: number): VariationPicture[] {
   return [...found.parameters]
@@ -42,7 +45,7 @@ function pictureOf(one: Variation, time: readonly number[]): VariationPicture {
       lines.at(-1)?.push([((time[index] ?? 0) - begin) / span, 0.5 - (0.47 * value) / largest]);
     }
   });
-  const strongest = one.against.filter((against) => against.significant)[0];
+  const strongest = one.against.find((against) => Math.abs(against.value) > SIGNIFICANT * against.noise);
   return {
     name: one.name,
     unit: one.unit,
