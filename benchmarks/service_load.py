@@ -16,6 +16,7 @@ import argparse
 import contextlib
 import http.client
 import json
+import math
 import os
 import subprocess
 import sys
@@ -88,13 +89,18 @@ def jitter(path: Path) -> tuple[list[float], int]:
     return (after - after.min()).tolist(), trace.missing
 
 
+def ready_again(service: RunningService) -> None:
+    """After a run that did not come to its end."""
+    service.ask("POST", "/reset", json={})
+    service.ask("POST", "/queue/resume", json={})
+
+
 def record(service: RunningService, seconds: float, found: Measured) -> tuple[list[float], int]:
     """Records an experiment of some length; one that ends before its end is noted, and measured as far as it came."""
     ended = service.ended("experiments", service.submit(sway(seconds)))
     if ended["state"] != "done":
         found.endings.append(f"{ended['state']}: {ended['reason']}")
-        service.ask("POST", "/reset", json={})
-        service.ask("POST", "/queue/resume", json={})
+        ready_again(service)
     file = service.ask("GET", f"/traces/{ended['trace']}")["entry"]["file"]
     return jitter(service.folder / "traces" / file)
 
@@ -155,7 +161,13 @@ def stop_again_and_again(service: RunningService, control: MockControl, fit: str
     doors[OWN_DOOR].connect()
     for number in range(times):
         door = (OWN_DOOR, STOP_DOOR)[number % 2]
-        service.until_recording(experiment := service.submit(sway(60.0)))
+        experiment = service.submit(sway(60.0))
+        try:
+            service.until_recording(experiment)
+        except RuntimeError as error:
+            found.endings.append(str(error))
+            ready_again(service)
+            continue
         before = control.ask("state")["stop"]["count"]
         time.sleep(random.uniform(0.0, 0.1))
         at, confirmed = stop(doors[door])
@@ -165,8 +177,7 @@ def stop_again_and_again(service: RunningService, control: MockControl, fit: str
         found.unconfirmed += not confirmed
         found.fitting += service.ask("GET", f"/jobs/{fit}")["state"] == "running"
         service.ended("experiments", experiment)
-        service.ask("POST", "/reset", json={})
-        service.ask("POST", "/queue/resume", json={})
+        ready_again(service)
     for line in doors.values():
         line.close()
 
@@ -252,13 +263,13 @@ def figures_of(found: Measured) -> list[Figure]:
         ("frozen in memory", FROZEN_TARGET_MS, found.frozen), ("first used", USED_TARGET_MS, found.used)
     ):  # fmt: skip
         for door, times in doors.items():
-            ms = [1e3 * one for one in times]
-            beside = f"{spread(ms)}, {len(ms)} stops"
+            ms = [1e3 * one for one in times] or [math.inf]
+            beside = f"{spread(ms)}, {len(times)} stops"
             stops.append(at_most(f"stop {door}: {what}, p99", quantile(ms, 0.99), target, "ms", beside))
     busy = ", ".join(f"{name} {100 * share:.0f} %" for name, share in found.busy.items())
     own = f"the clients' own lateness p99 {quantile(late, 0.99):.1f} ms"
     return [
-        Figure("recordings not completed", f"{len(found.endings)}", "0", not found.endings, "; ".join(found.endings)),
+        Figure("experiments not completed", f"{len(found.endings)}", "0", not found.endings, "; ".join(found.endings)),
         Figure("ticks lost", f"{lost}", "0", lost == 0, f"of {count}"),
         at_most("tick jitter added, p99", loaded - idle, JITTER_TARGET_MS, "ms",
                 f"p99 {loaded:.2f} ms, alone {idle:.2f} ms"),
