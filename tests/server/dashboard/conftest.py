@@ -57,7 +57,9 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Service, 
     mock = start_mock(port)
     control = MockControl(mock)
     try:
-        with running_service(tmp_path_factory.mktemp("dashboard"), mock.url) as service:
+        folder = tmp_path_factory.mktemp("dashboard")
+        (folder / "daq.toml").write_text("[server]\nconnect_at_start = false\n")  # the tests connect it
+        with running_service(folder, mock.url) as service:
             service.until_connected()
             yield service, control
     finally:
