@@ -297,7 +297,7 @@ class QueueDesk:
                 parts.robot.name, experiment.id, ending.event, parts.clock.utc(), ending.reason, ending.outcome
             )
         parts.told("experiment", f"{ending.event}: {ending.reason}".rstrip(": "), experiment=experiment.id)
-        if ending.holds_queue and not self._closing:
+        if ending.holds_queue:
             self.pause(f"experiment {experiment.id} was {ending.event} ({ending.reason}): look at the arm, then resume")
 
     def _run(self, experiment: Experiment) -> Ending:

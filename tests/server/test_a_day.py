@@ -33,7 +33,7 @@ def test_a_day(tmp_path: Path) -> None:
         service.until_connected()
         _what_the_restart_tells(service, running, waiting, job)
         assert {trace: _downloaded(service, trace) for trace in traces} == data
-        assert service.robot.get(f"/models/{model}").json()["traces"] == [traces[0]]
+        assert service.robot.get(f"/models/{model}").json()["entry"]["traces"] == [traces[0]]
         assert service.robot.get(f"/schedules/{schedule}").json()["submitted_runs"] == 1
         assert service.robot.post("/queue/resume", json={}).status_code == 200
         assert service.end_of(waiting)["state"] == "done"
@@ -116,7 +116,7 @@ def _what_the_restart_tells(service: Service, running: str, waiting: str, job: s
     assert service.robot.get(f"/traces/{found['trace']}").json()["entry"]["experiment"] == running
     queue = service.robot.get("/queue").json()
     assert (queue["paused"], queue["queued"]) == (True, 1)
-    assert "started again with 1 waiting and 1 interrupted" in queue["reason"]
+    assert "look at the arm, then resume" in queue["reason"]
     assert [one["id"] for one in service.robot.get("/queue/experiments").json()] == [waiting]
     service.robot.post(f"/jobs/{job}/cancel")  # one that had not begun is computed after a restart: it moves nothing
     assert service.end_of(job, "jobs")["state"] in ("cancelled", "interrupted")
