@@ -8,9 +8,8 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 FOR_USE := .venv/installed-for-use
 FOR_DEVELOPMENT := .venv/installed-for-development
 
-# make test WORKERS="-n 2 --dist loadfile": each file of tests to one of two workers. Tests against the clock then meet
-# the load of others and may fail for it.
-WORKERS ?=
+# Tests against the clock share one worker, all others go to the other. One process: make test WORKERS=
+WORKERS ?= -n 2 --dist loadgroup
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
