@@ -30,7 +30,7 @@ def _told(violation: dict[str, Any]) -> str:
 def test_axe_finds_no_fault_on_any_page(browser: Browser, served: tuple[Service, MockControl], scheme: str) -> None:
     assert Path(AXE).is_file(), "make page installs it"
     context = browser.new_context(viewport=WIDE, color_scheme=scheme)  # type: ignore[arg-type]
-    context.add_init_script(path=AXE)
+    context.add_init_script(AXE.read_text("utf-8"))
     tab = watched(context, *served)
     found = []
     for path in PAGES:
