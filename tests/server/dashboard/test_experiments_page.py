@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, Locator, Page, Playwright, expect
 
-from tests.server.dashboard.browser import TABLET, WIDE, Dashboard, MockControl, watched
+from tests.server.dashboard.browser import TABLET, WIDE, WITH_3D, Dashboard, MockControl, chromium, watched
 from tests.server.dashboard.test_accessible import AXE, RULES
 from tests.server.service import Service
 
@@ -165,6 +165,7 @@ def test_what_runs_shows_its_progress_and_is_stopped_from_the_queue(dashboard: D
     form.get_by_role("button", name="Stop it").click()
     expect(form.get_by_text("The arm is stopped.")).to_be_visible()
     expect(form.get_by_text("cancelled", exact=True).first).to_be_visible()
+    assert dashboard.mock is not None
     assert dashboard.mock.ask("state")["frozen"]
 
 
@@ -197,17 +198,28 @@ def test_the_queue_says_that_it_waits_for_whoever_has_the_control(dashboard: Das
     expect(form.get_by_text("has the control of the arm")).not_to_be_attached()
 
 
-def test_the_motion_is_shown_in_3d_and_turned_with_the_keyboard(form: Page) -> None:
-    picture = form.get_by_label("The motion in 3-D")
-    expect(picture).to_have_accessible_description(re.compile(r"End of the arm at x -?\d+.*Joints: 1 waist 180\.0°"))
-    before = picture.screenshot()
-    picture.focus()
-    for _ in range(6):
-        form.keyboard.press("ArrowRight")
-    form.get_by_role("button", name="Top", exact=True).scroll_into_view_if_needed()
-    assert picture.screenshot() != before
-    form.get_by_role("slider", name="Moment of the motion").fill("2")
-    expect(picture).to_have_accessible_description(re.compile("1 waist 201.6°"))
+def test_the_motion_is_shown_in_3d_and_turned_with_the_keyboard(
+    driver: Playwright, served: tuple[Service, MockControl]
+) -> None:
+    with chromium(driver, *WITH_3D) as browser:
+        form = watched(browser.new_context(viewport=WIDE), *served).open("experiments")
+        picture = form.get_by_label("The motion in 3-D")
+        expect(picture).to_have_accessible_description(re.compile(r"End of the arm at x -?\d+.*1 waist 180\.0°"))
+        expect(picture).to_be_visible()
+        place = picture.bounding_box()
+        assert place is not None
+        before = form.screenshot(clip=place)
+        picture.focus()
+        for _ in range(6):
+            form.keyboard.press("ArrowRight")
+        assert form.screenshot(clip=place) != before
+        form.get_by_role("slider", name="Moment of the motion").fill("2")
+        expect(picture).to_have_accessible_description(re.compile("1 waist 201.6°"))
+
+
+def test_the_motion_is_told_in_words_where_a_browser_shows_no_3d(form: Page) -> None:
+    expect(form.get_by_text("This browser shows no 3-D")).to_be_visible()
+    expect(form.get_by_text(re.compile(r"Joints: 1 waist 180\.0°")).first).to_be_visible()
 
 
 def test_it_fits_a_tablet(form: Page) -> None:

@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Floats, Trace, TraceRecord
 from daq.traces.store import write_trace
 from tests.server.dashboard.browser import TABLET, WIDE, Dashboard, MockControl, watched
 from tests.server.dashboard.test_accessible import AXE, RULES
@@ -27,12 +27,12 @@ Served = tuple[Service, MockControl]
 
 def _taken_in(service: Service, folder: Path, name: str, amplitude: float) -> str:
     """A step of joints 1 to 3 that swings about its target, as a trace of the service; its number."""
-    time = np.arange(80) * PERIOD
+    time: Floats = np.arange(80, dtype=np.float64) * PERIOD
     since = np.maximum(0, time - 0.3)[:, None]
     begin = np.array([3.1, 0.8, 0.0])
     way = amplitude * np.array([1.0, -0.5, 0.8])
     set_point = begin + way * (since > 0)
-    position = begin + way * (1 - np.exp(-6 * since) * (np.cos(9 * since) + 6 / 9 * np.sin(9 * since)))
+    position: Floats = begin + way * (1 - np.exp(-6 * since) * (np.cos(9 * since) + 6 / 9 * np.sin(9 * since)))
     record = TraceRecord(
         trace_id=uuid.uuid4().hex[:12],
         created=datetime.now(UTC),
