@@ -110,4 +110,4 @@ def _friction_deflection(model: Model, measured: Floats) -> Floats:
 
 def _spread(mask: Mask, reach: int) -> Mask:
     """True within `reach` samples of any True."""
-    return np.asarray(np.convolve(mask, np.ones(2 * reach + 1), mode="same") > 0.5)
+    return np.asarray(np.convolve(mask, np.ones(2 * reach + 1))[reach : reach + len(mask)] > 0.5)  # also a short one
