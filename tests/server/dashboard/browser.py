@@ -76,8 +76,10 @@ def playwright() -> Iterator[Playwright]:
 def chromium(driver: Playwright, *options: str) -> Iterator[Browser]:
     """The system's Chromium, without a window."""
     browser = driver.chromium.launch(executable_path=find_chromium(), args=[*OPTIONS, *options])
-    yield browser
-    browser.close()
+    try:
+        yield browser
+    finally:
+        browser.close()
 
 
 class MockControl:
