@@ -11,7 +11,7 @@ from playwright.sync_api import Playwright, expect
 from tests.server.dashboard.browser import WIDE, WITH_3D, MockControl, chromium, watched
 from tests.server.service import Service
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 def test_the_arm_is_drawn_and_moves_when_it_is_turned(driver: Playwright, served: tuple[Service, MockControl]) -> None:

@@ -12,7 +12,7 @@ from tests.server.dashboard.browser import TABLET, Dashboard
 from tests.server.dashboard.faults import faults_of
 from tests.server.dashboard.studied import Studied
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]
 """What `studied` has is computed once, before the first test."""
 
 

@@ -13,7 +13,7 @@ from tests.server.dashboard.browser import TABLET, WIDE, WITH_3D, Dashboard, Moc
 from tests.server.dashboard.test_accessible import AXE, RULES
 from tests.server.service import Service
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 SHORT = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.2}, "settle": 0.1, "hold": 0.1}
 
 

@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 
 from tests.server.dashboard.browser import Dashboard
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 RAMP = {"spec": {"trajectory": {"kind": "ramp", "amplitude": 0.1, "duration": 0.5}, "joints": [1]}}
 
 

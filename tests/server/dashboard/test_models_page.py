@@ -11,7 +11,7 @@ from tests.server.dashboard.browser import TABLET, Dashboard
 from tests.server.dashboard.faults import faults_of
 from tests.server.dashboard.studied import Studied
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]
 
 
 def test_the_tree_leads_from_the_machine_to_the_model_by_keyboard(

@@ -19,7 +19,7 @@ from tests.server.dashboard.browser import TABLET, WIDE, Dashboard, MockControl,
 from tests.server.dashboard.test_accessible import AXE, RULES
 from tests.server.service import Service
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 JOINTS = (1, 2, 3)
 PERIOD = 0.02
 Served = tuple[Service, MockControl]
