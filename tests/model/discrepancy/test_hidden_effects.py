@@ -19,6 +19,8 @@ HIDDEN = {
     "backlash": ("backlash:joint=2,play=0.012,stiffness=20000,damping=10", 2),
     "wrong_gain": ("wrong_gain:joint=1,factor=1.15", 1),
 }
+SLOW = ("motor_inductance", "backlash")
+"""Of them, those that take minutes: left to the slow tests."""
 
 
 def diagnosed(folder: Path, modification: str | None) -> Diagnosis:
@@ -29,7 +31,9 @@ def diagnosed(folder: Path, modification: str | None) -> Diagnosis:
     return diagnose(base_model(machine), [fitted], [held])
 
 
-@pytest.mark.parametrize("name", HIDDEN)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in HIDDEN]
+)
 @pytest.mark.timeout(400)
 def test_a_hidden_effect_is_named_at_its_joint_and_the_gap_shrinks(name: str, tmp_path: Path) -> None:
     modification, joint = HIDDEN[name]
