@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from model.discrepancy.answer import SignalError, Step, Verdict
 from model.discrepancy.thresholds import Thresholds
 
+SCATTER = 4.0
+"""Standard deviations of a variance known from so many samples, within which it may be above its floor by chance."""
+
 
 def unexplained(
-    fitted: Sequence[SignalError], held: Sequence[SignalError], thresholds: Thresholds, *, named: bool
-) -> tuple[int, ...]:
+    fitted: Sequence[SignalError], held: Sequence[SignalError], thresholds: Thresholds, *, named: bool,
+    samples: tuple[int, int] = (10**9, 10**9),
+) -> tuple[int, ...]:  # fmt: skip
     """Joints on which more is left than noise leaves, and than a law that is only nearly the arm's may leave.
 
     Args:
         fitted, held: errors before any effect was added, and now, on fitted and on held-out traces.
-        named: whether effects have been added.
+        named: whether effects have been added. samples: of a joint, on fitted and on held-out traces.
     """
+    in_sample = thresholds.unexplained if named else thresholds.unnamed
     found = []
-    for errors, least in (
-        (fitted, thresholds.unexplained if named else thresholds.unnamed),
-        (held, thresholds.unexplained),
-    ):
+    for errors, line, count in ((fitted, in_sample, samples[0]), (held, thresholds.unexplained, samples[1])):
+        least = max(line, SCATTER * math.sqrt(2.0 / max(count, 1)))
         for e in errors:
             before, after = ((size / e.floor) ** 2 - 1.0 for size in (e.before, e.after))
             if after > max(least, (1.0 - thresholds.least_share) * before if named else 0.0):

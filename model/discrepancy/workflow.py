@@ -271,9 +271,11 @@ def _unexplained(case: _Case, model: Model, first: Judged, current: Judged, step
         held = case.floor_held if case.held is None else np.maximum(case.floor_held, case.held.floor(after))
         case = replace(case, floor=floor, floor_held=held)
     fitted = errors(case.observation, model, before.residuals, after.residuals, case.floor)
-    return unexplained(
-        fitted, _held_errors(case, model, *_held(case, before, after)), case.thresholds, named=named
-    )  # fmt: skip
+    held_errors = _held_errors(case, model, *_held(case, before, after))
+    joints = len(case.floor)
+    judged = 0 if case.held is None else case.held.observation.samples
+    counts = case.observation.samples // joints, judged // joints
+    return unexplained(fitted, held_errors, case.thresholds, named=named, samples=counts)
 
 
 def _left(observation: Observation, point: Point) -> Left:
