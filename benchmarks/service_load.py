@@ -32,6 +32,7 @@ from benchmarks.mock_control import MockControl
 from benchmarks.mock_process import started_mock
 from benchmarks.service_clients import Clients, Seen, clients
 from benchmarks.service_process import ROBOT, RunningService, child, dice, ramp, started_service, sway
+from benchmarks.stop_latency import record_of_stop
 from daq.contracts.service.system import stop_port_after
 from daq.traces.reader import read_trace
 
@@ -44,7 +45,6 @@ JITTER_TARGET_MS = 5.0
 FROZEN_TARGET_MS = 30.0
 USED_TARGET_MS = 55.0
 GET_TARGET_MS = 25.0
-LONGEST_WAIT_S = 5.0
 OWN_DOOR, STOP_DOOR = "through the service", "through the stop listener"
 FIT = {"kind": "fit", "method": "nelder_mead", "starts": 20}
 EMPTY_APP = """
@@ -132,18 +132,6 @@ def stop(line: http.client.HTTPConnection) -> tuple[float, bool]:
     at = time.monotonic()
     line.request("POST", f"{API}/stop")
     return at, bool(json.loads(line.getresponse().read())["confirmed"])
-
-
-def record_of_stop(control: MockControl, number: int) -> tuple[float, float]:
-    """When stop `number` was in the memory and when it was first used (s, monotonic). Raises RuntimeError."""
-    give_up = time.monotonic() + LONGEST_WAIT_S
-    while time.monotonic() < give_up:
-        state = control.ask("state")
-        stop, zero_us = state["stop"], state["clock"]["monotonic_us_at_zero"]
-        if stop["count"] == number and stop["first_used_us"] is not None:
-            return (zero_us + stop["frozen_us"]) * 1e-6, (zero_us + stop["first_used_us"]) * 1e-6
-        time.sleep(0.01)
-    raise RuntimeError(f"stop {number} never had an effect: the mock recorded {stop}")
 
 
 def stop_again_and_again(service: RunningService, control: MockControl, fit: str, times: int, found: Measured) -> None:

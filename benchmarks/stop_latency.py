@@ -124,8 +124,8 @@ def _by_command(host: Connection, after_s: float) -> tuple[float, bool]:
     return at, confirmed
 
 
-def _record_of_stop(control: MockControl, number: int) -> tuple[float, float]:
-    """When stop `number` was in the memory and when it was first used (s, monotonic clock)."""
+def record_of_stop(control: MockControl, number: int) -> tuple[float, float]:
+    """When stop `number` was in the memory and when it was first used (s, monotonic clock). Raises RuntimeError."""
     give_up = time.monotonic() + LONGEST_WAIT_S
     while time.monotonic() < give_up:
         state = control.ask("state")
@@ -156,7 +156,7 @@ def measure(url: str, repeats: int) -> tuple[dict[str, Stops], int, dict[str, in
             for _ in range(times):
                 at, confirmed = way(host, dice.uniform(3 * PERIOD_S, 4 * PERIOD_S))
                 number += 1
-                frozen, used = _record_of_stop(control, number)
+                frozen, used = record_of_stop(control, number)
                 stops.frozen.append(1e3 * (frozen - at))
                 stops.used.append(1e3 * (used - at))
                 stops.unconfirmed += not confirmed

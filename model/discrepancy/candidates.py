@@ -29,8 +29,9 @@ TRIALS: Mapping[str, tuple[float, ...]] = {
 }
 """Trial sizes in expected deviations of effects that do not grow in proportion to their parameter."""
 SMALL = 0.002
-"""The one trial of all others, which tells the size by itself. It is small, for an effect that does what a tolerance
-parameter does can only be told by the price of that parameter's prior, and a curved response would hide it."""
+"""Expected deviations: the one trial of all others, which tells the size by itself. It is small: an effect that does
+what a tolerance parameter does can only be told by the price of that parameter's prior, and a curved response would
+hide it."""
 STICTION_SPEED = 0.045
 """rad/s: friction that has fallen below this speed belongs to breaking away, above it to the Stribeck curve. At 20 ms
 and 12 bits the joint moves by less than a count a sample there: no reading shows the fall."""

@@ -14,8 +14,8 @@ from model.fitting.fit import INTERVAL
 
 
 def found_values(found: Refitted) -> dict[str, FoundValue]:
-    """Estimates and 95 % intervals of a candidate's parameters, from the curvature at the solution; stretched by what
-    the residual's colour leaves of its samples."""
+    """Estimates and 95 % intervals of a candidate's parameters, from the curvature at the solution; widened by
+    the misfit where that is above 1. The colour of the residual is not accounted for."""
     point = found.judged.point
     covariance = np.linalg.pinv(point.information)
     stretch = max(1.0, point.misfit)

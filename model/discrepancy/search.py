@@ -158,8 +158,9 @@ def _step(observation: Observation, point: Point) -> tuple[Point, bool]:
 
 
 def _gauss_newton(point: Point, least: Floats, most: Floats) -> Floats:
-    """The step to the least of the linearised problem, at most to the bounds: an unknown that would leave them goes to
-    its bound, and the others take that into account. Cutting such steps off would spoil the descent of all others."""
+    """The step (p,) to the least of the linearised problem, from `least` to `most` (p,): an unknown that would leave
+    its bounds goes to the nearer one, and the others take that into account. Cutting such steps off would spoil the
+    descent of all others."""
     information = point.information
     diagonal = np.diag(information)
     information[np.diag_indices_from(information)] += 1e-9 * np.maximum(diagonal, 1e-12 * diagonal.max())
