@@ -18,11 +18,18 @@ def shared_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service
 
 
 @pytest.fixture(scope="session")
-def sound_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+def service_of_jobs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     """A service of the tests of jobs: its arm is as its machine file says, and none of the others moves it."""
     with running_service(tmp_path_factory.mktemp("jobs")) as service:
         service.until_connected()
         yield service
+
+
+@pytest.fixture(scope="module")
+def sound_service(service_of_jobs: Service) -> Service:
+    """The same, its queue open, whatever the tests of another file left."""
+    service_of_jobs.robot.post("/queue/resume", json={})
+    return service_of_jobs
 
 
 @pytest.fixture

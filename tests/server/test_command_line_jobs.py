@@ -24,7 +24,6 @@ Daq = Callable[..., Said]
 def worker(sound_service: Service) -> None:
     """The worker process is there before the tests, which may leave none behind: it has done one job."""
     spec = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.2}, "settle": 0.1, "hold": 0.1}
-    sound_service.robot.post("/queue/resume", json={})
     ended = sound_service.end_of(sound_service.robot.post("/experiments", json={"spec": spec}).json()["id"])
     request = {"kind": "compare", "traces": [ended["trace"]], "models": ["machine"]}
     job = sound_service.robot.post("/jobs", json=request).json()["id"]
