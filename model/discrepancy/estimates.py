@@ -6,23 +6,29 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from model.discrepancy.answer import Candidate, FoundValue
+from model.discrepancy.observation import Observation
 from model.discrepancy.ranking import Ranking
 from model.discrepancy.refitting import Refitted
 from model.fitting.fit import INTERVAL
+from model.fitting.whitening import Whitener
+
+Floats = NDArray[np.float64]
 
 
-def found_values(found: Refitted) -> dict[str, FoundValue]:
-    """Estimates and 95 % intervals of a candidate's parameters, from the curvature at the solution; widened by
-    the misfit where that is above 1. The colour of the residual is not accounted for."""
+def found_values(observation: Observation, found: Refitted) -> dict[str, FoundValue]:
+    """Estimates and 95 % intervals of a candidate's parameters: from the curvature at the solution, and the size and
+    colour of the residual that is left."""
     point = found.judged.point
-    covariance = np.linalg.pinv(point.information)
-    stretch = max(1.0, point.misfit)
+    covariance = coloured_covariance(
+        point.precision, found.judged.noise.whiteners, observation.by_joint(point.tangents)
+    )
     values = {}
     for p in found.candidate.free:
         k = [u.name for u in point.unknowns].index(p.name)
-        value, deviation = float(point.values[k]), float(np.sqrt(max(covariance[k, k], 0.0) * stretch))
+        value, deviation = float(point.values[k]), float(np.sqrt(max(covariance[k, k], 0.0)))
         unknown = point.unknowns[k]
         known = np.isfinite(deviation) and point.tangents[k] @ point.tangents[k] > 0
         low = max(unknown.low, value - INTERVAL * deviation) if known else None
@@ -31,9 +37,31 @@ def found_values(found: Refitted) -> dict[str, FoundValue]:
     return values
 
 
+def coloured_covariance(
+    precision: Floats, whiteners: Sequence[Whitener], tangents: Sequence[Sequence[Floats]]
+) -> Floats:
+    """(p, p); of least squares that take a residual for white, where it is coloured: H⁻¹ (J Σ Jᵀ + P) H⁻¹ with
+    H = J Jᵀ + P, the residual's own covariance Σ and the precision P of the priors (White 1980).
+
+    Args:
+        precision: (p,) of the priors. whiteners: of each joint's residual.
+        tangents: J of each joint, run by run (p, m).
+    """
+    information, meat = np.diag(precision), np.diag(precision)
+    for whitener, runs in zip(whiteners, tangents, strict=True):
+        for run in runs:
+            coloured = whitener.coloured(run.T)
+            information = information + run @ run.T
+            meat = meat + coloured.T @ coloured
+    inverse = np.linalg.pinv(information)
+    return np.asarray(inverse @ meat @ inverse)
+
+
 def listed(found: Refitted) -> Candidate:
     """A candidate in the list: its estimates without intervals, for its derivatives are not those of where it ended."""
-    values = {name: v.model_copy(update={"low": None, "high": None}) for name, v in found_values(found).items()}
+    values = {}
+    for p in found.candidate.free:
+        values[p.name] = FoundValue(value=found.judged.point.value(p.name), low=None, high=None, unit=p.unit)
     return Candidate(
         effect=found.candidate.name, joints=found.candidate.joints, evidence=found.evidence, misfit=found.misfit,
         refitted=True, parameters=values,

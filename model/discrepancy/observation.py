@@ -20,7 +20,7 @@ from daq.contracts.trace import Trace
 from model.fitting.fit import fit_problem
 from model.fitting.options import FitOptions
 from model.fitting.records import Record
-from model.fitting.simulated import SimulatedProblem, unknown_place
+from model.fitting.simulated import INITIAL, SimulatedProblem, unknown_place
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.simulation.engines import engine_for
@@ -43,6 +43,9 @@ DIFFERENCE = 0.05
 BEND_SHARE = 0.45
 """Standard deviation of each term of a potentiometer's curve, as a share of the stated linearity."""
 GEARS_THAT_GIVE = ("backlash", "joint_compliance")
+LOOSE_START = 8.0
+"""Times the tolerance of a reading: how far a trace may begin from where its first reading says. The trace itself shows
+where it began, and what it is read by may be what is missing."""
 BATCH = 64
 """Runs at a time: bounds the memory, 64 runs of 55 s take 26 MB."""
 
@@ -203,7 +206,7 @@ def observed(model: Model, traces: Sequence[Trace]) -> tuple[Observation, Model,
     sensors = [model.machine.joint(j).sensor for j in model.machine.modelled_joints]
     unit = np.array([1.0 if s is None else s.range.value / 2**s.bits for s in sensors])
     prepared = tuple(prepare(problem.model, r.inputs, Options(quantise=False)) for r in problem.records)
-    unknowns = tuple(_even_bend(u, problem.model) for u in problem.unknowns)
+    unknowns = tuple(_loose_start(_even_bend(u, problem.model)) for u in problem.unknowns)
     return Observation(problem.records, problem.floor, unit, prepared), problem.model, unknowns
 
 
@@ -217,7 +220,17 @@ def _difference(model: Model, unknown: Unknown, value: float) -> float:
     parameter = model.by_name.get(unknown.name)
     stated = None if parameter is None else parameter.deviation
     size = DIFFERENCE * (unknown.deviation or stated or unknown.scale)
+    if unknown.name.startswith(INITIAL + "."):
+        size /= LOOSE_START
     return -size if value + size > unknown.high else size
+
+
+def _loose_start(unknown: Unknown) -> Unknown:
+    """A posture at the start, free to be where the trace shows it."""
+    if not unknown.name.startswith(INITIAL + ".") or unknown.deviation is None:
+        return unknown
+    limit = 2 * LOOSE_START * unknown.deviation
+    return replace(unknown, deviation=LOOSE_START * unknown.deviation, low=-limit, high=limit)
 
 
 def _even_bend(unknown: Unknown, model: Model) -> Unknown:

@@ -134,7 +134,7 @@ def _with_evidence(
     after = judge(observation, point)
     price = len(candidate.free) * math.log(observation.samples)
     if candidate.name in TONES:
-        price += 2 * math.log(MOST_TONES)
+        price += 2 * math.log(MOST_TONES) - math.log(observation.samples)  # the tries are what the frequency costs
     return Refitted(candidate, after, before.description - after.description - price, promised)
 
 

@@ -220,7 +220,7 @@ def _turn(
     held = _held(case, current.point, best.judged.point)
     rejected = _rejected(case, best, *held)
     where = _where(case, current.point)
-    values = found_values(best)
+    values = found_values(observation, best)
     held_errors = _held_errors(case, model, *held)
     candidates = tuple(listed(r) for r in ranking.fitted) + only_probed(ranking, observation.samples)
     reason = reasons.reason(

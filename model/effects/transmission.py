@@ -22,6 +22,11 @@ def contact_compliance(scale: JointScale) -> float:
     return 1.0 / (CONTACT_RATE**2 * scale.inertia)
 
 
+def _give(scale: JointScale) -> float:
+    """A contact that is this much softer lets a joint give by two counts under a twentieth of its rated torque."""
+    return 2 * scale.resolution / (0.05 * scale.torque)
+
+
 TRANSMISSION = (
     Effect(
         "torque_ripple",
@@ -72,6 +77,16 @@ TRANSMISSION = (
                 low=0.0,
                 high=lambda s: 10 * _damping(s),
                 deviation=_damping,
+            ),
+            EffectParameter(
+                "contact",
+                at.CONTACT_COMPLIANCE,
+                "rad/(N·m)",
+                null=None,
+                start=contact_compliance,
+                low=contact_compliance,
+                high=lambda s: contact_compliance(s) + 10 * _give(s),
+                deviation=_give,
             ),
         ),
         flag=at.HAS_FLEXIBILITY,

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 Floats = NDArray[np.float64]
 
@@ -46,6 +47,11 @@ class Whitener:
                 full -= weight * signal[self.order - lag : len(signal) - lag]
             result[self.order :] = full / self.deviations[-1]
         return result
+
+    def coloured(self, signal: Floats) -> Floats:
+        """Filters (n, …) along its first axis the other way: independent noise of unit size becomes noise like that
+        which the predictors were fitted to, begun at rest."""
+        return np.asarray(lfilter([self.deviations[-1]], np.append(1.0, -self.predictors[-1]), signal, axis=0))
 
 
 def white(deviation: float) -> Whitener:

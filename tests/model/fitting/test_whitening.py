@@ -55,3 +55,10 @@ def test_runs_are_not_joined_across_a_gap() -> None:
 
 def test_white_only_scales() -> None:
     np.testing.assert_allclose(white(2.0).whitened(np.array([2.0, -4.0])), [1.0, -2.0])
+
+
+def test_coloured_undoes_whitened_and_makes_noise_of_the_fitted_size() -> None:
+    whitener = fitted_whitener([autoregressive(3, 20_000, (0.9, -0.5), 2.0)], 4, floor=1e-6)
+    made = whitener.coloured(np.random.default_rng(5).normal(size=20_000))
+    np.testing.assert_allclose(whitener.coloured(whitener.whitened(made)[4:])[200:], made[204:], rtol=1e-6, atol=1e-6)
+    assert made.std() == pytest.approx(autoregressive(4, 20_000, (0.9, -0.5), 2.0).std(), rel=0.05)
