@@ -22,13 +22,13 @@ def found_values(observation: Observation, found: Refitted) -> dict[str, FoundVa
     """Estimates and 95 % intervals of a candidate's parameters: from the curvature at the solution, and the size and
     colour of the residual that is left."""
     point = found.judged.point
-    covariance = coloured_covariance(
+    deviations = standard_deviations(
         point.precision, found.judged.noise.whiteners, observation.by_joint(point.tangents)
     )
     values = {}
     for p in found.candidate.free:
         k = [u.name for u in point.unknowns].index(p.name)
-        value, deviation = float(point.values[k]), float(np.sqrt(max(covariance[k, k], 0.0)))
+        value, deviation = float(point.values[k]), float(deviations[k])
         unknown = point.unknowns[k]
         known = np.isfinite(deviation) and point.tangents[k] @ point.tangents[k] > 0
         low = max(unknown.low, value - INTERVAL * deviation) if known else None
@@ -37,14 +37,15 @@ def found_values(observation: Observation, found: Refitted) -> dict[str, FoundVa
     return values
 
 
-def coloured_covariance(
+def standard_deviations(
     precision: Floats, whiteners: Sequence[Whitener], tangents: Sequence[Sequence[Floats]]
 ) -> Floats:
-    """(p, p); of least squares that take a residual for white, where it is coloured: H⁻¹ (J Σ Jᵀ + P) H⁻¹ with
-    H = J Jᵀ + P, the residual's own covariance Σ and the precision P of the priors (White 1980).
+    """(p,) of estimates by least squares that take a residual for white noise of unit size: what that gives, or, where
+    it is more, what the residual's own covariance Σ gives, H⁻¹ (J Σ Jᵀ + P) H⁻¹ with H = J Jᵀ + P (White 1980). Never
+    less, for a fit takes slow noise out of its residual.
 
     Args:
-        precision: (p,) of the priors. whiteners: of each joint's residual.
+        precision: P, (p,) of the priors. whiteners: of each joint's residual.
         tangents: J of each joint, run by run (p, m).
     """
     information, meat = np.diag(precision), np.diag(precision)
@@ -53,8 +54,9 @@ def coloured_covariance(
             coloured = whitener.coloured(run.T)
             information = information + run @ run.T
             meat = meat + coloured.T @ coloured
-    inverse = np.linalg.pinv(information)
-    return np.asarray(inverse @ meat @ inverse)
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))  # units differ by many powers of ten
+    inverse = np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-12, hermitian=True) * np.outer(scale, scale)
+    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), np.diag(inverse @ meat @ inverse))))
 
 
 def listed(found: Refitted) -> Candidate:
