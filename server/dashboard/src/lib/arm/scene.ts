@@ -15,10 +15,12 @@ import {
   WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import { FrameBudget } from '../drawing/budget';
 import type { Way } from '../trajectory/preview';
 import { reachOf, tipOf, type Chain, type Vector } from './chain';
 import type { ArmColours } from './colours';
 import { ArmFigure, type FigureMaterials } from './figure';
+import { farthest, metresOfPixel, outlineOf } from './motion';
 import { Trail } from './trail';
 import { cameraAt, fittingDistance, turned, viewFrom, viewNamed, type View, type ViewName } from './views';
 import { WayLine } from './way_line';
@@ -31,6 +33,12 @@ const TOP = 1.25;
 /** m. */
 const GRID_SQUARE = 0.1;
 const FINEST_PIXELS = 2;
+/** Size of the hand as a share of the reach: what of it moves when the last joint turns. */
+const HAND = 0.2;
+/** px that something has to move to be drawn anew. */
+const VISIBLE = 0.5;
+/** Without a graphics card: share of the time for drawing the arm, s between two drawings at least and at most. */
+const SPARED = [0.12, 0.08, 1] as const;
 
 /** What is shown. Postures in rad, one value a joint. */
 export interface ArmPicture {
@@ -69,7 +77,11 @@ export class ArmScene {
   private readonly target: Vector;
   private readonly floor: number;
   private shown: ArmPicture = { posture: null };
+  /** Arm and ghost as they are on the screen. */
+  private drawn: { arm: Vector[] | null; ghost: Vector[] | null } = { arm: null, ghost: null };
   private frame = 0;
+  private timer: ReturnType<typeof setTimeout> | null = null;
+  private readonly budget: FrameBudget | null;
   private chosen: ViewName | null = 'corner';
 
   constructor(
@@ -77,8 +89,16 @@ export class ArmScene {
     private readonly chain: Chain,
     floor: number | null,
     private colours: ArmColours,
+    /** Whether the processor draws: coarser, and only as often as leaves time for the charts. */
+    spared: boolean,
   ) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'low-power' });
+    this.budget = spared ? new FrameBudget(...SPARED) : null;
+    this.renderer = new WebGLRenderer({
+      canvas,
+      antialias: !spared,
+      alpha: true,
+      powerPreference: 'low-power',
+    });
     const reach = this.reach;
     this.floor = floor ?? -0.6 * reach;
     this.target = [0, 0, (this.floor + TOP * reach) / 2];
@@ -103,16 +123,17 @@ export class ArmScene {
     const { posture, ghost } = picture;
     this.arm.group.visible = this.shadow.group.visible = posture !== null;
     this.ghost.group.visible = Boolean(ghost);
-    if (posture) {
-      for (const figure of [this.arm, this.shadow]) figure.take(posture);
-      if (picture.trail) this.trail.add(tipOf(this.chain, posture));
-    }
-    if (ghost) this.ghost.take(ghost);
+    if (posture && picture.trail) this.trail.add(tipOf(this.chain, posture));
     if (picture.closed !== before.closed) this.arm.grip(picture.closed ?? false);
     if (picture.trail !== before.trail && !picture.trail) this.trail.clear();
     if (picture.way !== before.way || picture.marks !== before.marks) this.showWay();
     if (picture.stale !== before.stale || picture.ghostIsViolation !== before.ghostIsViolation) this.paint();
-    this.invalidate();
+    if (this.isVisibleChange(before)) this.invalidate();
+  }
+
+  /** Pictures a second, lately; null where every change is drawn. */
+  get rate(): number | null {
+    return this.budget?.rate(seconds()) ?? null;
   }
 
   /** After a change of the theme. */
@@ -142,6 +163,7 @@ export class ArmScene {
 
   dispose(): void {
     cancelAnimationFrame(this.frame);
+    if (this.timer !== null) clearTimeout(this.timer);
     this.observer.disconnect();
     this.controls.dispose();
     for (const part of [this.arm, this.ghost, this.shadow, this.trail, this.wayLine]) part.dispose();
@@ -241,7 +263,7 @@ export class ArmScene {
   private resize(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width === 0 || height === 0) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, FINEST_PIXELS));
+    this.renderer.setPixelRatio(this.budget ? 1 : Math.min(devicePixelRatio, FINEST_PIXELS));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
@@ -249,15 +271,68 @@ export class ArmScene {
     this.draw();
   }
 
+  /** Whether the picture differs from the one on the screen by more than a part of a pixel. */
+  private isVisibleChange(before: ArmPicture): boolean {
+    const { shown, drawn, camera, renderer } = this;
+    const others = ['stale', 'closed', 'way', 'marks', 'ghostIsViolation', 'trail'] as const;
+    if (others.some((part) => shown[part] !== before[part])) return true;
+    const distance = camera.position.distanceTo(this.controls.target);
+    const pixel = metresOfPixel(distance, (camera.fov * Math.PI) / 180, renderer.domElement.height);
+    const least = VISIBLE * pixel;
+    return (
+      farthest(drawn.arm, this.outline(shown.posture)) > least ||
+      farthest(drawn.ghost, this.outline(shown.ghost)) > least
+    );
+  }
+
+  private outline(posture: readonly number[] | null | undefined): Vector[] | null {
+    return posture ? outlineOf(this.chain, posture, HAND * this.reach) : null;
+  }
+
+  /** Draws with the next frame, or when the budget allows it. */
   private invalidate(): void {
-    this.frame ||= requestAnimationFrame(() => this.draw());
+    if (this.frame !== 0 || this.timer !== null) return;
+    const wait = this.budget?.wait(seconds()) ?? 0;
+    if (wait === 0) {
+      this.frame = requestAnimationFrame(() => this.draw());
+      return;
+    }
+    this.timer = setTimeout(() => {
+      this.timer = null;
+      this.frame ||= requestAnimationFrame(() => this.draw());
+    }, 1000 * wait);
   }
 
   private draw(): void {
     cancelAnimationFrame(this.frame);
     this.frame = 0;
+    const begin = seconds();
+    this.pose();
     this.renderer.render(this.scene, this.camera);
+    if (this.budget) {
+      this.finish();
+      this.budget.spent(begin, seconds() - begin);
+    }
+    this.drawn = { arm: this.outline(this.shown.posture), ghost: this.outline(this.shown.ghost) };
   }
+
+  /** Puts arm, ghost and trail where they are now: not for every sample, but for every picture. */
+  private pose(): void {
+    const { posture, ghost } = this.shown;
+    if (posture) for (const figure of [this.arm, this.shadow]) figure.take(posture);
+    if (ghost) this.ghost.take(ghost);
+    this.trail.paint();
+  }
+
+  /** Waits until the picture is drawn: what it costs is not known before. */
+  private finish(): void {
+    const context = this.renderer.getContext();
+    context.readPixels(0, 0, 1, 1, context.RGBA, context.UNSIGNED_BYTE, new Uint8Array(4));
+  }
+}
+
+function seconds(): number {
+  return performance.now() / 1000;
 }
 
 function all(chain: Chain, material: MeshBasicMaterial | MeshLambertMaterial): FigureMaterials {

@@ -19,6 +19,7 @@ export class Trail {
   });
   private colour = new Color();
   private count = 0;
+  private isPainted = false;
 
   constructor() {
     this.geometry.setAttribute('position', new BufferAttribute(this.positions, 3));
@@ -36,18 +37,18 @@ export class Trail {
       this.count = CAPACITY / 2;
     }
     this.positions.set(point, 3 * this.count++);
-    this.paint();
+    this.isPainted = false;
     return true;
   }
 
   clear(): void {
     this.count = 0;
-    this.paint();
+    this.isPainted = false;
   }
 
   setColour(colour: string): void {
     this.colour = new Color(colour);
-    this.paint();
+    this.isPainted = false;
   }
 
   dispose(): void {
@@ -55,7 +56,10 @@ export class Trail {
     this.material.dispose();
   }
 
-  private paint(): void {
+  /** Takes over what has changed, before it is drawn. */
+  paint(): void {
+    if (this.isPainted) return;
+    this.isPainted = true;
     for (let index = 0; index < this.count; index++) {
       const fresh = (index + 1) / this.count;
       this.colours.set([this.colour.r, this.colour.g, this.colour.b, fresh * fresh], 4 * index);

@@ -2,8 +2,8 @@
 
 import type { Column, Recording, Signal } from './recording';
 
-/** Rows above which columns are thinned: about the pixels of a chart. */
-export const MOST_ROWS = 1000;
+/** Rows above which columns are thinned. Half a minute is drawn as it came: drawing leaves out what shows nothing. */
+export const MOST_ROWS = 2000;
 
 export interface Shown {
   time: number[];

@@ -1,0 +1,32 @@
+import { describe, expect, it } from 'vitest';
+import { FrameBudget } from './budget';
+
+describe('a budget for drawing', () => {
+  it('lets the first one begin at once', () => {
+    expect(new FrameBudget(0.2, 0.1, 1).wait(5)).toBe(0);
+  });
+
+  it('takes no more than its share of the time', () => {
+    const budget = new FrameBudget(0.2, 0.05, 1);
+    budget.spent(10, 0.03);
+    expect(budget.wait(10.03)).toBeCloseTo(0.12);
+    expect(budget.wait(10.2)).toBe(0);
+  });
+
+  it('is not drawn more often than is of use, and not forgotten when it is dear', () => {
+    const budget = new FrameBudget(0.2, 0.05, 1);
+    budget.spent(10, 0.001);
+    expect(budget.wait(10)).toBeCloseTo(0.05);
+    budget.spent(20, 0.4);
+    expect(budget.wait(20)).toBeCloseTo(1);
+    budget.spent(30, 3);
+    expect(budget.wait(30)).toBeCloseTo(3);
+  });
+
+  it('tells how often it was drawn lately', () => {
+    const budget = new FrameBudget(1, 0, 1);
+    for (let at = 0; at < 4; at += 0.1) budget.spent(at, 0);
+    expect(budget.rate(3.95)).toBeCloseTo(10, 0);
+    expect(budget.rate(9)).toBe(0);
+  });
+});
