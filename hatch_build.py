@@ -6,7 +6,6 @@ the commands of the Makefile. Whether it is out of date is told by the content o
 
 from __future__ import annotations
 
-import gzip
 import hashlib
 import json
 import subprocess
@@ -23,6 +22,7 @@ SCHEMA = DASHBOARD / "src" / "lib" / "api" / "schema.d.ts"
 BUILT_FROM = PAGE / "built-from.txt"
 INSTALLED_FROM = DASHBOARD / "node_modules" / "installed-from.txt"
 LOCK_FILES = ("package.json", "package-lock.json")
+COMPRESS = DASHBOARD / "compress.mjs"
 COMPRESSIBLE = (".html", ".js", ".css", ".svg", ".json", ".webmanifest")
 TOOLS = {
     "build": [["vite/bin/vite.js", "build", "--logLevel", "error"]],
@@ -60,9 +60,9 @@ def build_page() -> None:
         return
     print("Building the dashboard's page", file=sys.stderr)
     run("build")
-    for path in PAGE.rglob("*"):
-        if path.suffix in COMPRESSIBLE:
-            path.with_name(f"{path.name}.gz").write_bytes(gzip.compress(path.read_bytes(), 9, mtime=0))
+    files = sorted(str(path) for path in PAGE.rglob("*") if path.suffix in COMPRESSIBLE)
+    if node([str(COMPRESS), *files], cwd=DASHBOARD) != 0:
+        raise BuildError(f"{COMPRESS.name} failed in {DASHBOARD}")
     BUILT_FROM.write_text(sources, "utf-8")
 
 
@@ -107,7 +107,8 @@ def _sources() -> list[Path]:
     """What the page is built from."""
     folders = [path for name in ("src", "public") for path in (DASHBOARD / name).rglob("*") if path.is_file()]
     tests = [path for path in folders if path.name.endswith(".test.ts")]
-    files = [DASHBOARD / name for name in ("index.html", "vite.config.ts", "svelte.config.js", *LOCK_FILES)]
+    settings = ("index.html", "vite.config.ts", "svelte.config.js", COMPRESS.name, *LOCK_FILES)
+    files = [DASHBOARD / name for name in settings]
     return [path for path in [*folders, *files] if path.is_file() and path not in tests]
 
 

@@ -1,4 +1,4 @@
-"""The dashboard's built page: its files, read once, served with the compressed form that the build made of them."""
+"""The dashboard's built page: its files, read once, served in the compressed forms that the build made of them."""
 
 from __future__ import annotations
 
@@ -24,14 +24,16 @@ TYPES = {
 FOREVER = "public, max-age=31536000, immutable"
 """For files whose name holds the hash of their content."""
 ASK_AGAIN = "no-cache"
+PACKINGS = {"br": ".br", "gzip": ".gz"}
+"""Content encodings, the smallest first, and how the build ends the names of files in them."""
 
 
 @dataclass(frozen=True)
 class PageFile:
-    """One file of the page. `packed` is its gzip form, where the build made one."""
+    """One file of the page. `packed` are its compressed forms that the build made, by encoding, the smallest first."""
 
     content: bytes
-    packed: bytes | None
+    packed: dict[str, bytes]
     media_type: str
     tag: str
     cache: str
@@ -41,10 +43,22 @@ class PageFile:
         headers = {"Cache-Control": self.cache, "ETag": self.tag, "Vary": "Accept-Encoding"}
         if request.headers.get("if-none-match") == self.tag:
             return Response(status_code=304, headers=headers)
-        if self.packed is not None and "gzip" in request.headers.get("accept-encoding", ""):
-            headers["Content-Encoding"] = "gzip"
-            return Response(self.packed, headers=headers, media_type=self.media_type)
+        taken = encodings(request.headers.get("accept-encoding", ""))
+        for encoding, packed in self.packed.items():
+            if encoding in taken:
+                headers["Content-Encoding"] = encoding
+                return Response(packed, headers=headers, media_type=self.media_type)
         return Response(self.content, headers=headers, media_type=self.media_type)
+
+
+def encodings(accepted: str) -> set[str]:
+    """What the header Accept-Encoding names and does not refuse (`;q=0`)."""
+    found = set()
+    for one in accepted.lower().split(","):
+        name, _, weight = one.partition(";")
+        if weight.replace(" ", "") not in ("q=0", "q=0.0", "q=0.00", "q=0.000"):
+            found.add(name.strip())
+    return found
 
 
 def is_built(folder: Path = FOLDER) -> bool:
@@ -80,10 +94,10 @@ def _files(folder: Path) -> dict[str, PageFile]:
         if path.suffix in TYPES:
             name = path.relative_to(folder).as_posix()
             content = path.read_bytes()
-            packed = path.with_name(f"{path.name}.gz")
+            forms = {name: path.with_name(path.name + ending) for name, ending in PACKINGS.items()}
             found[name] = PageFile(
                 content=content,
-                packed=packed.read_bytes() if packed.is_file() else None,
+                packed={name: form.read_bytes() for name, form in forms.items() if form.is_file()},
                 media_type=TYPES[path.suffix],
                 tag=f'"{sha256(content).hexdigest()[:32]}"',
                 cache=FOREVER if name.startswith("assets/") else ASK_AGAIN,

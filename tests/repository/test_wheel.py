@@ -25,5 +25,6 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
     assert not any(name.startswith("tests/") for name in packed)
     page = {name.removeprefix(SOURCES_OF_THE_PAGE) for name in packed if name.startswith(SOURCES_OF_THE_PAGE)}
     assert "dist/index.html" in page
-    assert any(name.startswith("dist/assets/") and name.endswith(".js.gz") for name in page)
+    for form in (".js.gz", ".js.br"):
+        assert any(name.startswith("dist/assets/") and name.endswith(form) for name in page)
     assert not any("node_modules" in name or name.startswith("src/") for name in page)

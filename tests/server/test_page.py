@@ -15,6 +15,8 @@ from server.page import FOLDER, NOT_BUILT, is_built, page_router
 LATER_ON_LIVE = ("Arm3d", "scene")
 """Parts that the Live page loads by itself once it is there."""
 SCRIPT = "assets/index-1a2b.js"
+BROTLI = bytes.fromhex("0b04806c6574206c6976653b03")
+"""`let live;`, as Node packs it."""
 
 
 @pytest.fixture
@@ -24,6 +26,7 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "index.html").write_text("<!doctype html>")
     (tmp_path / SCRIPT).write_text("let live;")
     (tmp_path / f"{SCRIPT}.gz").write_bytes(gzip.compress(b"let live;"))
+    (tmp_path / f"{SCRIPT}.br").write_bytes(BROTLI)
     (tmp_path / "built-from.txt").write_text("digest")
     return tmp_path
 
@@ -50,15 +53,18 @@ def test_the_page_is_asked_for_again_and_its_parts_are_kept_for_ever(folder: Pat
     assert (again.status_code, again.content) == (304, b"")
 
 
-def test_a_browser_that_takes_it_gets_the_packed_form(folder: Path) -> None:
-    packed = get(folder, f"/{SCRIPT}", Accept_Encoding="gzip")
+def test_a_browser_gets_the_smallest_form_that_it_takes(folder: Path) -> None:
+    smallest = get(folder, f"/{SCRIPT}", Accept_Encoding="gzip, deflate, br")
+    assert smallest.headers["content-encoding"] == "br"
+    assert int(smallest.headers["content-length"]) == len(BROTLI)
+    packed = get(folder, f"/{SCRIPT}", Accept_Encoding="gzip, br;q=0")
     assert packed.headers["content-encoding"] == "gzip"
     plain = get(folder, f"/{SCRIPT}", Accept_Encoding="identity")
     assert "content-encoding" not in plain.headers
     assert packed.text == plain.text == "let live;"
 
 
-@pytest.mark.parametrize("name", ["built-from.txt", f"{SCRIPT}.gz", "nothing.js", "assets"])
+@pytest.mark.parametrize("name", ["built-from.txt", f"{SCRIPT}.gz", f"{SCRIPT}.br", "nothing.js", "assets"])
 def test_nothing_else_is_served(folder: Path, name: str) -> None:
     assert get(folder, f"/{name}").status_code == 404
 
@@ -73,7 +79,7 @@ def test_the_first_load_is_small() -> None:
     index = (FOLDER / "index.html").read_text("utf-8")
     parts = [path for path in (FOLDER / "assets").iterdir() if path.suffix in (".js", ".css")]
     first = [path for path in parts if path.name in index or path.name.startswith(LATER_ON_LIVE)]
-    sent = sum(len(path.with_name(f"{path.name}.gz").read_bytes()) for path in first)
+    sent = sum(len(path.with_name(f"{path.name}.br").read_bytes()) for path in first)
     font = next(FOLDER.glob("assets/inter-latin-wght-normal-*.woff2")).stat().st_size
     assert len(first) >= 4
     assert sent + font < 300_000
