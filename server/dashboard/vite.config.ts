@@ -1,8 +1,36 @@
 import { svelte } from '@sveltejs/vite-plugin-svelte';
+import type { Plugin } from 'vite';
 import { defineConfig } from 'vitest/config';
 
+/**
+ * Names the program of the page in its index, so that the browser fetches it together with the few lines that ask the
+ * service for the first data; from these alone it would hear of it only when they run.
+ */
+function preloaded(program: string): Plugin {
+  return {
+    name: 'preloaded-program',
+    transformIndexHtml: {
+      order: 'post',
+      handler(html, { bundle, chunk: entry }) {
+        const chunks = Object.values(bundle ?? {}).filter((one) => one.type === 'chunk');
+        const main = chunks.find((one) => one.facadeModuleId?.endsWith(program));
+        if (main === undefined) throw new Error(`no part of the page is made from ${program}`);
+        const scripts = [main.fileName, ...main.imports].filter((name) => name !== entry?.fileName);
+        const styles = [...(main.viteMetadata?.importedCss ?? [])];
+        const tags = [
+          ...scripts.map((name) => ({ rel: 'modulepreload', crossorigin: true, href: `/${name}` })),
+          ...styles.map((name) => ({ rel: 'stylesheet', crossorigin: true, href: `/${name}` })),
+        ];
+        return tags
+          .filter(({ href }) => !html.includes(`"${href}"`))
+          .map((attrs) => ({ tag: 'link', attrs, injectTo: 'head' as const }));
+      },
+    },
+  };
+}
+
 export default defineConfig({
-  plugins: [svelte()],
+  plugins: [svelte(), preloaded('/src/app.ts')],
   build: {
     target: 'es2022',
     // The page's policy allows fonts and pictures as files of its own, not inside style sheets.

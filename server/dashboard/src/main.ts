@@ -1,8 +1,6 @@
 import '@fontsource-variable/inter/wght.css';
 import './app.css';
-import { mount } from 'svelte';
-import App from './App.svelte';
+import { askEarly } from './lib/live/asked';
 
-const target = document.getElementById('app');
-if (target === null) throw new Error('index.html has no element with the id "app"');
-mount(App, { target });
+askEarly();
+void import('./app');

@@ -5,8 +5,8 @@
  * what is shown as numbers (`live.sample`) follows ten times a second. Charts draw in `onFrame`.
  */
 
-import { api, ask, here, showRobot } from '../api/client';
-import { asProblem, Problem } from '../api/problem';
+import { here } from '../api/client';
+import { asProblem, type Problem } from '../api/problem';
 import { LiveSocket, type SocketState } from '../api/socket';
 import type {
   Job,
@@ -24,6 +24,7 @@ import type {
 } from '../api/types';
 import { stop } from '../stop/stop.svelte';
 import { ServiceClock, STALE_AFTER } from './age';
+import { asked, newTicket } from './asked';
 import { Recording } from './recording';
 
 const SHOWN_EVERY = 100;
@@ -84,12 +85,14 @@ class Live {
   newest: SampleMessage | null = null;
   private listeners = new Set<(message: LiveMessage) => void>();
   private lateness: number[] = [];
+  /** What was said before it was known what the robot is, and when. */
+  private unheard: [LiveFrame, number][] = [];
   private connection: LiveSocket | null = null;
 
   /** Asks who and what there is, then listens for as long as the page lives. */
-  async start(): Promise<void> {
+  start(): void {
     setInterval(() => this.tick(), SHOWN_EVERY);
-    await this.begin();
+    void this.begin();
   }
 
   /** Tries at once to reach the service. */
@@ -115,30 +118,44 @@ class Live {
   }
 
   private async begin(): Promise<void> {
+    const { robot, machine, me, stopPort, ticket } = asked();
     try {
-      const [robots, me] = await Promise.all([ask(api.GET('/api/v1/robots')), ask(api.GET('/api/v1/me'))]);
-      const robot = robots[0];
-      if (robot === undefined) throw new Problem(404, 'not-found', 'this service has no robot');
-      showRobot(robot.robot);
-      this.me = me;
-      const machine = await ask(api.GET('/api/v1/robots/{robot}/machine', { params: { path: here() } }));
-      this.machine = machine;
-      this.recording = new Recording(jointsOf(machine.joints.length), PERIOD, KEPT);
-      stop.port = (await ask(api.GET('/api/v1/system'))).stop_port;
+      await robot;
+      this.connection = this.connect(ticket);
+      this.connection.start();
+      const [known, caller, port] = await Promise.all([machine, me, stopPort]);
+      this.me = caller;
+      stop.port = port;
       this.problem = null;
+      this.know(known);
     } catch (error) {
+      this.connection?.end();
+      this.connection = null;
+      this.unheard = [];
       this.problem = asProblem(error);
       if (this.problem.status === 0 || this.problem.status >= 500) setTimeout(() => this.retryNow(), 2000);
-      return;
     }
-    this.connection = this.connect();
-    this.connection.start();
   }
 
-  private connect(): LiveSocket {
+  /** From now on what the service says can be kept: also what it has said already. */
+  private know(machine: Machine): void {
+    this.recording = new Recording(jointsOf(machine.joints.length), PERIOD, KEPT);
+    this.machine = machine;
+    const unheard = this.unheard;
+    this.unheard = [];
+    for (const [frame, at] of unheard) this.hear(frame, at);
+  }
+
+  /** `first`: the ticket of the first connection. */
+  private connect(first: Promise<string>): LiveSocket {
+    let given: Promise<string> | null = first;
     const path = `/api/v1/robots/${encodeURIComponent(here().robot)}/live`;
     return new LiveSocket({
-      ticket: async () => (await ask(api.POST('/api/v1/tickets'))).ticket,
+      ticket: () => {
+        const ticket = given ?? newTicket();
+        given = null;
+        return ticket;
+      },
       open: (ticket) => new WebSocket(`${location.origin.replace(/^http/, 'ws')}${path}?ticket=${ticket}`),
       wanted: () => ({
         subscribe: ['samples', 'robot', 'link', 'queue', 'jobs', 'events', 'teaching'],
@@ -165,6 +182,10 @@ class Live {
   }
 
   private hear(frame: LiveFrame, at: number): void {
+    if (this.recording === null) {
+      this.unheard.push([frame, at]);
+      return;
+    }
     if (this.clock.wentBack(frame.now, CLOCK_SLACK)) this.beginAnew();
     this.clock.heard(frame.now, at);
     for (const message of frame.messages) {
@@ -221,9 +242,11 @@ class Live {
   }
 
   private takeSample(sample: SampleMessage): void {
+    const isFirst = this.newest === null;
     this.newest = sample;
     this.recording?.addSample(sample);
     this.lateness.push(sample.lateness);
+    if (isFirst) this.tick();
   }
 
   private tick(): void {

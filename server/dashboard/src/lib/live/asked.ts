@@ -1,0 +1,57 @@
+/**
+ * What has to be known before anything is shown, asked for all at once. `main.ts` asks before the program of the page is
+ * loaded, so that the service answers while the browser reads it.
+ */
+
+import { api, ask, here, showRobot } from '../api/client';
+import { Problem } from '../api/problem';
+import type { Machine, Me } from '../api/types';
+
+export interface Asked {
+  /** The robot's name; from then on `here()` tells it. */
+  readonly robot: Promise<string>;
+  readonly machine: Promise<Machine>;
+  readonly me: Promise<Me>;
+  readonly stopPort: Promise<number | null>;
+  /** Opens one socket. */
+  readonly ticket: Promise<string>;
+}
+
+let early: Asked | null = null;
+
+/** Asks ahead of whoever will want to know. */
+export function askEarly(): void {
+  early = askAll();
+}
+
+/** What was asked early, once; asked now after that. Every answer may be a Problem instead. */
+export function asked(): Asked {
+  const found = early ?? askAll();
+  early = null;
+  return found;
+}
+
+export async function newTicket(): Promise<string> {
+  return (await ask(api.POST('/api/v1/tickets'))).ticket;
+}
+
+function askAll(): Asked {
+  const robot = firstRobot();
+  const found: Asked = {
+    robot,
+    machine: robot.then(() => ask(api.GET('/api/v1/robots/{robot}/machine', { params: { path: here() } }))),
+    me: ask(api.GET('/api/v1/me')),
+    stopPort: ask(api.GET('/api/v1/system')).then((system) => system.stop_port),
+    ticket: newTicket(),
+  };
+  // A refusal is told to whoever waits for the answer; until then nobody has missed it.
+  for (const answer of Object.values(found) as Promise<unknown>[]) answer.catch(() => {});
+  return found;
+}
+
+async function firstRobot(): Promise<string> {
+  const [first] = await ask(api.GET('/api/v1/robots'));
+  if (first === undefined) throw new Problem(404, 'not-found', 'this service has no robot');
+  showRobot(first.robot);
+  return first.robot;
+}
