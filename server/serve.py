@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import socket
 from collections.abc import Callable
 from contextlib import suppress
@@ -54,6 +55,8 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         host, port = listener.getsockname()[:2]
         address = f"http://{f'[{host}]' if ':' in host else host}:{port}"
         stop_listener = _stop_listener(services, gate, beside, port)
+        # The web server raises its signal again when it has ended in order; the rest ends in order after it.
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
         try:
             with suppress(KeyboardInterrupt):  # the service has ended in order by then
                 _Server(config, lambda: ready(address)).run([listener])

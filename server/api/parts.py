@@ -1,4 +1,8 @@
-"""What routes ask for: the services, the robot of the address, who calls."""
+"""What routes ask for: the services, the robot of the address, who calls.
+
+All of it is there already, so these are coroutines that wait for nothing: FastAPI would carry each plain function over
+to a thread and back, which under load costs more than most answers.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +22,14 @@ def services(connection: HTTPConnection) -> Services:
     return found
 
 
-ServicesPart = Annotated[Services, Depends(services)]
+async def _services(connection: HTTPConnection) -> Services:
+    return services(connection)
 
 
-def robot_services(
+ServicesPart = Annotated[Services, Depends(_services)]
+
+
+async def robot_services(
     robot: Annotated[str, Path(max_length=64, examples=["ma2000"], description="Name of the robot.")],
     found: ServicesPart,
 ) -> RobotServices:
@@ -30,8 +38,18 @@ def robot_services(
 
 
 RobotPart = Annotated[RobotServices, Depends(robot_services)]
-Viewer = Annotated[Caller, Depends(require_viewer)]
-Operator = Annotated[Caller, Depends(require_operator)]
+
+
+async def _viewer(connection: HTTPConnection) -> Caller:
+    return require_viewer(connection)
+
+
+async def _operator(connection: HTTPConnection) -> Caller:
+    return require_operator(connection)
+
+
+Viewer = Annotated[Caller, Depends(_viewer)]
+Operator = Annotated[Caller, Depends(_operator)]
 
 Limit = Annotated[PageLimit, Query(description="Length of this part of the list.")]
 CursorOf = Annotated[str | None, Query(max_length=200, description="`next` of the part before.")]

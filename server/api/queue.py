@@ -15,7 +15,7 @@ router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
 
 
 @router.get("/queue", tags=["queue"])
-def get_queue(one: RobotPart, _: Viewer) -> QueueStatus:
+async def get_queue(one: RobotPart, _: Viewer) -> QueueStatus:
     """Whether experiments are taken from the queue, and if not, why."""
     return one.queue.status()
 
@@ -96,7 +96,7 @@ def delete_schedule(schedule: Identity, one: RobotPart, found: ServicesPart, who
 
 
 @router.get("/control", tags=["control"])
-def get_control(one: RobotPart, _: Viewer) -> Control:
+async def get_control(one: RobotPart, _: Viewer) -> Control:
     """Who may move the robot now."""
     return one.control.status()
 

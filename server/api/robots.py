@@ -18,7 +18,7 @@ router = APIRouter(prefix="/robots", tags=["robots"], responses=PROBLEMS)
 
 
 @router.get("")
-def list_robots(found: ServicesPart, _: Viewer) -> tuple[RobotSummary, ...]:
+async def list_robots(found: ServicesPart, _: Viewer) -> tuple[RobotSummary, ...]:
     """The robots of this service."""
     return tuple(
         RobotSummary(
@@ -32,13 +32,13 @@ def list_robots(found: ServicesPart, _: Viewer) -> tuple[RobotSummary, ...]:
 
 
 @router.get("/{robot}")
-def get_robot(one: RobotPart, _: Viewer) -> RobotStatus:
+async def get_robot(one: RobotPart, _: Viewer) -> RobotStatus:
     """Everything about one robot now; every value says how old it is."""
     return status_of(one)
 
 
 @router.get("/{robot}/machine")
-def get_machine(one: RobotPart, _: Viewer) -> Machine:
+async def get_machine(one: RobotPart, _: Viewer) -> Machine:
     """The machine file with this configuration's limits: geometry, drives, sensors, limits."""
     return one.robot.machine
 

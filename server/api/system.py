@@ -47,7 +47,7 @@ def metrics(found: ServicesPart, _: Viewer) -> Response:
 
 
 @router.get("/me")
-def get_me(who: Viewer) -> Me:
+async def get_me(who: Viewer) -> Me:
     """Who the service takes the caller for."""
     return Me(name=who.name, role=who.role)
 

@@ -20,7 +20,8 @@ from server.catalogue.catalogue import Catalogue
 from server.clock import Clock
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
 from server.jobs.models import Models
-from server.jobs.work import Ended, Task, begin_worker, carry_out
+from server.jobs.work import Ended, Task, carry_out
+from server.jobs.yielding import begin_worker
 from server.problems import conflict, not_found
 from server.queue.states import Event
 from server.store.jobs import JobStore, models_of, traces_of
@@ -136,6 +137,7 @@ class JobDesk:
                     os.kill(reported.process, signal.SIGTERM)
         if self._executor is not None:
             self._executor.shutdown(wait=False, cancel_futures=True)
+            self._executor = None
 
     def _folder(self, identity: str) -> Path:
         return self._parts.folder / identity

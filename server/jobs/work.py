@@ -1,11 +1,8 @@
-"""A job as its worker process does it: files in, files out. Runs at the lowest priority, and ends with the service."""
+"""A job as its worker process does it: files in, files out."""
 
 from __future__ import annotations
 
-import os
-import threading
 from dataclasses import dataclass
-from multiprocessing import parent_process
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,7 +35,6 @@ if TYPE_CHECKING:
 
     AnyResult = FitJobResult | ValidationJobResult | ComparisonJobResult | DiagnosisJobResult
 
-NICENESS = 19
 CURVE_POINTS = 21
 FIT_SHARE, VALIDATION_SHARE, DIAGNOSIS_SHARE = 0.9, 0.7, 0.95
 """Of the progress, before comparison and report."""
@@ -65,19 +61,6 @@ class Ended:
     cancelled: bool = False
     model: str | None = None
     headline: str = ""
-
-
-def begin_worker() -> None:
-    """In every worker process, before its first job."""
-    os.nice(NICENESS)
-    threading.Thread(target=_end_with_the_service, name="parent-watch", daemon=True).start()
-
-
-def _end_with_the_service() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def carry_out(folder: Path) -> Ended:

@@ -121,11 +121,9 @@ class QueueDesk:
     def pause(self, reason: str, by: str | None = None) -> None:
         """Lets no other experiment begin; one that runs goes on."""
         with self._lock:
-            if self._state.paused and by is None:
-                return
-            self._set_state(QueueState(True, reason, self._parts.clock.utc()))
-            self._attended_until = None
-        self._parts.told("queue", f"paused: {reason}", actor=by)
+            held = self._hold(reason, anew=by is not None)
+        if held:
+            self._parts.told("queue", f"paused: {reason}", actor=by)
 
     def resume(self, by: str, *, moves_real_arm: bool) -> None:
         """The operator's word that the queue may move the arm. Raises a 409 while the arm is stopped or at fault."""
@@ -164,12 +162,11 @@ class QueueDesk:
         return experiment.model_copy(update={"progress": running.progress, "progress_text": running.text})
 
     def status(self) -> QueueStatus:
-        """Now."""
-        with self._lock:
-            state, running, waiting_for = self._state, self._running, self._waiting_for
-            left = None if self._attended_until is None else self._attended_until - self._parts.clock.monotonic()
+        """Now. Waits for nothing, neither for a disk nor for whoever holds the queue: the event loop asks this."""
+        running, state, waiting_for, until = self._running, self._state, self._waiting_for, self._attended_until
+        left = None if until is None else until - self._parts.clock.monotonic()
         needs_attendance = left is not None and left > 0 and self._needs_attendance()
-        until = self._parts.clock.utc() + timedelta(seconds=left) if needs_attendance and left is not None else None
+        attended = self._parts.clock.utc() + timedelta(seconds=left) if needs_attendance and left is not None else None
         return QueueStatus(
             paused=state.paused,
             reason=state.reason,
@@ -177,7 +174,7 @@ class QueueDesk:
             queued=self._parts.experiments.count_waiting(self._parts.robot.name),
             running=None if running is None else running.id,
             waiting_for="" if state.paused or running is not None else waiting_for,
-            attended_until=until,
+            attended_until=attended,
         )
 
     def close(self, patience: float) -> None:
@@ -205,6 +202,14 @@ class QueueDesk:
             state = QueueState(False, "nothing was waiting when the service began", now)
         parts.queues.set(name, state)
         return state
+
+    def _hold(self, reason: str, *, anew: bool = False) -> bool:
+        """Pauses, under the lock; False where it is paused already, and keeps its first reason unless it is `anew`."""
+        if self._state.paused and not anew:
+            return False
+        self._set_state(QueueState(True, reason, self._parts.clock.utc()))
+        self._attended_until = None
+        return True
 
     def _set_state(self, state: QueueState) -> None:
         self._parts.queues.set(self._parts.robot.name, state)
@@ -259,16 +264,15 @@ class QueueDesk:
             if not parts.control.take_for_queue(following.id):
                 self._waiting_for = "a client has the control of the robot"
                 return None
+            self._running = Running(following.id)  # before it leaves those that wait: the queue never looks empty
             try:
-                experiment = parts.experiments.begin(parts.robot.name, following.id, parts.clock.utc())
-            except IllegalEventError:  # cancelled in this moment
+                return parts.experiments.begin(parts.robot.name, following.id, parts.clock.utc())
+            except BaseException as error:
+                self._running = None
                 parts.control.give_back_for_queue()
-                return None
-            except BaseException:
-                parts.control.give_back_for_queue()
+                if isinstance(error, IllegalEventError):  # cancelled in this moment
+                    return None
                 raise
-            self._running = Running(experiment.id)
-            return experiment
 
     def _what_is_missing(self) -> str:
         robot = self._parts.robot
@@ -291,14 +295,18 @@ class QueueDesk:
             parts.robot.experiment = None
             parts.control.give_back_for_queue()
         with self._lock:
-            running, self._running = self._running, None
-            ending = self._as_wished(ending, running)
-            parts.experiments.end(
-                parts.robot.name, experiment.id, ending.event, parts.clock.utc(), ending.reason, ending.outcome
-            )
+            ending = self._as_wished(ending, self._running)
+            why = f"experiment {experiment.id} was {ending.event} ({ending.reason}): look at the arm, then resume"
+            try:
+                held = ending.holds_queue and self._hold(why)  # whoever hears of the end finds the queue paused
+                parts.experiments.end(
+                    parts.robot.name, experiment.id, ending.event, parts.clock.utc(), ending.reason, ending.outcome
+                )
+            finally:
+                self._running = None
         parts.told("experiment", f"{ending.event}: {ending.reason}".rstrip(": "), experiment=experiment.id)
-        if ending.holds_queue:
-            self.pause(f"experiment {experiment.id} was {ending.event} ({ending.reason}): look at the arm, then resume")
+        if held:
+            parts.told("queue", f"paused: {why}")
 
     def _run(self, experiment: Experiment) -> Ending:
         parts = self._parts

@@ -113,11 +113,11 @@ class Robot:
 
     @property
     def connection(self) -> ConnectionState:
-        """How it is reached."""
-        with self._lock:
-            if self._identity is None:
-                return "disconnected" if self._owner is None else "connecting"
-            return "lost" if self.arm is not None and self.arm.link == "lost" else "connected"
+        """How it is reached. Waits for nobody: the event loop asks this."""
+        owner, identity, arm = self._owner, self._identity, self.arm
+        if identity is None:
+            return "disconnected" if owner is None else "connecting"
+        return "lost" if arm is not None and arm.link == "lost" else "connected"
 
     @property
     def owner_pid(self) -> int | None:

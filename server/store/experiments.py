@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from datetime import datetime
 
 from sqlalchemy import func, select
@@ -27,6 +29,18 @@ class ExperimentStore:
 
     def __init__(self, store: Store) -> None:
         self._store = store
+        self._counting = threading.Lock()
+        self._waiting: dict[str, int] = {}
+
+    @contextmanager
+    def _changing(self, robot: str) -> Iterator[Session]:
+        """A session that may change what waits; how much that is, is known without the database afterwards."""
+        with self._counting:
+            with self._store.writing() as session:
+                yield session
+                session.flush()
+                waiting = _count_waiting(session, robot)
+            self._waiting[robot] = waiting
 
     def submit(
         self,
@@ -42,7 +56,7 @@ class ExperimentStore:
         Raises a 409 when the key was used for something else.
         """
         digest = digest_of(request)
-        with self._store.writing() as session:
+        with self._changing(robot) as session:
             if (found := made_before(session, ExperimentRow, robot, key, digest)) is not None:
                 return as_experiment(found), False
             row = ExperimentRow(
@@ -88,16 +102,15 @@ class ExperimentStore:
             return [as_experiment(row) for row in session.scalars(query.limit(500))]
 
     def count_waiting(self, robot: str) -> int:
-        """How many are queued."""
-        with self._store.reading() as session:
-            return (
-                session.scalar(select(func.count()).select_from(ExperimentRow).filter_by(robot=robot, state="queued"))
-                or 0
-            )
+        """How many are queued. Asks the database the first time only."""
+        if robot not in self._waiting:
+            with self._changing(robot):
+                pass
+        return self._waiting[robot]
 
     def begin(self, robot: str, identity: str, now: datetime) -> Experiment:
         """The worker takes it. Raises IllegalEventError when it was cancelled meanwhile."""
-        with self._store.writing() as session:
+        with self._changing(robot) as session:
             row = _row(session, robot, identity)
             row.state = advance(_state(row), Event.TAKEN)
             row.started = now
@@ -108,7 +121,7 @@ class ExperimentStore:
         self, robot: str, identity: str, event: Event, now: datetime, reason: str, outcome: Outcome | None = None
     ) -> Experiment:
         """What became of it. Raises IllegalEventError."""
-        with self._store.writing() as session:
+        with self._changing(robot) as session:
             row = _row(session, robot, identity)
             row.state = advance(_state(row), event)
             row.ended, row.reason = now, reason
@@ -139,7 +152,7 @@ class ExperimentStore:
 
     def settle_after_restart(self, robot: str, now: datetime) -> list[Experiment]:
         """What ran when the service ended is interrupted. Returns those."""
-        with self._store.writing() as session:
+        with self._changing(robot) as session:
             rows = list(session.scalars(select(ExperimentRow).filter_by(robot=robot, state="running")))
             for row in rows:
                 row.state = after_restart(_state(row))
@@ -185,6 +198,11 @@ def as_experiment(row: ExperimentRow) -> Experiment:
         reason=row.reason,
         trace=row.trace if has_trace else None,
     )
+
+
+def _count_waiting(session: Session, robot: str) -> int:
+    query = select(func.count()).select_from(ExperimentRow).filter_by(robot=robot, state="queued")
+    return session.scalar(query) or 0
 
 
 def _state(row: ExperimentRow) -> ExperimentState:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import httpx
 
@@ -79,8 +79,10 @@ def running_service(
     *options: str,
     headers: dict[str, str] | None = None,
     program: Sequence[str] = DAQ,
+    log: BinaryIO | None = None,
 ) -> Iterator[Service]:
-    """A service whose database, traces and stop sockets lie in `folder`; `program` stands for `daq`."""
+    """A service whose database, traces and stop sockets lie in `folder`; `program` stands for `daq`, `log` is where its
+    log goes."""
     environment = {key: value for key, value in os.environ.items() if not key.startswith("DAQ_")}
     environment |= {"DAQ_RUNTIME_FOLDER": str(folder / "run"), "XDG_CONFIG_HOME": str(folder / "configuration")}
     process = subprocess.Popen(
@@ -88,6 +90,7 @@ def running_service(
         cwd=folder,
         env=environment,
         stdout=subprocess.PIPE,
+        stderr=log,
     )
     try:
         assert process.stdout is not None

@@ -52,11 +52,15 @@ def test_whatever_process_is_killed_its_work_is_interrupted_and_what_waits_waits
         owner = _owner_of(service.process.pid)
         assert service.end(signal.SIGKILL) == -signal.SIGKILL
         _until_gone(owner)  # it freezes the arm, records a second more and closes the trace by itself
-    with running_service(tmp_path) as service:
+    log = tmp_path / "log"
+    with log.open("wb") as stream, running_service(tmp_path, log=stream) as service:
         service.until_connected()
         trace = _after_the_server(service, running, waiting)
         _without_the_acquisition_process(service)
         _without_the_worker(service, trace)
+        service.robot.post("/disconnect")
+        assert service.end() == 0
+    assert "leaked" not in log.read_text()  # of what its worker processes shared with it
 
 
 def _after_the_server(service: Service, running: str, waiting: str) -> str:
