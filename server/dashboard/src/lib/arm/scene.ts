@@ -40,6 +40,9 @@ const VISIBLE = 0.5;
 /** Without a graphics card: share of the time for drawing the arm, s between two drawings at least and at most. */
 const SPARED = [0.12, 0.08, 1] as const;
 
+/** ms between two looks at whether a picture is drawn. */
+const LOOK_EVERY = 4;
+
 /** What is shown. Postures in rad, one value a joint. */
 export interface ArmPicture {
   readonly posture: readonly number[] | null;
@@ -82,6 +85,9 @@ export class ArmScene {
   private frame = 0;
   private timer: ReturnType<typeof setTimeout> | null = null;
   private readonly budget: FrameBudget | null;
+  /** Whether something has changed while a picture was being drawn. */
+  private isAwaited = false;
+  private isDisposed = false;
   private chosen: ViewName | null = 'corner';
 
   constructor(
@@ -99,6 +105,7 @@ export class ArmScene {
       alpha: true,
       powerPreference: 'low-power',
     });
+    this.renderer.debug.checkShaderErrors = false; // to ask for errors would wait for the compiler
     const reach = this.reach;
     this.floor = floor ?? -0.6 * reach;
     this.target = [0, 0, (this.floor + TOP * reach) / 2];
@@ -162,6 +169,7 @@ export class ArmScene {
   }
 
   dispose(): void {
+    this.isDisposed = true;
     cancelAnimationFrame(this.frame);
     if (this.timer !== null) clearTimeout(this.timer);
     this.observer.disconnect();
@@ -297,6 +305,8 @@ export class ArmScene {
       this.frame = requestAnimationFrame(() => this.draw());
       return;
     }
+    this.isAwaited = wait === Infinity;
+    if (this.isAwaited) return;
     this.timer = setTimeout(() => {
       this.timer = null;
       this.frame ||= requestAnimationFrame(() => this.draw());
@@ -310,8 +320,11 @@ export class ArmScene {
     this.pose();
     this.renderer.render(this.scene, this.camera);
     if (this.budget) {
-      this.finish();
-      this.budget.spent(begin, seconds() - begin);
+      this.budget.begun(begin);
+      this.whenDone((end) => {
+        this.budget?.spent(begin, end - begin);
+        if (this.isAwaited) this.invalidate();
+      });
     }
     this.drawn = { arm: this.outline(this.shown.posture), ghost: this.outline(this.shown.ghost) };
   }
@@ -324,10 +337,22 @@ export class ArmScene {
     this.trail.paint();
   }
 
-  /** Waits until the picture is drawn: what it costs is not known before. */
-  private finish(): void {
-    const context = this.renderer.getContext();
-    context.readPixels(0, 0, 1, 1, context.RGBA, context.UNSIGNED_BYTE, new Uint8Array(4));
+  /** Calls when the picture is drawn, which is later than it was asked for: what it costs is not known before. */
+  private whenDone(call: (at: number) => void): void {
+    const context = this.renderer.getContext() as WebGL2RenderingContext;
+    const fence = context.fenceSync(context.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    context.flush();
+    const look = (): void => {
+      const isDone =
+        fence === null || context.getSyncParameter(fence, context.SYNC_STATUS) === context.SIGNALED;
+      if (!isDone && !context.isContextLost() && !this.isDisposed) {
+        setTimeout(look, LOOK_EVERY);
+        return;
+      }
+      context.deleteSync(fence);
+      call(seconds());
+    };
+    setTimeout(look, LOOK_EVERY);
   }
 }
 

@@ -6,6 +6,14 @@ describe('a budget for drawing', () => {
     expect(new FrameBudget(0.2, 0.1, 1).wait(5)).toBe(0);
   });
 
+  it('has one drawing at a time', () => {
+    const budget = new FrameBudget(0.2, 0.1, 1);
+    budget.begun(5);
+    expect(budget.wait(5.5)).toBe(Infinity);
+    budget.spent(5, 0.6);
+    expect(budget.wait(5.6)).toBeCloseTo(0.4);
+  });
+
   it('takes no more than its share of the time', () => {
     const budget = new FrameBudget(0.2, 0.05, 1);
     budget.spent(10, 0.03);
@@ -25,7 +33,10 @@ describe('a budget for drawing', () => {
 
   it('tells how often it was drawn lately', () => {
     const budget = new FrameBudget(1, 0, 1);
-    for (let at = 0; at < 4; at += 0.1) budget.spent(at, 0);
+    for (let at = 0; at < 4; at += 0.1) {
+      budget.begun(at);
+      budget.spent(at, 0);
+    }
     expect(budget.rate(3.95)).toBeCloseTo(10, 0);
     expect(budget.rate(9)).toBe(0);
   });

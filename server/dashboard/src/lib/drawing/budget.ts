@@ -17,14 +17,19 @@ export class FrameBudget {
     private readonly latest: number,
   ) {}
 
-  /** A drawing that began at `at` took `cost`. */
-  spent(at: number, cost: number): void {
-    const wait = Math.min(Math.max(cost / this.share, this.soonest), this.latest);
-    this.next = Math.max(at + wait, at + cost);
+  /** A drawing begins at `at`: the next has to wait until it is known what this one costs. */
+  begun(at: number): void {
+    this.next = Infinity;
     this.drawn = [...this.drawn.filter((one) => one > at - LATELY), at];
   }
 
-  /** s until the next drawing may begin; 0 when it may now. */
+  /** The drawing that began at `at` took `cost`. */
+  spent(at: number, cost: number): void {
+    const wait = Math.min(Math.max(cost / this.share, this.soonest), this.latest);
+    this.next = at + Math.max(wait, cost);
+  }
+
+  /** s until the next drawing may begin; 0 when it may now, infinite while one is being drawn. */
   wait(at: number): number {
     return Math.max(0, this.next - at);
   }

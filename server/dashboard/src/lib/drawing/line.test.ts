@@ -2,6 +2,7 @@ import { describe, expect, it } from 'vitest';
 import { drawLine, TOLERANCE, type Pen } from './line';
 
 type Point = [number, number];
+const AS_IT_IS = { factor: 1, from: 0 };
 
 class Paper implements Pen {
   strokes: Point[][] = [];
@@ -15,13 +16,7 @@ class Paper implements Pen {
 
 function drawn(x: readonly number[], y: readonly (number | null | undefined)[]): Point[][] {
   const paper = new Paper();
-  drawLine(
-    paper,
-    (row) => x[row]!,
-    (row) => y[row],
-    0,
-    x.length - 1,
-  );
+  drawLine(paper, x, y, 0, x.length - 1, AS_IT_IS, AS_IT_IS);
   return paper.strokes;
 }
 
@@ -74,6 +69,17 @@ describe('a line through samples', () => {
     const heights = stroke!.map(([, height]) => height);
     expect(Math.max(...heights)).toBe(90);
     expect(Math.min(...heights)).toBe(-40);
+  });
+
+  it('is drawn in pixels', () => {
+    const paper = new Paper();
+    drawLine(paper, [0, 1, 2], [10, 20, 30], 1, 2, { factor: 100, from: 5 }, { factor: -2, from: 80 });
+    expect(paper.strokes).toEqual([
+      [
+        [105, 40],
+        [205, 20],
+      ],
+    ]);
   });
 
   it('follows a step straight up', () => {

@@ -17,78 +17,90 @@ export const TOLERANCE = 0.3;
 /** px: points that are nearer than this horizontally lie above each other. */
 const ABOVE = 1e-3;
 
+/** From values to pixels: factor · value + from. */
+export interface Scale {
+  readonly factor: number;
+  readonly from: number;
+}
+
 /**
  * Draws the rows `first` to `last` (both inclusive) of two columns. null: a gap, the line begins anew behind it;
  * undefined: no sample of this line at that moment, the line goes through.
  */
 export function drawLine(
   pen: Pen,
-  x: (row: number) => number,
-  y: (row: number) => number | null | undefined,
+  x: ArrayLike<number>,
+  y: ArrayLike<number | null | undefined>,
   first: number,
   last: number,
+  toX: Scale,
+  toY: Scale,
 ): void {
-  const line = new Line(pen);
-  const column = new PixelColumn(line);
+  const column = new PixelColumn(new Line(pen));
+  // Tens of thousands of samples a frame come through here: numbers at hand, no function a sample more than needed.
+  const { factor: factorX, from: fromX } = toX;
+  const { factor: factorY, from: fromY } = toY;
   for (let row = first; row <= last; row += 1) {
-    const height = y(row);
-    if (height === undefined) continue;
-    if (height === null) {
-      column.end();
-      line.end();
-    } else {
-      column.add(x(row), height);
-    }
+    const value = y[row];
+    if (value === undefined) continue;
+    if (value === null) column.break();
+    else column.add(factorX * (x[row] as number) + fromX, factorY * value + fromY);
   }
-  column.end();
-  line.end();
+  column.break();
 }
 
 /** Gathers the points of one column of pixels. */
 class PixelColumn {
   private place = NaN;
   private count = 0;
-  private readonly first = { x: 0, y: 0 };
-  private readonly low = { x: 0, y: 0 };
-  private readonly high = { x: 0, y: 0 };
-  private readonly last = { x: 0, y: 0 };
+  private firstX = 0;
+  private firstY = 0;
+  private lowX = 0;
+  private lowY = 0;
+  private highX = 0;
+  private highY = 0;
+  private lastX = 0;
+  private lastY = 0;
 
   constructor(private readonly line: Line) {}
 
   add(x: number, y: number): void {
     const place = Math.floor(x);
     if (place !== this.place) {
-      this.end();
+      if (this.count > 0) this.end();
       this.place = place;
+      this.firstX = this.lowX = this.highX = x;
+      this.firstY = this.lowY = this.highY = y;
+    } else if (y < this.lowY) {
+      this.lowX = x;
+      this.lowY = y;
+    } else if (y > this.highY) {
+      this.highX = x;
+      this.highY = y;
     }
     this.count += 1;
-    if (this.count === 1) {
-      put(this.first, x, y);
-      put(this.low, x, y);
-      put(this.high, x, y);
-    } else if (y < this.low.y) put(this.low, x, y);
-    else if (y > this.high.y) put(this.high, x, y);
-    put(this.last, x, y);
+    this.lastX = x;
+    this.lastY = y;
   }
 
-  end(): void {
-    const { first, low, high, last, count } = this;
+  /** The line ends here. */
+  break(): void {
+    if (this.count > 0) this.end();
     this.place = NaN;
-    this.count = 0;
-    if (count === 0) return;
-    this.line.add(first.x, first.y);
-    if (count > 2) {
-      const [one, other] = low.x <= high.x ? [low, high] : [high, low];
-      this.line.add(one.x, one.y);
-      this.line.add(other.x, other.y);
-    }
-    if (count > 1) this.line.add(last.x, last.y);
+    this.line.end();
   }
-}
 
-function put(point: { x: number; y: number }, x: number, y: number): void {
-  point.x = x;
-  point.y = y;
+  private end(): void {
+    const { line, count } = this;
+    line.add(this.firstX, this.firstY);
+    if (count > 2) {
+      const lowIsFirst = this.lowX <= this.highX;
+      line.add(lowIsFirst ? this.lowX : this.highX, lowIsFirst ? this.lowY : this.highY);
+      line.add(lowIsFirst ? this.highX : this.lowX, lowIsFirst ? this.highY : this.lowY);
+    }
+    if (count > 1) line.add(this.lastX, this.lastY);
+    this.count = 0;
+  }
 }
 
 /** Leaves out points that the line goes through without them: within the cone from the last one that was drawn. */
@@ -150,7 +162,9 @@ class Line {
       this.most = -Infinity;
       return;
     }
-    this.least = Math.max(this.least, (y - TOLERANCE - this.y0) / way);
-    this.most = Math.min(this.most, (y + TOLERANCE - this.y0) / way);
+    const least = (y - TOLERANCE - this.y0) / way;
+    const most = (y + TOLERANCE - this.y0) / way;
+    if (least > this.least) this.least = least;
+    if (most < this.most) this.most = most;
   }
 }
