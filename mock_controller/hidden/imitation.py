@@ -1,4 +1,4 @@
-"""Deviations that imitate an effect exactly, where there are any: the refit looks there, too."""
+"""Deviations that imitate an effect exactly or nearly, where there are any: the refit looks there, too."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from mock_controller.modifications.friction import LoadDependentFriction, Viscou
 from mock_controller.modifications.interface import Modification
 from mock_controller.modifications.load import LinkMass, Payload
 from mock_controller.modifications.motor import BackEmfError
+from mock_controller.modifications.sensor import PotentiometerGain
 from mock_controller.plant import PlantParameters
 
 
 def imitation(parameters: PlantParameters, modifications: Iterable[Modification]) -> dict[str, float]:
-    """Deviations (fractions) of the arm `parameters` that do what the modifications do, where some can."""
+    """Deviations (fractions) of the arm `parameters` that do what the modifications do, or nearly, where some can."""
     found: dict[str, float] = {}
     for effect in modifications:
         for name, fraction in _of_one(parameters, effect).items():
@@ -21,7 +22,9 @@ def imitation(parameters: PlantParameters, modifications: Iterable[Modification]
     return found
 
 
-def _of_one(parameters: PlantParameters, effect: Modification) -> dict[str, float]:
+def _of_one(  # noqa: PLR0911  (a table: a line an effect)
+    parameters: PlantParameters, effect: Modification
+) -> dict[str, float]:
     body = parameters.rigid_body
     match effect:
         case Payload():
@@ -35,6 +38,8 @@ def _of_one(parameters: PlantParameters, effect: Modification) -> dict[str, floa
             return _damping(parameters, effect.joint, effect.coefficient)
         case BackEmfError():
             return _damping(parameters, effect.joint, (effect.factor - 1.0) * _dampings(parameters, effect.joint)[0])
+        case PotentiometerGain():
+            return _faster(parameters, effect.joint, 1.0 / (1.0 + effect.error) - 1.0)
         case _:
             return {}
 
@@ -45,6 +50,12 @@ def _dampings(parameters: PlantParameters, number: int) -> tuple[float, float]:
     squared = joint.gear_ratio**2
     electrical = squared * joint.torque_constant * joint.back_emf_constant / joint.resistance
     return electrical, squared * joint.viscous_friction
+
+
+def _faster(parameters: PlantParameters, number: int, share: float) -> dict[str, float]:
+    """A joint that moves by a share more than is read: as if all that grows with its speed were that much more."""
+    damped = _damping(parameters, number, share * sum(_dampings(parameters, number)))
+    return {**damped, f"rotor_inertia_{number}": share}
 
 
 def _damping(parameters: PlantParameters, number: int, more: float) -> dict[str, float]:

@@ -61,6 +61,8 @@ _NEAR_DAMPING = 1.0
 """The refit's damping at first where it begins from a place that the tangents have led to."""
 _CLEAR = 15.0
 """d′ far above what counts as detectable: its value is then wanted to a tenth only, and the tangents give that."""
+_MOSTLY_EXPLAINED = 0.2
+"""Share of the difference: where no more is left, the tangents have explained so much that they need a look."""
 _SMALL_MOVE = 0.5
 """Standard deviations within which the tangents are trusted without looking."""
 _SETTLED = 0.95
@@ -170,7 +172,7 @@ def separation(
 
     The refit goes along the tangents, then looks where that has led. Unless what is left is what the tangents have
     foretold, or d′ is clearly large, it goes on, up to `refits` times: a strong effect that tolerances can imitate is
-    far from where the tangents were taken. Where some can imitate it exactly, the refit starts from those.
+    far from where the tangents were taken. Where some can imitate it, exactly or nearly, the refit starts from those.
     """
     one = reading_deviation(parts.board)
     step_us = _step_length(parts)
@@ -194,7 +196,8 @@ def separation(
     hidden = [effect for effect in parts.modifications if effect not in without]
     imitating = imitation(parts.plant, hidden)
     as_foretold = abs(looked.d_prime - found.d_prime) <= _AS_FORETOLD * found.d_prime
-    if not imitating and (as_foretold or min(looked.d_prime, found.d_prime) > _CLEAR):
+    clear = min(looked.d_prime, found.d_prime) > max(_CLEAR, _MOSTLY_EXPLAINED * found.before_refit)
+    if not imitating and (as_foretold or clear):
         return min(looked, found, key=lambda each: each.d_prime)
     if imitating:
         start = known.within_reach(np.array([imitating.get(name, 0.0) for name in known.names]) / known.deviations)

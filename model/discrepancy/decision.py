@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
@@ -23,11 +24,23 @@ class Decision:
     group: tuple[Refitted, ...]
 
 
-def decide(ranking: Ranking, thresholds: Thresholds, collected: float = 0.0) -> Decision:
-    """Nothing significant, one name, or a group; `collected`: evidence of the effects that were added before."""
+def decide(
+    ranking: Ranking, thresholds: Thresholds, collected: float = 0.0, added: Collection[str] = ()
+) -> Decision:  # fmt: skip
+    """Nothing significant, one name, or a group.
+
+    Args:
+        collected: evidence of the effects that were added before. added: their names: what one joint has, another one
+            of the same build is likelier to have.
+    """
     fits = ranking.fitted
-    if not fits or fits[0].evidence < thresholds.significant + thresholds.echo * collected:
-        return Decision("nothing", fits[0] if fits else None, 0.0, ())
+    if not fits:
+        return Decision("nothing", None, 0.0, ())
+    needed = thresholds.significant + thresholds.echo * collected
+    if fits[0].candidate.name in added:
+        needed *= thresholds.kin
+    if fits[0].evidence < needed:
+        return Decision("nothing", fits[0], 0.0, ())
     best = fits[0]
     rivals = [f for f in fits[1:] if not same_answer(f, best)]
     margin = best.evidence - max([0.0, *(r.evidence for r in rivals)])

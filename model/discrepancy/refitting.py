@@ -26,6 +26,8 @@ Floats = NDArray[np.float64]
 
 STEPS = 8
 POLISHING = 4
+DEEPER = 3.0
+"""Fall of the cost from which a fit counts as better, not as ended elsewhere on the same flat ground."""
 SHAPE_PRIOR = 3.0
 """Expected deviations within which a parameter that only shapes an effect is looked for: keeps it from running away
 where the effect is too small to show its shape."""
@@ -104,6 +106,21 @@ def finished(observation: Observation, before: Judged, found: Refitted) -> Refit
         return found
     better = _with_evidence(observation, before, found.candidate, point, found.promised)
     return better if better.judged.point.cost < found.judged.point.cost else found
+
+
+def deeper(observation: Observation, before: Judged, found: Refitted) -> Judged | None:
+    """A better fit without the candidate, from where the candidate's fit has brought all other unknowns; None where
+    there is none. Such a fall is not the candidate's: the search before it had not come to its end."""
+    point = before.point
+    values = np.array([found.judged.point.value(u.name) for u in point.unknowns])
+    try:
+        tried = point_at(observation, point.model, point.unknowns, values, found.judged.point.noise, point.tangents)
+        if not tried.cost < point.cost - DEEPER:
+            return None
+        better = judge(observation, settled(observation, tried, STEPS))
+    except SpecError:
+        return None
+    return better if better.point.cost < point.cost - DEEPER else None
 
 
 def _started(point: Point, probed: Probed) -> Point:

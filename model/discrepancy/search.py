@@ -2,8 +2,8 @@
 
 Most of the time goes into derivatives, and those by the tolerance parameters change little when an effect is added. So
 they are computed once and kept. Every simulation that a step costs, also one that does not descend, corrects them along
-the step (Broyden's update, in the metric of the information); a step that does not descend is then computed anew, or
-shortened, and in the end given up.
+the step (Broyden's update, in the metric of the information); a step that does not descend is then computed anew,
+shortened or damped, and in the end given up.
 """
 
 from __future__ import annotations
@@ -21,8 +21,10 @@ from model.machine_model.model import Model
 
 Floats = NDArray[np.float64]
 
-SHARES = (1.0, 1.0, 0.4, 0.12)
-"""Of the steps that are tried, each from derivatives that the ones before have corrected."""
+ATTEMPTS = ((1.0, 0.0), (1.0, 0.0), (0.4, 0.0), (1.0, 0.3), (0.12, 0.0), (1.0, 3.0))
+"""Steps that are tried, as a share of the whole one and a damping in shares of the information's diagonal (Marquardt
+1963), each from derivatives that the ones before have corrected. A short step helps where the ground is curved, a damped
+one where the record says little."""
 SETTLED = 1.0
 """A step that lowers the cost by less ends the search: one unit is one standard deviation of one parameter."""
 MOST_SEARCHES = 8
@@ -144,8 +146,8 @@ def settled(observation: Observation, point: Point, steps: int) -> Point:
 def _step(observation: Observation, point: Point) -> tuple[Point, bool]:
     """A step, and whether it descends; if not, the same point with derivatives that know better."""
     low, high = (np.array([getattr(u, side) for u in point.unknowns]) for side in ("low", "high"))
-    for share in SHARES:
-        step = _gauss_newton(point, low - point.values, high - point.values)
+    for share, damping in ATTEMPTS:
+        step = _gauss_newton(point, low - point.values, high - point.values, damping)
         values = np.clip(point.values + share * step, low, high)  # against rounding: the whole step is within bounds
         tried = _point(observation, point.model, point.unknowns, values, point.noise, point.tangents)
         if not np.isfinite(tried.weighted).all():
@@ -157,13 +159,13 @@ def _step(observation: Observation, point: Point) -> tuple[Point, bool]:
     return point, False
 
 
-def _gauss_newton(point: Point, least: Floats, most: Floats) -> Floats:
-    """The step (p,) to the least of the linearised problem, from `least` to `most` (p,): an unknown that would leave
-    its bounds goes to the nearer one, and the others take that into account. Cutting such steps off would spoil the
-    descent of all others."""
+def _gauss_newton(point: Point, least: Floats, most: Floats, damping: float) -> Floats:
+    """The damped step (p,) to the least of the linearised problem, from `least` to `most` (p,): an unknown that would
+    leave its bounds goes to the nearer one, and the others take that into account. Cutting such steps off would spoil
+    the descent of all others."""
     information = point.information
     diagonal = np.diag(information)
-    information[np.diag_indices_from(information)] += 1e-9 * np.maximum(diagonal, 1e-12 * diagonal.max())
+    information[np.diag_indices_from(information)] += (1e-9 + damping) * np.maximum(diagonal, 1e-12 * diagonal.max())
     gradient = point.tangents @ point.weighted - point.precision * (point.values - point.expected)
     step, free = np.zeros_like(gradient), np.ones(len(gradient), dtype=bool)
     while free.any():

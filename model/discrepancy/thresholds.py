@@ -13,6 +13,7 @@ class Thresholds:
         significant: evidence from which an effect counts as found.
         echo: share of the evidence already collected that a further effect must bring besides: where the law of an
             effect that has been added is not exactly the arm's, what is left of it is no effect of its own.
+        kin: share of both that suffices for an effect that another joint has been found to have.
         margin: evidence over the next answer from which one name is given, instead of a group.
         unexplained: variance of a joint's error above its floor, in floors, above which something is missing that none
             of the known effects is. unnamed: the same on the traces fitted to, while no effect has been added.
@@ -26,6 +27,7 @@ class Thresholds:
 
     significant: float = 12.0
     echo: float = 0.05
+    kin: float = 0.5
     margin: float = 4.0
     unexplained: float = 0.3
     unnamed: float = 0.12

@@ -38,7 +38,7 @@ from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.probing import Probed
 from model.discrepancy.ranking import Ranking, ranked
 from model.discrepancy.reasons_samples import Left
-from model.discrepancy.refitting import Judged, Refitted, judge
+from model.discrepancy.refitting import Judged, Refitted, deeper, judge
 from model.discrepancy.remaining import shapes
 from model.discrepancy.search import Point, point_at, searched, settled
 from model.discrepancy.thresholds import THRESHOLDS, Thresholds
@@ -105,10 +105,10 @@ def diagnose(
         number = len(steps) - len(findings)
         share = 0.1 + 0.8 * number / options.most_steps
         joints = _to_search(case, current, number)
-        turn = _ranked_in(case, current, joints, share, progress, cancel, probes) if joints else Ranking((), ())
+        turn, current = _ranked_in(case, current, joints, share, progress, cancel, probes)
         probes = (*probes, *turn.probed)
-        collected = sum(s.evidence for s in steps[len(findings) :] if s.adopted)
-        decision = decide(turn, case.thresholds, collected)
+        taken = [s for s in steps[len(findings) :] if s.adopted]
+        decision = decide(turn, case.thresholds, sum(s.evidence for s in taken), {s.effect or "" for s in taken})
         step, following = _turn(case, current, turn, decision)
         if step is not None:
             steps.append(step)
@@ -198,14 +198,22 @@ def _to_search(case: _Case, current: Judged, number: int) -> tuple[int, ...]:
 def _ranked_in(
     case: _Case, current: Judged, joints: tuple[int, ...], share: float, progress: Progress, cancel: Cancel,
     earlier: Sequence[Probed],
-) -> Ranking:  # fmt: skip
+) -> tuple[Ranking, Judged]:  # fmt: skip
+    """The candidates of a turn, and the point that they are compared with: the current one, or a better one that their
+    fits have found."""
+    if not joints:
+        return Ranking((), ()), current
     width = 0.8 / case.options.most_steps
 
     def tell(done: float, text: str) -> None:
         progress(share + width * done, text)
 
     options = case.options.model_copy(update={"joints": joints})
-    return ranked(case.observation, current, options, case.excluded, case.thresholds, tell, cancel, earlier)
+    turn = ranked(case.observation, current, options, case.excluded, case.thresholds, tell, cancel, earlier)
+    better = deeper(case.observation, current, turn.fitted[0]) if turn.fitted else None
+    if better is None:
+        return turn, current
+    return ranked(case.observation, better, options, case.excluded, case.thresholds, tell, cancel), better
 
 
 def _turn(

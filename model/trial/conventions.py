@@ -86,7 +86,7 @@ LEFT_OUT: dict[str, str] = {
     "potentiometer_nonlinearity": "a loaded divider there, a sine series here",
     "torque_ripple: sine, cosine": "their phase is that of a reading that potentiometers bend by up to ±0.25 %",
     "periodic_disturbance: sine, cosine": "their phase counts from the mock's start there, from the record's here",
-    "backlash: damping": "contact damping there, a share of critical damping here; it only shapes the contact",
+    "backlash: damping, contact": "how teeth meet: free here, with a prior, and only there to shape the contact",
     "joint_compliance: damping": "as that of backlash",
 }
 """Effects, or parameters of them, that no interval is counted for."""

@@ -49,3 +49,9 @@ def test_an_echo_of_what_was_found_is_no_effect() -> None:
     small = ranking(("dead_zone", 3, 30.0))
     assert decide(small, LINES).kind == "named"
     assert decide(small, LINES, collected=1000.0).kind == "nothing"
+
+
+def test_what_one_joint_has_another_is_likelier_to_have() -> None:
+    small = ranking(("dead_zone", 3, 8.0))
+    assert decide(small, LINES, collected=40.0, added={"backlash"}).kind == "nothing"
+    assert decide(small, LINES, collected=40.0, added={"dead_zone"}).kind == "named"

@@ -130,7 +130,7 @@ def test_what_no_experiment_tells_is_said() -> None:
     moved = [r.judged.point.value(SPEED_LAWS[r.candidate.name]) for r in rivals]
     assert moved[0] > 1.2 * arm.parameter(coefficient).value
     assert moved[1] > 1.02 * arm.parameter(SPEED_LAWS["back_emf_error"]).value
-    asked = best_experiment(rivals, [EXPERIMENTS["diagnostic-b"], EXPERIMENTS["diagnostic-d"]], plan)
+    asked = best_experiment(rivals, [EXPERIMENTS["diagnostic-b"]], plan)
     assert asked.experiment is None
     assert asked.note is not None
     assert "no experiment" in asked.note
