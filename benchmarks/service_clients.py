@@ -29,6 +29,9 @@ class Seen:
     """Of the clients' own clock, which shares the cores with all that is measured."""
     refused: int = 0
     watchers: int = 0
+    """Those that have got their history."""
+    joining: float = 0.0
+    """s until all watchers had it, all having come at once."""
     samples: int = 0
     samples_missed: int = 0
     ended_early: int = 0
@@ -83,9 +86,9 @@ async def _watch(url: str, seen: Seen) -> None:
     last: int | None = None
     async with websockets.connect(url, compression=None, open_timeout=60) as socket:
         await socket.send(json.dumps({"subscribe": SUBSCRIBED, "history": 60}))
-        seen.watchers += 1
         async for frame in socket:
             for message in json.loads(frame)["messages"]:
+                seen.watchers += message["topic"] == "history"
                 if message["topic"] != "sample":
                     continue
                 seen.samples += 1
@@ -108,9 +111,11 @@ async def _all(url: str, live: str, watchers: int, paths: Sequence[str], rate: f
             seen.own_lateness.clear()
 
     async with asyncio.TaskGroup() as clients:
+        begun = time.monotonic()
         watching = [clients.create_task(_watch(live, seen)) for _ in range(watchers)]
         while seen.watchers < watchers:
-            await asyncio.sleep(0.05)
+            await asyncio.sleep(0.01)
+        seen.joining = time.monotonic() - begun
         loop.add_reader(parent.fileno(), told)
         parent.send("ready")
         await _get_steadily(urlsplit(url).netloc, paths, rate, seen, over)

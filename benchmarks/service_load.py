@@ -45,6 +45,7 @@ JITTER_TARGET_MS = 5.0
 FROZEN_TARGET_MS = 30.0
 USED_TARGET_MS = 55.0
 GET_TARGET_MS = 25.0
+OTHERS = "other programs"
 OWN_DOOR, STOP_DOOR = "through the service", "through the stop listener"
 FIT = {"kind": "fit", "method": "nelder_mead", "starts": 20}
 EMPTY_APP = """
@@ -106,19 +107,27 @@ def record(service: RunningService, seconds: float, found: Measured) -> tuple[li
 
 
 class ProcessorTime:
-    """Processor time of processes by name, from now on."""
+    """Processor time of processes by name, and of everything else on this machine, from now on."""
 
     def __init__(self, processes: dict[str, int]) -> None:
         self._processes = processes
         self._begun = time.monotonic()
-        self._before = {name: _processor_time(number) for name, number in processes.items()}
+        self._before = self._now()
 
     def shares(self) -> dict[str, float]:
         """Of one core, since the beginning."""
         seconds = time.monotonic() - self._begun
-        return {
-            name: (_processor_time(number) - self._before[name]) / seconds for name, number in self._processes.items()
-        }
+        shares = {name: (now - self._before[name]) / seconds for name, now in self._now().items()}
+        return shares | {OTHERS: max(0.0, shares[OTHERS] - sum(shares.values()) + shares[OTHERS])}
+
+    def _now(self) -> dict[str, float]:
+        return {name: _processor_time(number) for name, number in self._processes.items()} | {OTHERS: _machine_time()}
+
+
+def _machine_time() -> float:
+    """s that all cores of this machine were busy."""
+    user, nice, system, _idle, _waiting, *interrupts = map(int, Path("/proc/stat").read_text("utf-8").split()[1:9])
+    return (user + nice + system + sum(interrupts)) / os.sysconf("SC_CLK_TCK")
 
 
 def _processor_time(process: int) -> float:
@@ -204,6 +213,7 @@ def measure(seconds: float, stops: int) -> Measured:
                 "fit": child(service.process.pid, b"spawn_main"),
                 "mock": mock.number,
                 "clients": load.process,
+                "stops and questions": os.getpid(),
             }
             _under_load(service, control, load, fit, seconds, stops, processes, found)
         found.seen = load.seen
@@ -268,6 +278,7 @@ def figures_of(found: Measured) -> list[Figure]:
         Figure("an empty FastAPI application, alone, p99", f"{quantile(floor, 0.99):.3g} ms", beside=spread(floor)),
         Figure("requests refused", f"{seen.refused}", "0", seen.refused == 0, own),
         Figure("processor time, of one core", f"{100 * sum(found.busy.values()):.0f} %", beside=busy),
+        Figure("until all watchers had the last 60 s", f"{seen.joining:.2f} s", beside="all of them join at once"),
         Figure("samples that a watcher did not get", f"{seen.samples_missed}", "0", seen.samples_missed == 0,
                f"of {seen.samples}, {seen.watchers} watchers, {seen.ended_early} dropped"),
     ]  # fmt: skip

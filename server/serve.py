@@ -21,6 +21,7 @@ from server.access.tokens import KnownTokens
 from server.app import make_app
 from server.listening import listening
 from server.services import Services
+from server.steady import keep_steady
 from server.stop_listener import StopListener
 from server.store.lock import sole_use
 
@@ -99,4 +100,5 @@ class _Server(uvicorn.Server):
         """As uvicorn's, then ready."""
         await super().startup(sockets)
         if self.started:
+            keep_steady()
             self._ready()

@@ -56,7 +56,7 @@ def submit_experiment(
 
 
 @router.get("")
-def list_experiments(
+async def list_experiments(
     one: RobotPart,
     found: ServicesPart,
     _: Viewer,
@@ -66,7 +66,7 @@ def list_experiments(
     cursor: CursorOf = None,
 ) -> Page[Experiment]:
     """Experiments, the newest first."""
-    page = found.experiments.page(one.robot.name, state or (), schedule, cursor, limit)
+    page = await found.experiments.page.told(one.robot.name, tuple(state or ()), schedule, cursor, limit)
     return page.model_copy(update={"items": tuple(one.queue.as_told(item) for item in page.items)})
 
 

@@ -42,7 +42,7 @@ _BINARY = {"schema": {"type": "string", "format": "binary"}}
 
 
 @router.get("")
-def list_traces(
+async def list_traces(
     one: RobotPart,
     found: ServicesPart,
     _: Viewer,
@@ -58,7 +58,7 @@ def list_traces(
 ) -> Page[CatalogueEntry]:
     """Traces, the newest first."""
     search = TraceSearch(q, tag, source, outcome, kind, since, until)
-    return found.traces.page(one.robot.name, search, cursor, limit)
+    return await found.traces.page.told(one.robot.name, search, cursor, limit)
 
 
 @router.post(

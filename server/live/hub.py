@@ -58,6 +58,9 @@ class Hub:
     def __init__(self, clock: Clock, history: History, status: Callable[[], RobotStatus]) -> None:
         self.history = history
         self.dropped = 0
+        self.looking_back = asyncio.Lock()
+        """Held while a client's history is put together: many that join at once have it one after the other, so that
+        the threads that do it take turns with everything else and not with each other."""
         self._clock = clock
         self._status = status
         self._loop: asyncio.AbstractEventLoop | None = None

@@ -1,7 +1,8 @@
 """What one client is still to be sent, and what happens when it reads too slowly. Pure: the caller says the time.
 
 A client that does not keep up gets fewer samples first: those that wait are thinned to every second one, again and
-again. One that has not taken anything for DROP_AFTER is dropped. Messages that are no samples are never left out.
+again. Many at once, after a hiccup of the service itself, are no reason yet. One that has not taken anything for
+DROP_AFTER is dropped. Messages that are no samples are never left out.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ from collections import deque
 from dataclasses import dataclass, field
 
 THIN_BEYOND = 50
-"""Samples that wait before they are thinned: one second's."""
+"""Samples that wait before they are thinned: one second's,"""
+THIN_AFTER = 1.0
+"""s without a frame taken, too."""
 DROP_AFTER = 10.0
 """s without a frame taken, while something waits."""
 MOST_WAITING = 4096
@@ -37,7 +40,7 @@ class Outbox:
         self._waiting.append((sample, message))
         if sample:
             self._samples += 1
-            if self._samples > THIN_BEYOND:
+            if self._samples > THIN_BEYOND and now - self.taken_at >= THIN_AFTER:
                 self._thin()
 
     def take(self, now: float) -> list[str]:

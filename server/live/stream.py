@@ -94,12 +94,17 @@ async def _take(request: LiveRequest, one: RobotServices, client: Client, who: C
     for message in one.hub.shown(fresh & client.topics):
         client.outbox.put(message, now)
     if request.history is not None:
-        past = await run_in_threadpool(one.hub.history.since, now - request.history, request.points)
-        client.outbox.put(past.model_dump_json(), now)
+        async with one.hub.looking_back:
+            past = await run_in_threadpool(_past, one, now - request.history, request.points)
+        client.outbox.put(past, now)
     if client.outbox:
         client.something.set()
     if request.jog is not None:
         await run_in_threadpool(_jog, request.jog, one, who)
+
+
+def _past(one: RobotServices, begin: float, points: int) -> str:
+    return one.hub.history.since(begin, points).model_dump_json()
 
 
 def _jog(command: JogCommand, one: RobotServices, who: Caller) -> None:

@@ -19,6 +19,7 @@ from server.owner.inbox import Inbox
 from server.owner.messages import CannotOpen, Open, Opened
 from server.owner.owner import serve
 from server.owner.watched_controller import WatchedController
+from server.steady import keep_steady
 
 EXIT_WRONG_INPUT = 2
 EXIT_INTERRUPTED = 130
@@ -68,6 +69,7 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
             control.stop(cause)
         desk.read_gains()
         identity = controller.identity
+        keep_steady()
         speaker.ended(
             Opened(
                 simulated=identity.simulated,

@@ -46,6 +46,8 @@ class Store:
         self._readers = sessionmaker(self.engine, expire_on_commit=False)
         self._writers = sessionmaker(self.engine.execution_options(writing=True), expire_on_commit=False)
         self._writing = threading.RLock()
+        self.changes = 0
+        """Transactions written so far: what was read before the last one may be out of date."""
 
     def migrate(self) -> None:
         """Brings the tables up to this version's. Raises StoreError, also for a database of a newer version."""
@@ -69,8 +71,10 @@ class Store:
     @contextmanager
     def writing(self) -> Iterator[Session]:
         """A session whose changes are on the disk when it is left; all of them or none."""
-        with self._writing, self._writers.begin() as session:
-            yield session
+        with self._writing:
+            with self._writers.begin() as session:
+                yield session
+            self.changes += 1
 
     def close(self) -> None:
         """Closes all connections."""

@@ -20,6 +20,7 @@ from server.queue.order import Waiting
 from server.queue.states import Event, IllegalEventError, advance, after_restart
 from server.store.engine import Store
 from server.store.pages import newest_first
+from server.store.remembered import Remembered
 from server.store.submitted import digest_of, made_before, new_columns
 from server.store.tables import ExperimentRow
 
@@ -31,6 +32,7 @@ class ExperimentStore:
         self._store = store
         self._counting = threading.Lock()
         self._waiting: dict[str, int] = {}
+        self.page = Remembered(store, self._page)
 
     @contextmanager
     def _changing(self, robot: str) -> Iterator[Session]:
@@ -76,7 +78,7 @@ class ExperimentStore:
         with self._store.reading() as session:
             return as_experiment(_row(session, robot, identity))
 
-    def page(
+    def _page(
         self, robot: str, states: Sequence[ExperimentState], schedule: str | None, cursor: str | None, limit: int
     ) -> Page[Experiment]:
         """The newest first."""

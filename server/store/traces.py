@@ -15,6 +15,7 @@ from daq.contracts.trace import Outcome
 from server.problems import conflict, not_found
 from server.store.engine import Store
 from server.store.pages import Cursor, page_of
+from server.store.remembered import Remembered
 from server.store.tables import TraceRow, TraceTagRow, TraceUseRow
 
 
@@ -58,6 +59,7 @@ class TraceStore:
 
     def __init__(self, store: Store) -> None:
         self._store = store
+        self.page = Remembered(store, self._page)
 
     def insert(self, new: NewTrace) -> None:
         """A new trace. Raises a 409 when another file with this number is there."""
@@ -95,7 +97,7 @@ class TraceStore:
             row = _row(session, robot, identity)
             return _entry(row, _tags(session, [row.id]).get(row.id, ()))
 
-    def page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
+    def _page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """The newest first."""
         query = select(TraceRow).where(TraceRow.robot == robot)
         for column, wanted in (("source", search.source), ("outcome", search.outcome), ("kind", search.kind)):

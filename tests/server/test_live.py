@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from server.live.history import History
-from server.live.outbox import DROP_AFTER, THIN_BEYOND, Outbox
+from server.live.outbox import DROP_AFTER, THIN_AFTER, THIN_BEYOND, Outbox
 from server.owner.messages import LiveSample
 from tests.server.service import Service
 from tests.server.watching import frames, messages, watching
@@ -110,13 +110,22 @@ def test_jogging_through_the_stream_needs_the_control(service: Service) -> None:
 @given(st.lists(st.booleans(), max_size=600))
 def test_only_samples_are_left_out_and_order_is_kept(kinds: list[bool]) -> None:
     outbox = Outbox(0.0)
-    for number, is_sample in enumerate(kinds):
-        outbox.put(str(number), 0.0, sample=is_sample)
-    taken = [int(message) for message in outbox.take(0.0)]
+    outbox.put("", 0.0)
+    kinds.insert(0, False)
+    for number, is_sample in enumerate(kinds[1:], 1):
+        outbox.put(str(number), THIN_AFTER, sample=is_sample)
+    taken = [int(message or 0) for message in outbox.take(THIN_AFTER)]
     assert taken == sorted(taken)
     assert {number for number, is_sample in enumerate(kinds) if not is_sample} <= set(taken)
     assert sum(kinds[number] for number in taken) <= THIN_BEYOND
     assert len(taken) + outbox.left_out == len(kinds)
+
+
+def test_a_hiccup_of_the_service_leaves_nothing_out() -> None:
+    outbox = Outbox(0.0)
+    for number in range(3 * THIN_BEYOND):
+        outbox.put(str(number), 5.0, sample=True)
+    assert (len(outbox.take(5.0)), outbox.left_out) == (3 * THIN_BEYOND, 0)
 
 
 def test_a_client_that_takes_nothing_is_hopeless_and_one_that_waits_for_news_is_not() -> None:

@@ -42,6 +42,8 @@ const SPARED = [0.12, 0.08, 1] as const;
 
 /** ms between two looks at whether a picture is drawn. */
 const LOOK_EVERY = 4;
+/** s after which it is no longer waited for one. */
+const GIVE_UP = 2;
 
 /** What is shown. Postures in rad, one value a joint. */
 export interface ArmPicture {
@@ -339,13 +341,15 @@ export class ArmScene {
 
   /** Calls when the picture is drawn, which is later than it was asked for: what it costs is not known before. */
   private whenDone(call: (at: number) => void): void {
+    const begin = seconds();
     const context = this.renderer.getContext() as WebGL2RenderingContext;
     const fence = context.fenceSync(context.SYNC_GPU_COMMANDS_COMPLETE, 0);
     context.flush();
     const look = (): void => {
       const isDone =
         fence === null || context.getSyncParameter(fence, context.SYNC_STATUS) === context.SIGNALED;
-      if (!isDone && !context.isContextLost() && !this.isDisposed) {
+      const isGivenUp = this.isDisposed || seconds() > begin + GIVE_UP;
+      if (!isDone && !isGivenUp) {
         setTimeout(look, LOOK_EVERY);
         return;
       }

@@ -1,0 +1,46 @@
+"""Parts of lists that were read lately: many pages that are open ask for the same ones again and again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from typing import Generic, ParamSpec, TypeVar
+
+from fastapi.concurrency import run_in_threadpool
+
+from daq.contracts.service.base import Page
+from server.store.engine import Store
+
+MOST_REMEMBERED = 32
+"""Parts."""
+P = ParamSpec("P")
+Item = TypeVar("Item")
+
+
+class Remembered(Generic[P, Item]):
+    """What `read` found, until anything is written. Its arguments are hashable. May be called from any thread."""
+
+    def __init__(self, store: Store, read: Callable[P, Page[Item]]) -> None:
+        self._store = store
+        self._read = read
+        self._parts: dict[Hashable, tuple[int, Page[Item]]] = {}
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> Page[Item]:
+        """The part, read where it is not remembered."""
+        question = (args, tuple(kwargs.items()))
+        found = self._known(question)
+        if found is None:
+            changes = self._store.changes  # before it is read: what is written meanwhile makes it out of date
+            found = self._read(*args, **kwargs)
+            if len(self._parts) >= MOST_REMEMBERED:
+                self._parts.clear()
+            self._parts[question] = (changes, found)
+        return found
+
+    async def told(self, *args: P.args, **kwargs: P.kwargs) -> Page[Item]:
+        """The same from the event loop: only what has to be read takes a thread."""
+        found = self._known((args, tuple(kwargs.items())))
+        return await run_in_threadpool(self, *args, **kwargs) if found is None else found
+
+    def _known(self, question: Hashable) -> Page[Item] | None:
+        changes, found = self._parts.get(question, (-1, None))
+        return found if changes == self._store.changes else None
