@@ -23,8 +23,8 @@ Floats = NDArray[np.float64]
 
 ATTEMPTS = ((1.0, 0.0), (1.0, 0.0), (0.4, 0.0), (1.0, 0.3), (0.12, 0.0), (1.0, 3.0))
 """Steps that are tried, as a share of the whole one and a damping in shares of the information's diagonal (Marquardt
-1963), each from derivatives that the ones before have corrected. A short step helps where the ground is curved, a damped
-one where the record says little."""
+1963), each from derivatives that the ones before have corrected. A short step helps where the ground is curved, a
+damped one where the record says little."""
 SETTLED = 1.0
 """A step that lowers the cost by less ends the search: one unit is one standard deviation of one parameter."""
 MOST_SEARCHES = 8

@@ -7,7 +7,7 @@ import pytest
 
 from model.discrepancy.observation import Observation, observed
 from model.discrepancy.probing import projection
-from model.discrepancy.search import Point, _corrected, point_at, searched, with_new_tangents
+from model.discrepancy.search import Point, _corrected, point_at, settled
 from tests.model.fitting import imagined
 
 TRUTH = {"joint2.viscous_friction.coefficient": 2.2e-4, "load.mass": 1.4, "joint1.motor.back_emf_constant": 0.0352}
@@ -24,8 +24,7 @@ def case() -> tuple[Observation, Point]:
 
 def test_a_search_ends_at_the_noise(case: tuple[Observation, Point]) -> None:
     observation, given = case
-    found = searched(observation, given, 6)
-    found = searched(observation, with_new_tangents(observation, found), 4)
+    found = settled(observation, given, 4)
     names = [u.name for u in given.unknowns]
     values = given.values.copy()
     for name, value in TRUTH.items():
