@@ -3,6 +3,7 @@
 from daq.transport.channel import ByteChannel, ChannelError
 from daq.transport.discovery import FoundPort, ports
 from daq.transport.endpoint import Endpoint, open_endpoint
+from daq.transport.pseudo_terminal import Terminal, require_same, terminal_at
 from daq.transport.reconnect import ReconnectDelay
 from daq.transport.url import MockPort, PortBusyError, PortUrl, SerialPort, TcpPort, TransportError, parse_port_url
 
@@ -17,8 +18,11 @@ __all__ = [
     "ReconnectDelay",
     "SerialPort",
     "TcpPort",
+    "Terminal",
     "TransportError",
     "open_endpoint",
     "parse_port_url",
     "ports",
+    "require_same",
+    "terminal_at",
 ]

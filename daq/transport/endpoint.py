@@ -9,6 +9,7 @@ import serial
 
 from daq.transport.channel import ByteChannel, DescriptorChannel
 from daq.transport.mock_process import MockProcess, start_mock
+from daq.transport.pseudo_terminal import Terminal, require_same, terminal_at
 from daq.transport.url import MockPort, PortBusyError, PortUrl, SerialPort, TcpPort, TransportError, parse_port_url
 
 CONNECT_TIMEOUT_S = 3.0
@@ -66,9 +67,13 @@ class PortEndpoint:
         self.lock_step = isinstance(port, TcpPort) and port.lock_step
         self.bytes_per_second = port.baud / BITS_PER_BYTE
         self._port = port
+        self._terminal: Terminal | None = None
 
     def connect(self) -> ByteChannel:
-        """A new channel."""
+        """A new channel, to what the first one led to."""
+        if isinstance(self._port, SerialPort):
+            require_same(self._port.device, self._terminal)
+            self._terminal = terminal_at(self._port.device) or self._terminal
         return connect(self._port)
 
     def close(self) -> None:

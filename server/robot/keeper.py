@@ -35,7 +35,7 @@ class Keeper:
         """From now on it is to be connected. Raises ReachError when it cannot be reached now; it is tried again."""
         with self._changed:
             self._wanted = True
-        self._robot.connect()
+        self._robot.connect(anew=True)
         self._wake()
 
     def disconnect(self) -> bool:

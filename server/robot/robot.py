@@ -14,7 +14,15 @@ from daq.acquisition.messages import EventHappened, Progress
 from daq.contracts.errors import ReachError
 from daq.contracts.machine import Machine
 from daq.contracts.service.robot import ConnectionState, RobotIdentity
-from daq.transport import PortBusyError
+from daq.transport import (
+    PortBusyError,
+    SerialPort,
+    Terminal,
+    TransportError,
+    parse_port_url,
+    require_same,
+    terminal_at,
+)
 from server.clock import Clock
 from server.owner.messages import (
     Answer,
@@ -75,6 +83,8 @@ class Robot:
         self._problem = ""
         self._arm: Seen | None = None
         self._sample: Seen | None = None
+        self._terminal: Terminal | None = None
+        """The pseudo-terminal that it was reached at, where it is a mock's."""
 
     @property
     def name(self) -> str:
@@ -125,10 +135,15 @@ class Robot:
         owner = self._owner
         return None if owner is None else owner.pid
 
-    def connect(self) -> RobotIdentity:
-        """Connects, or waits for a connection that is being made. Moves nothing. Raises ReachError, SpecError."""
+    def connect(self, *, anew: bool = False) -> RobotIdentity:
+        """Connects, or waits for a connection that is being made. Moves nothing. Raises ReachError, SpecError.
+
+        Unless it is wanted `anew`, by somebody who knows what is at its port, it is what was there before or nothing.
+        """
         with self._lock:
             if self._owner is None:
+                self._terminal = None if anew else self._terminal
+                self.require_same_place()
                 self._begin()
             opened = self._opened
         assert opened is not None
@@ -137,6 +152,16 @@ class Robot:
         except TimeoutError:
             self.disconnect()
             raise ReachError(f"{self.place.url}: no greeting within {OPEN_WITHIN:g} s") from None
+
+    def require_same_place(self) -> None:
+        """Raises ReachError where its port has become another program's: nothing may be sent there."""
+        port = parse_port_url(self.place.url)
+        if isinstance(port, SerialPort):
+            try:
+                require_same(port.device, self._terminal)
+            except TransportError as error:
+                self._problem = str(error)
+                raise ReachError(self._problem) from error
 
     def disconnect(self, patience: float = 4.0) -> bool:
         """Gives the port back; what runs is stopped first. True when that is done within `patience` s."""
@@ -190,8 +215,10 @@ class Robot:
         identity = RobotIdentity(
             simulated=report.simulated, protocol=report.protocol, period=report.period, boots=report.boots
         )
+        port = parse_port_url(self.place.url)
         with self._lock:
             self._identity = identity
+            self._terminal = terminal_at(port.device) if isinstance(port, SerialPort) else None
             assert self._opened is not None
             self._opened.set_result(identity)
 

@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from daq.acquisition.port_stop import stop_at_port
 from daq.acquisition.stop_socket import StopAnswer, request_stop
+from daq.contracts.errors import ReachError
 from daq.contracts.service.robot import StopResult
 from server.clock import Clock
 from server.robot.robot import Robot
@@ -67,4 +68,8 @@ class StopDesk:
             return next((answer for answer in answers if not answer.confirmed), answers[0])
         if url.startswith("mock://"):
             return StopAnswer(robot=name, port=url, delivered=False, confirmed=False, text="no robot is connected")
+        try:
+            self._robot.require_same_place()
+        except ReachError as error:
+            return StopAnswer(robot=name, port=url, delivered=False, confirmed=False, text=str(error))
         return stop_at_port(name, url)

@@ -136,7 +136,21 @@ def test_a_port_that_another_program_has_and_a_robot_that_is_pulled_out(tmp_path
         assert service.robot.get("/queue").json()["paused"]
         assert service.robot.get(f"/experiments/{waiting}").json()["state"] == "queued"
         assert service.status()["connection"] in ("lost", "disconnected")
-        assert not service.robot.post("/stop").json()["confirmed"]
+        with _terminal_of_the_same_number(mock.url) as ours:
+            assert not service.robot.post("/stop").json()["confirmed"]
+            assert not select.select([ours], [], [], 0)[0]  # nothing was sent to whoever has the number now
+
+
+@contextmanager
+def _terminal_of_the_same_number(url: str) -> Iterator[int]:
+    """Another program's, which got the number of a mock that has ended."""
+    ours, theirs = os.openpty()
+    try:
+        assert url == f"serial://{os.ttyname(theirs)}"
+        yield ours
+    finally:
+        os.close(ours)
+        os.close(theirs)
 
 
 def _port_in_use(service: Service) -> None:
