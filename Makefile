@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 FOR_USE := .venv/installed-for-use
 FOR_DEVELOPMENT := .venv/installed-for-development
 
-# Tests against the clock share one worker, all others go to the other. One process: make test WORKERS=
+# Each worker has half of the tests against the clock. One process: make test WORKERS=
 WORKERS ?= -n 2 --dist loadgroup
 
 .DEFAULT_GOAL := help
