@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from model.discrepancy.candidates import Candidate
 from model.discrepancy.observation import Observation, observed
 from model.discrepancy.probing import projection
+from model.discrepancy.refitting import Refitted, deeper, judge
 from model.discrepancy.search import Point, _corrected, point_at, settled
 from tests.model.fitting import imagined
 
@@ -32,6 +34,18 @@ def test_a_search_ends_at_the_noise(case: tuple[Observation, Point]) -> None:
     truth = point_at(observation, given.model, given.unknowns, values, given.noise, given.tangents)
     assert given.misfit > 2.0
     assert found.cost < truth.cost + 5.0, "the arm's own numbers explain the record no better"
+
+
+def test_what_a_fit_without_the_candidate_reaches_too_is_not_the_candidates(case: tuple[Observation, Point]) -> None:
+    observation, given = case
+    end = judge(observation, settled(observation, given, 4))
+    candidate = Candidate("coulomb_friction", (2,), given.model, (), (), proportional=True)
+    found = Refitted(candidate, end, evidence=100.0, promised=20.0)
+    stuck = judge(observation, given)
+    better = deeper(observation, stuck, found)
+    assert better is not None
+    assert better.point.cost < end.point.cost + 5.0
+    assert deeper(observation, end, found) is None
 
 
 def test_a_corrected_derivative_repeats_the_step(case: tuple[Observation, Point]) -> None:
