@@ -114,6 +114,7 @@ def test_the_control_is_held_given_back_and_told_when_it_is_lost(robot: Robot, c
     with robot.control() as control:
         assert robot.control_status().holder == "client"
         assert control.set_output(2, on=True).outputs[2]
+        assert not any(control.set_output(2, on=False).outputs)
         assert control.perform(Program(name="wait", instructions=(Wait(duration=0.1),))).activity in ("program", "none")
         with pytest.raises(ServiceError) as held, client.robot().control():
             pass

@@ -142,10 +142,12 @@ def test_gains_signals_and_gripper(daq: Daq) -> None:
     assert "joint 6: P  3" in daq("gains", "show").out
     assert daq("gains", "set", "6=2/0/0").code == 0
     assert daq("io", "set", "3", "on").code == 0
-    outputs = next(line for line in daq("io", "show").out.splitlines() if line.startswith("outputs "))
-    assert outputs[-4] == "1"  # output 3; other tests may have set others at this service's mock
+    assert "outputs 00001000\n" in daq("io", "show").out
+    assert daq("io", "set", "3", "off").code == 0
+    assert "outputs 00000000\n" in daq("io", "show").out
     assert daq("io", "gripper", "close").code == 0
     assert daq("io", "show").out.endswith("gripper closed\n")
+    assert daq("io", "gripper", "open").code == 0
 
 
 def test_traces_are_listed_fetched_and_sent(daq: Daq, tmp_path: Path) -> None:

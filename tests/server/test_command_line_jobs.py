@@ -62,3 +62,32 @@ def test_fit_and_compare_are_jobs_of_the_service(daq: Daq, sound_service: Servic
     assert kinds[:2] == ["compare", "fit"]
     daq("fit", "last", "-o", "x.json", "--effect-file", "own.py").complains(2, "runs no programs")
     daq("fit", "last", "-o", "x.json", "--torques").complains(2, "--torques", "not by a service")
+
+
+def test_validate_is_a_job_of_the_service(daq: Daq, sound_service: Service, tmp_path: Path) -> None:
+    assert daq(*RAMP).code == 0
+    one = ["--parameters", "joint1.motor.torque_constant", "--joint", "1"]
+    said = daq("validate", "ma2000", "last", *one, "--report", "validation.html", "--json")
+    assert said.code == 0, said.err
+    found = json.loads(said.out)
+    assert [judged["name"] for judged in found["fidelity"]["parameters"]] == ["joint1.motor.torque_constant"]
+    assert (tmp_path / "validation.html").read_text().startswith("<!doctype html>")
+    newest = sound_service.robot.get("/jobs").json()["items"][0]
+    assert (newest["request"]["kind"], newest["state"]) == ("validate", "done")
+    assert f"job {newest['id']} at " in said.err
+    said = daq("validate", "ma2000", "last", "--parameters", "joint9.*")
+    said.complains(2, "joint9")
+
+
+def test_diagnose_is_a_job_of_the_service(daq: Daq, sound_service: Service, tmp_path: Path) -> None:
+    assert daq(*RAMP).code == 0
+    few = ["--joints", "1", "--effects", "coulomb_friction", "--most", "1"]
+    said = daq("diagnose", "last", *few, "-o", "better.json", "--report", "diagnosis.html", "--json")
+    assert said.code == 0, said.err
+    found = json.loads(said.out)
+    assert found["verdict"]
+    assert (tmp_path / "diagnosis.html").read_text().startswith("<!doctype html>")
+    newest = sound_service.robot.get("/jobs").json()["items"][0]
+    assert (newest["request"]["kind"], newest["state"]) == ("diagnose", "done")
+    assert newest["request"]["effects"] == ["coulomb_friction"]
+    daq("diagnose", "last", "--effects", "no_such_effect").complains(2, "no_such_effect")
