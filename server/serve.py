@@ -39,7 +39,11 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
     section = settings.server
     with sole_use(section.database_url), listening(section) as (listener, beside):
         services = Services(settings)
-        gate = _gate(services, section, beside.getsockname()[1])
+        try:
+            gate = _gate(services, section, beside.getsockname()[1])
+        except SpecError:
+            services.close()
+            raise
         app = make_app(services, gate)
         config = uvicorn.Config(
             app,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
@@ -20,8 +19,10 @@ from server.access.tickets import GOOD_FOR, Tickets
 from server.access.tokens import REMEMBERED_FOR, KnownTokens, TokenStore, digest_of
 from server.store.engine import Store
 from server.store.tables import TokenRow
+from tests.daq.cli.invoke import CommandLine
 from tests.server.clocks import HandClock
-from tests.server.service import DAQ, Service, running_service
+from tests.server.desk import anothers_desk
+from tests.server.service import Service, running_service
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.8.8.8", "::1", "[::1]", "localhost"])
@@ -161,28 +162,27 @@ def test_a_body_that_is_too_large_is_not_read(service: Service) -> None:
     assert (answer.status_code, answer.json()["type"]) == (413, "docs/service.md#too-large")
 
 
-def test_others_are_not_let_in_without_tokens(tmp_path: Path) -> None:
-    ended = subprocess.run(
-        [*DAQ, "serve", "--host", "0.0.0.0", "--port", "0"],
-        cwd=tmp_path,
-        env={key: value for key, value in os.environ.items() if not key.startswith("DAQ_")},
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-    )
-    assert ended.returncode == 2
-    assert ended.stdout == ""
-    assert "make one with `daq token add NAME --role operator`" in ended.stderr
+@pytest.fixture
+def daq(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[CommandLine]:
+    """The command of the user whose service it is."""
+    with anothers_desk(tmp_path, capsys, monkeypatch) as daq:
+        yield daq
 
 
-def _token(folder: Path, name: str, role: str) -> str:
-    command = [*DAQ, "token", "add", name, "--role", role]
-    return subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True, timeout=100).stdout.strip()
+def test_others_are_not_let_in_without_tokens(daq: CommandLine, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.logs.begin", lambda: None)  # the logs of this process are the tests' own
+    refused = daq("serve", "--host", "0.0.0.0", "--port", "0")
+    refused.complains(2, "make one with `daq token add NAME --role operator`")
 
 
-def test_viewers_look_and_stop_operators_do_the_rest(tmp_path: Path) -> None:
-    viewer, operator = _token(tmp_path, "anna", "viewer"), _token(tmp_path, "bert", "operator")
+def _token(daq: CommandLine, name: str, role: str) -> str:
+    made = daq("token", "add", name, "--role", role)
+    assert made.code == 0, made.err
+    return made.out.strip()
+
+
+def test_viewers_look_and_stop_operators_do_the_rest(tmp_path: Path, daq: CommandLine) -> None:
+    viewer, operator = _token(daq, "anna", "viewer"), _token(daq, "bert", "operator")
     with running_service(tmp_path, "mock://?pty=1&lock_step=1", "--host", "0.0.0.0") as service:
         base = f"{service.url.replace('0.0.0.0', '127.0.0.1')}/api/v1"
         with httpx.Client(base_url=base, timeout=60) as nobody:

@@ -81,41 +81,46 @@ def _blocked(service: Service) -> Iterator[None]:
         stuck.join()
 
 
-def test_a_stop_reaches_the_arm_through_every_other_door_while_the_event_loop_is_blocked(
+def test_a_stop_reaches_the_arm_while_the_event_loop_is_blocked_and_while_the_whole_service_hangs(
     tmp_path: Path, daq: CommandLine
 ) -> None:
     with running_service(tmp_path, program=[sys.executable, "-c", BLOCKING]) as service:
         experiment = _running(service)
         with _blocked(service), Client(service.url) as client:
-            stopped = client.robot("ma2000").stop()
-            assert stopped.confirmed, stopped
-            for words in (["stop"], ["--server", service.url, "stop"]):
-                said = daq(*words)
-                assert said.code == 0, (words, said)
-                assert said.out.startswith("ma2000: stopped, confirmed by the board"), said
+            _every_other_door_is_open(service, client, daq)
         ended = service.end_of(experiment)
         assert (ended["state"], ended["outcome"]) == ("cancelled", "stopped")
         texts = [event["text"] for event in service.robot.get("/events").json()["items"] if event["kind"] == "stop"]
         assert any("confirmed by the board" in text for text in texts)
-
-
-def test_when_the_whole_service_hangs_daq_stop_remains_and_a_client_is_told_to_use_the_emergency_stop(
-    tmp_path: Path, daq: CommandLine
-) -> None:
-    with running_service(tmp_path) as service:
+        assert service.robot.post("/reset", json={}).status_code == 200
+        assert service.robot.post("/queue/resume", json={}).status_code == 200
         experiment = _running(service)
-        service.process.send_signal(signal.SIGSTOP)
-        try:
-            said = daq("stop")
-            with Client(service.url) as client:
-                not_stopped = client.robot("ma2000").stop()
-        finally:
-            service.process.send_signal(signal.SIGCONT)
-        assert said.code == 0, said
-        assert said.out.startswith("ma2000: stopped, confirmed by the board")
-        assert not not_stopped.delivered
-        assert "emergency stop" in not_stopped.text
+        _daq_stop_remains(service, daq)
         assert service.end_of(experiment)["state"] == "cancelled"
+
+
+def _every_other_door_is_open(service: Service, client: Client, daq: CommandLine) -> None:
+    stopped = client.robot("ma2000").stop()
+    assert stopped.confirmed, stopped
+    for words in (["stop"], ["--server", service.url, "stop"]):
+        said = daq(*words)
+        assert said.code == 0, (words, said)
+        assert said.out.startswith("ma2000: stopped, confirmed by the board"), said
+
+
+def _daq_stop_remains(service: Service, daq: CommandLine) -> None:
+    """A client is told to use the emergency stop."""
+    service.process.send_signal(signal.SIGSTOP)
+    try:
+        said = daq("stop")
+        with Client(service.url) as client:
+            not_stopped = client.robot("ma2000").stop()
+    finally:
+        service.process.send_signal(signal.SIGCONT)
+    assert said.code == 0, said
+    assert said.out.startswith("ma2000: stopped, confirmed by the board")
+    assert not not_stopped.delivered
+    assert "emergency stop" in not_stopped.text
 
 
 # ---- who may
