@@ -13,6 +13,7 @@ from alembic.migration import MigrationContext
 from sqlalchemy import text
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import ExperimentRequest
 from daq.contracts.service.traces import TraceChange
 from server.problems import ProblemError
@@ -20,6 +21,7 @@ from server.queue.states import Event
 from server.store.engine import Store, StoreError, migrations
 from server.store.experiments import ExperimentStore
 from server.store.pages import Cursor
+from server.store.remembered import Remembered
 from server.store.tables import Table
 from server.store.traces import NewTrace, TraceSearch, TraceStore
 
@@ -175,3 +177,23 @@ def test_the_spec_comes_back_as_it_was_submitted(store: Store) -> None:
     spec = ExperimentSpec.model_validate({"trajectory": {"kind": "sine", "amplitude": {1: 0.1}}, "joints": [1]})
     made, _ = experiments.submit("ma2000", ExperimentRequest(spec=spec), NOW, "anna")
     assert experiments.get("ma2000", made.id).spec == spec
+
+
+def test_a_list_is_read_again_once_anything_was_written_also_while_it_was_read(store: Store) -> None:
+    read: list[str] = []
+
+    def page(name: str) -> Page[str]:
+        read.append(name)
+        if len(read) == 2:
+            with store.writing():  # by another thread, as far as the reader knows
+                pass
+        return Page(items=(f"{name} {len(read)}",), next=None)
+
+    listed = Remembered(store, page)
+    assert [listed("a").items, listed("a").items] == [("a 1",), ("a 1",)]
+    with store.writing():
+        pass
+    assert listed("a").items == ("a 2",)
+    assert listed("a").items == ("a 3",)
+    assert listed("b").items == ("b 4",)
+    assert listed("a").items == ("a 3",)

@@ -15,10 +15,19 @@ RULES = {
 }
 
 
+TALL = 4000
+"""px: nothing has to be scrolled, so that no header that stays in view covers half of a button."""
+
+
 def faults_of(page: Page) -> list[str]:
     """One line a fault. The page's policy lets no script in from elsewhere: axe comes through the debugger."""
+    assert AXE.is_file(), "make page installs it"
+    size = page.viewport_size
+    assert size is not None
+    page.set_viewport_size({"width": size["width"], "height": TALL})
     page.evaluate(AXE.read_text("utf-8"))
     found: dict[str, Any] = page.evaluate("rules => axe.run(document, rules)", RULES)
+    page.set_viewport_size(size)
     return [_told(one) for one in found["violations"]]
 
 

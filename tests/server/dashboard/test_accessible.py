@@ -2,42 +2,25 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 from playwright.sync_api import Browser, expect
 
-from tests.repository.tracked import ROOT
 from tests.server.dashboard.browser import WIDE, Dashboard, MockControl, watched
+from tests.server.dashboard.faults import faults_of
 from tests.server.dashboard.test_stop import PAGES
 from tests.server.service import Service
 
 pytestmark = pytest.mark.browser
-AXE = ROOT / "server" / "dashboard" / "node_modules" / "axe-core" / "axe.min.js"
-RULES = {
-    "runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"],
-    "resultTypes": ["violations"],
-}
-
-
-def _told(violation: dict[str, Any]) -> str:
-    places = ", ".join(str(node["target"]) for node in violation["nodes"][:4])
-    return f"{violation['id']}: {violation['help']}: {places}: {violation['nodes'][0].get('failureSummary', '')}"
-
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_no_fault_on_any_page(browser: Browser, served: tuple[Service, MockControl], scheme: str) -> None:
-    assert Path(AXE).is_file(), "make page installs it"
     context = browser.new_context(viewport=WIDE, color_scheme=scheme)  # type: ignore[arg-type]
-    context.add_init_script(AXE.read_text("utf-8"))
     tab = watched(context, *served)
     found = []
     for path in PAGES:
         page = tab.open(path)
         page.wait_for_load_state("networkidle")
-        result = page.evaluate("rules => axe.run(document, rules)", RULES)
-        found += [f"{path}: {_told(violation)}" for violation in result["violations"]]
+        found += [f"{path}: {fault}" for fault in faults_of(page)]
     context.close()
     assert found == []
     assert tab.complaints == []

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, Playwright, expect
 
 from tests.server.dashboard.browser import TABLET, WIDE, WITH_3D, Dashboard, MockControl, chromium, watched
-from tests.server.dashboard.test_accessible import AXE, RULES
+from tests.server.dashboard.faults import faults_of
 from tests.server.service import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -47,21 +47,6 @@ def _amplitude(page: Page) -> Locator:
 
 def _waiting(page: Page) -> Locator:
     return page.get_by_role("list", name="Experiments that wait, the next one first").get_by_role("listitem")
-
-
-def test_a_ramp_is_started_from_the_form_and_its_trace_appears(dashboard: Dashboard, form: Page) -> None:
-    _amplitude(form).fill("5")
-    form.get_by_role("textbox", name="Hold after").fill("0.2")
-    form.get_by_role("textbox", name="Name").fill("from-the-form")
-    expect(form.get_by_text("within all limits")).to_be_visible()
-    form.get_by_role("button", name="Add to the queue").click()
-    expect(form.get_by_text("from-the-form is in the queue")).to_be_visible()
-    form.get_by_role("link", name="Trace of from-the-form").click()
-    expect(form.get_by_role("img", name=re.compile("Position and set point of joint 1, 2, 3")).first).to_be_visible()
-    entry = dashboard.service.robot.get("/traces").json()["items"][0]
-    assert (entry["name"], entry["outcome"]) == ("from-the-form", "complete")
-    spec = dashboard.service.robot.get(f"/traces/{entry['id']}").json()["record"]["spec"]
-    assert spec["trajectory"]["amplitude"] == pytest.approx(0.0872664626)
 
 
 def test_a_limit_that_would_be_broken_is_marked_and_nothing_is_sent(dashboard: Dashboard, form: Page) -> None:
@@ -234,12 +219,11 @@ def test_axe_finds_no_fault_while_limits_are_broken(
     browser: Browser, served: tuple[Service, MockControl], scheme: str
 ) -> None:
     context = browser.new_context(viewport=WIDE, color_scheme=scheme)  # type: ignore[arg-type]
-    context.add_init_script(AXE.read_text("utf-8"))
     tab = watched(context, *served)
     page = tab.open("experiments")
     _amplitude(page).fill("200")
     expect(page.get_by_role("list", name="Limits that the motion breaks")).to_be_visible()
     page.get_by_role("radio", name="Every so often").check()
-    found = page.evaluate("rules => axe.run(document, rules)", RULES)["violations"]
+    found = faults_of(page)
     context.close()
-    assert [(one["id"], [node["target"] for node in one["nodes"]]) for one in found] == []
+    assert found == []

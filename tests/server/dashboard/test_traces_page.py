@@ -16,7 +16,7 @@ from daq.contracts.machine import load_machine
 from daq.contracts.trace import Floats, Trace, TraceRecord
 from daq.traces.store import write_trace
 from tests.server.dashboard.browser import TABLET, WIDE, Dashboard, MockControl, watched
-from tests.server.dashboard.test_accessible import AXE, RULES
+from tests.server.dashboard.faults import faults_of
 from tests.server.service import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -216,12 +216,11 @@ def test_axe_finds_no_fault_with_traces_shown(
     browser: Browser, served: Served, traces: tuple[str, str], scheme: str
 ) -> None:
     context = browser.new_context(viewport=WIDE, color_scheme=scheme)  # type: ignore[arg-type]
-    context.add_init_script(AXE.read_text("utf-8"))
     tab = watched(context, *served)
     page = tab.open(f"traces/{traces[0]},{traces[1]}")
     expect(_chart(page)).to_be_visible()
     page.get_by_role("button", name="Measure").click()
     expect(page.get_by_role("region", name="Between the cursors").get_by_role("table")).to_be_visible()
-    found = page.evaluate("rules => axe.run(document, rules)", RULES)["violations"]
+    found = faults_of(page)
     context.close()
     assert [(one["id"], [node["target"] for node in one["nodes"]]) for one in found] == []
