@@ -12,6 +12,7 @@ from tests.server.service import Service
 
 pytestmark = pytest.mark.browser
 
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_no_fault_on_any_page(browser: Browser, served: tuple[Service, MockControl], scheme: str) -> None:
     context = browser.new_context(viewport=WIDE, color_scheme=scheme)  # type: ignore[arg-type]
