@@ -1,4 +1,5 @@
-"""Clients of a service, in a process of their own: WebSockets that watch, and plain GETs at a steady rate."""
+"""Clients of a service: WebSockets that watch, and plain GETs at a steady rate, in two processes, so that what the
+watchers do with their samples is not counted as the service's time to answer."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ import json
 import multiprocessing
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from urllib.parse import urlsplit
 
@@ -118,7 +119,9 @@ async def _all(url: str, live: str, watchers: int, paths: Sequence[str], rate: f
         seen.joining = time.monotonic() - begun
         loop.add_reader(parent.fileno(), told)
         parent.send("ready")
-        await _get_steadily(urlsplit(url).netloc, paths, rate, seen, over)
+        if paths:
+            await _get_steadily(urlsplit(url).netloc, paths, rate, seen, over)
+        await over.wait()
         for task in watching:
             task.cancel()
     return seen
@@ -129,22 +132,16 @@ def _run(url: str, live: str, watchers: int, paths: Sequence[str], rate: float, 
 
 
 @dataclass
-class Clients:
-    """Clients under way."""
+class _Part:
+    """One of the processes."""
 
-    _pipe: Connection
+    pipe: Connection
     process: int
     seen: Seen = field(default_factory=Seen)
-    """Complete when the block has ended."""
-
-    def begin_anew(self) -> None:
-        """Forgets the GETs so far: those while everything started."""
-        self._pipe.send("anew")
 
 
 @contextlib.contextmanager
-def clients(url: str, watchers: int, paths: Sequence[str], rate: float, live: str = "") -> Iterator[Clients]:
-    """`watchers` WebSockets at `live` (a path), and `rate` GETs a second of `paths` in turn, as long as the block."""
+def _part(url: str, live: str, watchers: int, paths: Sequence[str], rate: float) -> Iterator[_Part]:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(
@@ -152,7 +149,7 @@ def clients(url: str, watchers: int, paths: Sequence[str], rate: float, live: st
     )
     process.start()
     theirs.close()
-    made = Clients(ours, process.pid or 0)
+    made = _Part(ours, process.pid or 0)
     try:
         ours.recv()
         yield made
@@ -164,3 +161,37 @@ def clients(url: str, watchers: int, paths: Sequence[str], rate: float, live: st
             process.kill()
             process.join()
         ours.close()
+
+
+@dataclass
+class Clients:
+    """Clients under way."""
+
+    _watching: _Part | None
+    _asking: _Part
+    seen: Seen = field(default_factory=Seen)
+    """Complete when the block has ended."""
+
+    @property
+    def processes(self) -> dict[str, int]:
+        """By what they do."""
+        watching = {} if self._watching is None else {"watchers": self._watching.process}
+        return watching | {"GETs": self._asking.process}
+
+    def begin_anew(self) -> None:
+        """Forgets the GETs so far: those while everything started."""
+        self._asking.pipe.send("anew")
+
+
+@contextlib.contextmanager
+def clients(url: str, watchers: int, paths: Sequence[str], rate: float, live: str = "") -> Iterator[Clients]:
+    """`watchers` WebSockets at `live` (a path), and `rate` GETs a second of `paths` in turn, as long as the block."""
+    with contextlib.ExitStack() as parts:
+        watching = parts.enter_context(_part(url, live, watchers, (), 0.0)) if watchers else None
+        asking = parts.enter_context(_part(url, live, 0, paths, rate))
+        made = Clients(watching, asking)
+        yield made
+    asked = asking.seen
+    made.seen = asked if watching is None else replace(
+        watching.seen, latencies=asked.latencies, own_lateness=asked.own_lateness, refused=asked.refused
+    )  # fmt: skip

@@ -167,12 +167,15 @@ class Campaign:
         self._service: RunningService | None = None
         self._trace = ""
 
-    def run(self, kills: int) -> Findings:
-        """All of them."""
+    def run(self, kills: int, seconds: float) -> Findings:
+        """All of them, or as many as there is time for."""
+        until = time.monotonic() + seconds
         with self._open:
             self._begin()
             self._trace = self._complete_trace()
             for number in range(kills):
+                if time.monotonic() > until:
+                    break
                 self._kill(VICTIMS[number % len(VICTIMS)], f"kill {number}")
             last = Told.by(self._there)
             self._there.ask("POST", "/disconnect")
@@ -292,11 +295,12 @@ def main() -> int:
     """The exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks service_kills", description=__doc__)
     parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--minutes", type=float, default=60.0, help="no more kills after so long")
     parser.add_argument("--seed", type=int, default=1991)
     parser.add_argument("--quick", action="store_true", help="10 kills")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        found = Campaign(Path(name), PORT, given.seed).run(10 if given.quick else given.kills)
+        found = Campaign(Path(name), PORT, given.seed).run(10 if given.quick else given.kills, 60 * given.minutes)
     for line in (*found.lost, *found.untrue, *found.queue):
         print(line, file=sys.stderr)
     return show("kill -9 at random moments", "python -m benchmarks service_kills", figures_of(found))

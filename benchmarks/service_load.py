@@ -212,7 +212,7 @@ def measure(seconds: float, stops: int) -> Measured:
                 "owner of the port": child(service.process.pid, b"server.owner"),
                 "fit": child(service.process.pid, b"spawn_main"),
                 "mock": mock.number,
-                "clients": load.process,
+                **load.processes,
                 "stops and questions": os.getpid(),
             }
             _under_load(service, control, load, fit, seconds, stops, processes, found)
