@@ -2,6 +2,7 @@ import { beforeEach, describe, expect, it } from 'vitest';
 import {
   ANSWER_WITHIN,
   backOff,
+  isMissing,
   LiveSocket,
   OPEN_WITHIN,
   SILENT_AFTER,
@@ -205,5 +206,19 @@ describe('the live socket', () => {
     await clock.pass(60);
     expect(sockets).toHaveLength(1);
     expect(sockets[0]?.closed).toBe(true);
+  });
+});
+
+describe('a connection that is missing', () => {
+  it('is told without a break until it is back', () => {
+    expect(isMissing({ phase: 'lost', attempt: 0, why: '', retryAt: 1 }, true)).toBe(true);
+    expect(isMissing({ phase: 'connecting', attempt: 1 }, true)).toBe(true);
+    expect(isMissing({ phase: 'connecting', attempt: 2 }, true)).toBe(true);
+    expect(isMissing({ phase: 'open' }, true)).toBe(false);
+  });
+
+  it('has a moment when the page is opened', () => {
+    expect(isMissing({ phase: 'connecting', attempt: 1 }, false)).toBe(false);
+    expect(isMissing({ phase: 'connecting', attempt: 2 }, false)).toBe(true);
   });
 });

@@ -46,6 +46,15 @@ export function backOff(attempt: number): number {
   return BACK_OFF[Math.min(attempt, BACK_OFF.length) - 1] ?? 3;
 }
 
+/**
+ * Whether the connection is missing: also while it is being tried again. Only the very first attempt, before anything was
+ * heard, has a moment.
+ */
+export function isMissing(state: SocketState, hasHeard: boolean): boolean {
+  if (state.phase === 'open') return false;
+  return state.phase === 'lost' || state.attempt > 1 || hasHeard;
+}
+
 export class LiveSocket {
   private socket: Socket | null = null;
   private isOpen = false;

@@ -7,7 +7,7 @@
 
 import { here } from '../api/client';
 import { asProblem, type Problem } from '../api/problem';
-import { LiveSocket, type SocketState } from '../api/socket';
+import { isMissing, LiveSocket, type SocketState } from '../api/socket';
 import type {
   Job,
   LinkMessage,
@@ -76,6 +76,8 @@ class Live {
   /** Largest lateness of samples in the last second, s. */
   jitter = $state<number | null>(null);
   isOpen: boolean = $derived(this.socket.phase === 'open');
+  /** Whether there is no connection where there was one, or should be. */
+  isMissing: boolean = $derived(isMissing(this.socket, this.silence !== null));
   /** Whether what is shown is not what is: no connection, or no samples although the robot is connected. */
   isStale: boolean = $derived(!this.isOpen || this.sampleAge === null || this.sampleAge > STALE_AFTER);
   isOperator: boolean = $derived(this.me?.role === 'operator');
