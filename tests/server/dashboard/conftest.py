@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -50,14 +51,17 @@ def browser(driver: Playwright) -> Iterator[Browser]:
 
 @pytest.fixture(scope="package")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Service, MockControl]]:
-    """A service, connected to a mock in real time, and the mock's own control port."""
+    """A service, connected to a mock in real time, and the mock's own control port.
+
+    The mock's line has a name that stays when it is pulled and plugged in again, as that of a real cable does.
+    """
     find_chromium()
+    folder = tmp_path_factory.mktemp("dashboard")
     port = parse_port_url("mock://?pty=1&seed=3")
     assert isinstance(port, MockPort)
-    mock = start_mock(port)
+    mock = start_mock(replace(port, arguments=(*port.arguments, "--link", str(folder / "cable"))))
     control = MockControl(mock)
     try:
-        folder = tmp_path_factory.mktemp("dashboard")
         (folder / "daq.toml").write_text("[server]\nconnect_at_start = false\n")  # the tests connect it
         with running_service(folder, mock.url) as service:
             service.until_connected()

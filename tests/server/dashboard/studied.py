@@ -12,7 +12,7 @@ from tests.server.service import Service, running_service
 
 ARM = "mock://?pty=1&lock_step=1&seed=3&modify=coulomb_friction:joint=2,torque=8"
 """Dry friction on joint 2 that the machine file knows nothing of. In lock-step: results depend on no clock."""
-CANDIDATES = ("coulomb_friction", "load_dependent_friction", "stribeck_friction")
+CANDIDATES = ("coulomb_friction", "load_dependent_friction")
 """On a ramp the second is close to the first: another experiment is asked for."""
 RAMP = {"name": "ramp"}
 
@@ -52,7 +52,7 @@ def _studied(service: Service) -> Studied:
 
 
 def diagnosis_request(traces: tuple[str, str]) -> dict[str, Any]:
-    """A small one: three candidates on one joint, one step."""
+    """A small one: two candidates on one joint, one step."""
     return {
         "kind": "diagnose", "traces": [traces[0]], "held_out": [traces[1]], "joints": [2], "most_steps": 1,
         "effects": list(CANDIDATES),
