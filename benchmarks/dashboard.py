@@ -29,7 +29,7 @@ from playwright.sync_api import Browser, CDPSession, Page, sync_playwright
 
 from benchmarks.figures import Figure, at_least, at_most, quantile, show
 from benchmarks.mock_process import started_mock
-from benchmarks.service_process import RunningService, started_service, sway
+from benchmarks.service_process import ROBOT, RunningService, started_service, sway
 
 SCRIPT_TARGET_MS = 6.0
 FRAMES_TARGET = 25.0
@@ -220,13 +220,14 @@ def _watched(service: RunningService, program: str, flags: list[str], seconds: f
 def _move(service: RunningService, seconds: float) -> None:
     """Lets the arm sway for the rest of the measurement. A busy machine may have ended it: the owner of the port does,
     when samples come too late."""
-    service.ask("POST", "/queue/resume", json={})
     if not _is_moving(service):
+        service.ask("POST", "/reset", json={})
+        service.ask("POST", "/queue/resume", json={})
         service.submit(sway(4 * (seconds + WARM_UP) + 40))
 
 
 def _is_moving(service: RunningService) -> bool:
-    return bool(service.ask("GET", "/status")["activity"] == "experiment")
+    return bool(service.ask("GET", f"{service.url}/api/v1/robots/{ROBOT}")["activity"] == "experiment")
 
 
 def _tab(browser: Browser) -> Page:
