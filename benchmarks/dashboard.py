@@ -221,8 +221,8 @@ def _move(service: RunningService, seconds: float) -> None:
     """Lets the arm sway for the rest of the measurement. A busy machine may have ended it: the owner of the port does,
     when samples come too late."""
     if not _is_moving(service):
-        service.ask("POST", "/reset", json={})
-        service.ask("POST", "/queue/resume", json={})
+        for path in ("/reset", "/queue/resume"):
+            service.robot.post(path, json={})  # where it is refused the arm stands still, and the figures say so
         service.submit(sway(4 * (seconds + WARM_UP) + 40))
 
 
