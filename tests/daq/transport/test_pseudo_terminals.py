@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
-import select
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from subprocess import PIPE
 
 import pytest
 
-from daq.transport import Terminal, TransportError, open_endpoint, terminal_at
+from daq.transport import TransportError, open_endpoint, terminal_at
 
 
 @contextmanager
@@ -23,30 +25,53 @@ def _terminal() -> Iterator[tuple[int, str]]:
         os.close(theirs)
 
 
+HOLDER = """
+import os, select, sys
+ours, theirs = os.openpty()
+print(os.ttyname(theirs), flush=True)
+sys.stdin.readline()
+print(len(select.select([ours], [], [], 0)[0]), flush=True)
+"""
+"""A program with a pseudo-terminal, which tells at its end whether anything was sent there."""
+
+
 @contextmanager
-def _later_terminal(name: str, before: Terminal | None) -> Iterator[int]:
-    """One of the same number, made when the file system's clock has gone on: it ticks every few ms."""
-    while True:
-        with _terminal() as (ours, again):
-            assert again == name, "the system gives the lowest free number"
-            if terminal_at(again) != before:
-                yield ours
-                return
+def _another_programs() -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """A pseudo-terminal of another program, and its name."""
+    with subprocess.Popen([sys.executable, "-c", HOLDER], stdin=PIPE, stdout=PIPE, text=True) as program:
+        assert program.stdout is not None
+        yield program, program.stdout.readline().strip()
 
 
 def test_a_connection_does_not_go_on_at_another_programs_terminal_of_the_same_number() -> None:
-    with _terminal() as (ours, name):
+    with _terminal() as (_, name):
         endpoint = open_endpoint(f"serial://{name}")
         endpoint.connect().close()
         endpoint.connect().close()  # the same one again
-        before = terminal_at(name)
     with pytest.raises(TransportError, match="does not exist"):
         endpoint.connect()
-    with _later_terminal(name, before) as ours:
+    with _another_programs() as (program, again):
+        assert again == name, "the system gives the lowest free number"
         with pytest.raises(TransportError, match="another program's terminal now"):
             endpoint.connect()
-        assert not select.select([ours], [], [], 0)[0]
         open_endpoint(f"serial://{name}").connect().close()  # whoever names it now means this one
+        assert program.communicate("end\n")[0].strip() == "0"
+
+
+def test_a_mock_whose_cable_was_pulled_has_a_new_terminal_and_is_the_same() -> None:
+    with _terminal() as (_, name):
+        endpoint = open_endpoint(f"serial://{name}")
+        endpoint.connect().close()
+        before = terminal_at(name)
+    assert before is not None
+    while True:  # until the file system's clock has gone on: it ticks every few ms
+        with _terminal() as (_, again):
+            now = terminal_at(again)
+            assert now is not None
+            assert now.number == before.number
+            if now.made != before.made:
+                endpoint.connect().close()
+                return
 
 
 def test_only_a_numbered_terminal_is_told_from_another() -> None:
