@@ -76,7 +76,9 @@ def _watch(desk: Desk, last: int | None) -> int:
 
 def _carry_out(desk: Desk, order: Long | Quick) -> None:
     if isinstance(order, Quick):
-        desk.speaker.ended(long_orders.answered_quickly(desk, order))
+        answer = long_orders.answered_quickly(desk, order)
+        desk.tell_arm()  # before the answer: who has heard of a reset may resume the queue at once
+        desk.speaker.ended(answer)
         return
     try:
         answer = _moved(desk, order)
