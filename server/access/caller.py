@@ -33,14 +33,17 @@ def caller_of(connection: HTTPConnection) -> Caller | None:
     return found
 
 
+def token_needed() -> ProblemError:
+    """A 401 for somebody who has not said who they are."""
+    advice = "send the header Authorization: Bearer TOKEN; `daq token add` makes one"
+    return ProblemError(401, "token-needed", "this service needs a token", advice, (), {"WWW-Authenticate": "Bearer"})
+
+
 def require_viewer(connection: HTTPConnection) -> Caller:
     """Anybody who may see the robot. Raises a 401."""
     caller = caller_of(connection)
     if caller is None:
-        advice = "send the header Authorization: Bearer TOKEN; `daq token add` makes one"
-        raise ProblemError(
-            401, "token-needed", "this service needs a token", advice, (), {"WWW-Authenticate": "Bearer"}
-        )
+        raise token_needed()
     return caller
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import re
 import secrets
 import time
 from collections.abc import Callable
@@ -16,7 +17,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
 from server import logs
-from server.access.caller import LOCAL, Caller
+from server.access.caller import LOCAL, Caller, token_needed
 from server.access.headers import secure
 from server.access.limits import LARGEST_BODY, Buckets, counted
 from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_known_name
@@ -24,11 +25,11 @@ from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
 from server.problems import ProblemError, response
 
-STOP = "/stop"
-"""The end of the one address that no limit holds up."""
+STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
+"""The one address whose POST no limit of requests holds up."""
+UPLOADS = re.compile(r"/api/v1/robots/[^/]+/(traces|models)")
+"""Addresses whose POST takes a file, and counts its bytes itself."""
 NOT_ALLOWED = 1008
-UPLOADS = ("/traces", "/models")
-"""Ends of addresses that take files, and count their bytes themselves."""
 log = logging.getLogger("server.access")
 
 
@@ -86,8 +87,7 @@ class Gate:
             except ProblemError as problem:
                 await response(Request(scope), problem)(scope, receive, secured)
                 return
-            limited = receive if scope["path"].endswith(UPLOADS) else counted(receive, LARGEST_BODY)
-            await app(scope, limited, secured)
+            await app(scope, receive if _is_post(scope, UPLOADS) else counted(receive, LARGEST_BODY), secured)
         finally:
             seconds = time.perf_counter() - begun
             self.observed(scope["method"], status, seconds)
@@ -107,7 +107,7 @@ class Gate:
 
     async def _admit(self, scope: Scope) -> Caller | None:
         """Who calls. Raises a 401, 403, 413 or 429."""
-        headers, path = Headers(scope=scope), scope["path"]
+        headers = Headers(scope=scope)
         changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS
         if not is_known_name(headers.get("host", ""), self.names, loopback_only=self.open_on_loopback):
             line = f"this service is not called {headers.get('host', '')!r:.100}"
@@ -116,10 +116,12 @@ class Gate:
             line = f"a page of another origin ({headers.get('origin')!r:.100}) may not do this"
             raise ProblemError(403, "other-origin", line, "use the page that this service serves")
         caller = await self._caller(scope, headers)
-        if not path.endswith(STOP):
+        if not _is_post(scope, STOP):
             self._count(caller, scope)
+        if caller is None and changes and scope["type"] == "http":
+            raise token_needed()  # before anything of a body is read, which the routes would do first
         length = headers.get("content-length", "0")
-        if not path.endswith(UPLOADS) and (not length.isdecimal() or int(length) > LARGEST_BODY):
+        if not _is_post(scope, UPLOADS) and (not length.isdecimal() or int(length) > LARGEST_BODY):
             raise ProblemError(413, "too-large", f"a body may have {LARGEST_BODY >> 20} MB", "send less at once")
         return caller
 
@@ -157,6 +159,10 @@ class Gate:
         name = caller.name if caller else None
         extra = {"caller": name, "status": status, "ms": round(1000 * seconds, 1)}
         log.log(level, "%s %s", scope["method"], scope["path"], extra=extra)
+
+
+def _is_post(scope: Scope, address: re.Pattern[str]) -> bool:
+    return scope.get("method") == "POST" and address.fullmatch(scope["path"]) is not None
 
 
 _BEARER = {"WWW-Authenticate": "Bearer"}
