@@ -124,8 +124,9 @@ describe('the live socket', () => {
     expect(states.at(-1)).toMatchObject({ phase: 'lost', why: 'the service ends' });
     await clock.pass(backOff(1));
     expect(newest().ticket).toBe('ticket-2');
+    expect(states).toContainEqual({ phase: 'open', again: false });
     newest().opens();
-    expect(phase()).toBe('open');
+    expect(states.at(-1)).toEqual({ phase: 'open', again: true });
     expect(newest().sent).toHaveLength(1);
   });
 
@@ -214,7 +215,7 @@ describe('a connection that is missing', () => {
     expect(isMissing({ phase: 'lost', attempt: 0, why: '', retryAt: 1 }, true)).toBe(true);
     expect(isMissing({ phase: 'connecting', attempt: 1 }, true)).toBe(true);
     expect(isMissing({ phase: 'connecting', attempt: 2 }, true)).toBe(true);
-    expect(isMissing({ phase: 'open' }, true)).toBe(false);
+    expect(isMissing({ phase: 'open', again: true }, true)).toBe(false);
   });
 
   it('has a moment when the page is opened', () => {

@@ -17,7 +17,8 @@ export const OPEN_WITHIN = 6;
 
 export type SocketState =
   | { phase: 'connecting'; attempt: number }
-  | { phase: 'open' }
+  /** `again`: it was open before, so that something may have been missed. */
+  | { phase: 'open'; again: boolean }
   | { phase: 'lost'; attempt: number; why: string; retryAt: number };
 
 /** The part of a WebSocket that is used. */
@@ -64,6 +65,7 @@ export class LiveSocket {
   private turn = 0;
   private cancelTimer: () => void = () => {};
   private ended = false;
+  private wasOpen = false;
 
   constructor(private readonly parts: SocketParts) {}
 
@@ -111,7 +113,8 @@ export class LiveSocket {
       this.isOpen = true;
       this.attempt = 0;
       this.heard = this.parts.now();
-      this.parts.state({ phase: 'open' });
+      this.parts.state({ phase: 'open', again: this.wasOpen });
+      this.wasOpen = true;
       this.send(this.parts.wanted());
       this.listen();
     };

@@ -48,6 +48,11 @@ const seconds = (): number => performance.now() / 1000;
 
 class Live {
   socket = $state.raw<SocketState>({ phase: 'connecting', attempt: 0 });
+  /**
+   * How often the connection has come back. Whoever has loaded a list reads it in an effect and loads anew when it
+   * changes: messages about what happened meanwhile do not come later.
+   */
+  healed = $state(0);
   /** Set when the page cannot be used at all: no token, no service. */
   problem = $state.raw<Problem | null>(null);
   machine = $state.raw<Machine | null>(null);
@@ -167,6 +172,7 @@ class Live {
       frame: (frame, at) => this.hear(frame, at),
       state: (state) => {
         this.socket = state;
+        if (state.phase === 'open' && state.again) this.healed += 1;
       },
       now: seconds,
       after: (wait, call) => {
