@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import bisect
 import threading
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class RoundTrips:
 
 @dataclass(frozen=True)
 class LinkCounters:
-    """All since the link was opened."""
+    """All since the link was opened, or since a moment that was marked."""
 
     requests: int = 0
     """Transactions begun."""
@@ -66,6 +67,16 @@ _EDGES_S = tuple(_FINEST_S * _STEP**i for i in range(120))
 """Upper edges of the histogram's classes: 10 µs to 0.84 s, each a tenth above the one before."""
 
 
+@dataclass(frozen=True)
+class Mark:
+    """What had been counted by a moment; nothing, by default."""
+
+    counts: Mapping[str, int] = field(default_factory=lambda: dict.fromkeys(COUNTED, 0))
+    damaged: int = 0
+    trips: tuple[int, ...] = (0,) * (len(_EDGES_S) + 1)
+    trip_sum_s: float = 0.0
+
+
 class Tally:
     """The counters while they run; safe to use from any thread."""
 
@@ -88,24 +99,33 @@ class Tally:
             self._trip_sum_s += seconds
             self._trip_max_s = max(self._trip_max_s, seconds)
 
-    def snapshot(self, damaged: int) -> LinkCounters:
-        """All counters at this moment; `damaged` is the dialect's own count."""
+    def mark(self, damaged: int) -> Mark:
+        """This moment, to count from; `damaged` is the dialect's own count."""
         with self._lock:
-            return LinkCounters(**self._counts, damaged=damaged, round_trips=self._summary())
+            return Mark(dict(self._counts), damaged, tuple(self._trips), self._trip_sum_s)
 
-    def _summary(self) -> RoundTrips:
-        count = sum(self._trips)
+    def snapshot(self, damaged: int, since: Mark | None = None) -> LinkCounters:
+        """All counters at this moment, from the beginning or from a mark; `damaged` is the dialect's own count."""
+        before = since or Mark()
+        with self._lock:
+            counts = {name: count - before.counts[name] for name, count in self._counts.items()}
+            return LinkCounters(**counts, damaged=damaged - before.damaged, round_trips=self._summary(before))
+
+    def _summary(self, before: Mark) -> RoundTrips:
+        trips = [now - then for now, then in zip(self._trips, before.trips, strict=True)]
+        count = sum(trips)
         if not count:
             return RoundTrips()
-        return RoundTrips(
-            count, self._trip_sum_s / count, self._quantile(0.5 * count), self._quantile(0.99 * count), self._trip_max_s
-        )
+        mean = (self._trip_sum_s - before.trip_sum_s) / count
+        longest = self._quantile(trips, count)
+        return RoundTrips(count, mean, self._quantile(trips, 0.5 * count), self._quantile(trips, 0.99 * count), longest)
 
-    def _quantile(self, wanted: float) -> float:
-        """Upper edge (s) of the class in which the `wanted`-th round trip lies; within 10 % of its time."""
+    def _quantile(self, trips: Sequence[int], wanted: float) -> float:
+        """Upper edge (s) of the class in which the `wanted`-th round trip lies; within 10 % of its time. No longer than
+        the longest of all."""
         seen = 0
-        for edge, trips in zip(_EDGES_S, self._trips, strict=False):
-            seen += trips
+        for edge, count in zip(_EDGES_S, trips, strict=False):
+            seen += count
             if seen >= wanted:
                 return min(edge, self._trip_max_s)
         return self._trip_max_s

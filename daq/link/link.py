@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import Protocol, Self, TypeVar
 
 from daq.link.connection import Connection
-from daq.link.counters import LinkCounters, Tally
+from daq.link.counters import LinkCounters, Mark, Tally
 from daq.link.errors import LinkError, LinkLostError, RequestRefusedError
 from daq.link.timed_exchange import TimedExchange
 from daq.link.timing import CLEAN_TRANSACTIONS, LinkTiming
@@ -103,6 +103,14 @@ class Link:
     def counters(self) -> LinkCounters:
         """Everything counted so far."""
         return self.tally.snapshot(self._connection.damaged)
+
+    def mark(self) -> Mark:
+        """This moment, for `counters_since`."""
+        return self.tally.mark(self._connection.damaged)
+
+    def counters_since(self, mark: Mark) -> LinkCounters:
+        """What the link has been through since then."""
+        return self.tally.snapshot(self._connection.damaged, mark)
 
     def set_period(self, period_s: float) -> None:
         """Tells the control period, for which `Sample` may have to wait."""

@@ -134,6 +134,7 @@ def _record(run: Arrangement, prepared: Prepared, changes: tuple[GainChange, ...
     follower = Follower(
         run.controller, run.control, run.machine, run.limits, prepared.joints, recorder, run.outside.ended
     )
+    begun = run.controller.link.mark()
     with writer, run.control.frozen_on_error():
         for change in changes:
             follower.tell("gains", change.message)
@@ -146,7 +147,7 @@ def _record(run: Arrangement, prepared: Prepared, changes: tuple[GainChange, ...
             if ending.kind != "lost":
                 follower.observe(round(AFTERMATH / run.controller.period_s))
         outcome = _outcome(ending, run.outside.interrupted())
-        counters = run.controller.counters.numbers()
+        counters = run.controller.link.counters_since(begun).numbers()
         path = writer.close(outcome, counters)
     return RunResult(outcome, ending.cause, path, recorder.samples, recorder.missing, counters)
 
