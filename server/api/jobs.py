@@ -198,4 +198,8 @@ def delete_model(model: Identity, one: RobotPart, found: ServicesPart, who: Oper
 
 
 def _taken_in(text: bytes, name: str, one: RobotServices, found: Services, by: str) -> ModelEntry:
-    return found.models.get(one.robot.name, one.models.take_in_text(text, name, by))
+    try:
+        return found.models.get(one.robot.name, one.models.take_in_text(text, name, by))
+    except RecursionError:
+        line, advice = "the body is nested too deeply", "send a file as `daq fit` writes it"
+        raise ProblemError(422, "not-a-model", line, advice) from None

@@ -6,14 +6,18 @@ to a thread and back, which under load costs more than most answers.
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from typing import Annotated
 
 from fastapi import Depends, Header, Path, Query
+from pydantic import AfterValidator
 from starlette.requests import HTTPConnection
 
 from daq.contracts.service.base import PageLimit
 from server.access.caller import Caller, require_operator, require_viewer
+from server.problems import ProblemError
 from server.services import RobotServices, Services
+from server.store.pages import Cursor
 
 
 def services(connection: HTTPConnection) -> Services:
@@ -51,8 +55,24 @@ async def _operator(connection: HTTPConnection) -> Caller:
 Viewer = Annotated[Caller, Depends(_viewer)]
 Operator = Annotated[Caller, Depends(_operator)]
 
+
+def _of_a_list(cursor: str | None) -> str | None:
+    """Raises ValueError for one that no list can have given out: its number is a row's or a moment's, its identity can
+    be written down."""
+    if cursor is not None:
+        try:
+            place = Cursor.parse(cursor)
+            datetime.fromtimestamp(place.number, UTC)
+            place.identity.encode()
+        except (ProblemError, ValueError, OverflowError, OSError):
+            raise ValueError("is none that a list gave out; begin without one") from None
+    return cursor
+
+
 Limit = Annotated[PageLimit, Query(description="Length of this part of the list.")]
-CursorOf = Annotated[str | None, Query(max_length=200, description="`next` of the part before.")]
+CursorOf = Annotated[
+    str | None, AfterValidator(_of_a_list), Query(max_length=200, description="`next` of the part before.")
+]
 IdempotencyKey = Annotated[
     str | None,
     Header(min_length=1, max_length=200, description="Sent again with the same request, it is carried out once."),

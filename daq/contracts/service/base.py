@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from typing import Annotated, Generic, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field
 
 
 class Wire(BaseModel):
@@ -13,6 +14,16 @@ class Wire(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+def _has_utc(moment: datetime) -> datetime:
+    try:
+        moment.astimezone(UTC)
+    except OverflowError:
+        raise ValueError("lies outside the years 1 to 9999, UTC") from None
+    return moment
+
+
+Moment = Annotated[AwareDatetime, AfterValidator(_has_utc)]
+"""A moment that a client names, with its time zone: moments are compared and kept in UTC."""
 T = TypeVar("T")
 PageLimit = Annotated[int, Field(ge=1, le=500)]
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import AwareDatetime, Field
 
 from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.service.base import Wire
+from daq.contracts.service.base import Moment, Wire
 from daq.contracts.trace import EventKind, Outcome
 
 ExperimentState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
@@ -27,7 +27,7 @@ class ExperimentRequest(Wire):
     """What is to be run. `at`: not before this moment (with its time zone); None for as soon as possible."""
 
     spec: ExperimentSpec = ExperimentSpec()
-    at: AwareDatetime | None = None
+    at: Moment | None = None
     priority: Priority = 0
 
 
@@ -75,7 +75,7 @@ class ScheduleRequest(Wire):
     spec: ExperimentSpec = ExperimentSpec()
     every: Interval
     """s from one run to the next."""
-    starts: AwareDatetime | None = None
+    starts: Moment | None = None
     """The first run; None for at once."""
     count: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
     """How many runs; None for no end."""

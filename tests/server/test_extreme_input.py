@@ -1,0 +1,44 @@
+"""Input that fits its type and yet nothing can be done with: refused with its field, and never a fault."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+import pytest
+
+from tests.server.service import Service
+
+NO_MOMENTS = ["9999-12-31T23:59:59-12:00", "0001-01-01T00:00:00+12:00"]
+"""Of time zones; in UTC there are none such."""
+
+
+@pytest.mark.parametrize("moment", NO_MOMENTS)
+@pytest.mark.parametrize(("path", "field"), [("/experiments", "at"), ("/schedules", "starts")])
+def test_a_moment_that_utc_does_not_have_is_refused(service: Service, path: str, field: str, moment: str) -> None:
+    answer = service.robot.post(path, json={"every": 3600, field: moment} if field == "starts" else {field: moment})
+    assert (answer.status_code, answer.json()["fields"][0]["field"]) == (422, field), answer.text
+    assert "years 1 to 9999" in answer.json()["detail"]
+
+
+def _cursor(text: str) -> str:
+    return base64.urlsafe_b64encode(text.encode()).decode()
+
+
+@pytest.mark.parametrize("path", ["/traces", "/models", "/experiments", "/events", "/jobs", "/schedules"])
+@pytest.mark.parametrize(
+    "cursor",
+    [_cursor('[1e18, "x"]'), _cursor('[-1e18, "x"]'), _cursor('[1, "\\ud800"]'), _cursor("[1"), _cursor("1"), "é", ""],
+)
+def test_a_cursor_that_no_list_gave_out_is_refused(service: Service, path: str, cursor: str) -> None:
+    answer = service.robot.get(path, params={"cursor": cursor})
+    assert (answer.status_code, [one["field"] for one in answer.json()["fields"]]) == (422, ["cursor"]), answer.text
+
+
+@pytest.mark.parametrize("body", [b"[" * 50_000, b'{"a":' * 50_000])
+def test_a_body_nested_beyond_measure_is_refused(service: Service, body: bytes) -> None:
+    headers: dict[str, Any] = {"Content-Type": "application/json"}
+    model = service.robot.post("/models", params={"name": "x"}, content=body, headers=headers)
+    assert (model.status_code, model.json()["type"]) == (422, "docs/service.md#not-a-model"), model.text
+    experiment = service.robot.post("/experiments", content=body, headers=headers)
+    assert experiment.status_code in (400, 422), experiment.text
