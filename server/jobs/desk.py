@@ -14,6 +14,8 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExec
 from dataclasses import dataclass
 from pathlib import Path
 
+from sqlalchemy.exc import OperationalError
+
 from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import MACHINE, DiagnoseRequest, FitRequest, Job, JobRequest
 from server.catalogue.catalogue import Catalogue
@@ -22,7 +24,7 @@ from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox, Reporte
 from server.jobs.models import Models
 from server.jobs.work import Ended, Task, carry_out
 from server.jobs.yielding import begin_worker
-from server.problems import conflict, not_found
+from server.problems import ProblemError, conflict, not_found
 from server.queue.states import Event
 from server.store.jobs import JobStore, models_of, traces_of
 
@@ -91,11 +93,14 @@ class JobDesk:
     def cancel(self, identity: str, by: str) -> Job:
         """Takes back what waits; asks what runs to end. Raises a 404, and a 409 for what has ended."""
         parts = self._parts
-        job = parts.jobs.get(parts.robot, identity)
-        if job.state == "running":
+        try:
+            job = parts.jobs.change(parts.robot, identity, Event.CANCELLED, parts.clock.utc(), f"cancelled by {by}")
+        except ProblemError:  # it does not wait, or not any more
+            job = parts.jobs.get(parts.robot, identity)
+            if job.state != "running":
+                raise
             Mailbox(self._folder(identity)).cancel()
             return self.as_told(job)
-        job = parts.jobs.change(parts.robot, identity, Event.CANCELLED, parts.clock.utc(), f"cancelled by {by}")
         self._tell(job)
         return job
 
@@ -155,6 +160,7 @@ class JobDesk:
         told: dict[str, Reported] = {}
         while not self._closing:
             self._wake.clear()
+            failed = False
             try:
                 self._collect()
                 self._begin()
@@ -162,28 +168,50 @@ class JobDesk:
             except Exception:
                 # A disk that is full, a database that is locked: the next look may go better.
                 log.exception("jobs")
-            self._wake.wait(LOOK_EVERY if self._running else None)
+                failed = True
+            self._wake.wait(LOOK_EVERY if self._running or failed else None)
 
     def _begin(self) -> None:
         parts = self._parts
-        for job in parts.jobs.waiting(parts.robot)[: max(0, parts.at_once - len(self._running))]:
-            if self._executor is None:
-                self._executor = parts.make_executor(parts.at_once)
-            try:
-                future = self._executor.submit(carry_out, self._folder(job.id))
-            except BrokenExecutor:
-                self._executor = None
-                self._wake.set()
+        for job in parts.jobs.waiting(parts.robot):
+            if sum(not future.done() for future in self._running.values()) >= parts.at_once:
                 return
-            self._running[job.id] = future
-            self._tell(parts.jobs.change(parts.robot, job.id, Event.TAKEN, parts.clock.utc()))
+            try:  # its state first: what is cancelled before that is never computed
+                begun = parts.jobs.change(parts.robot, job.id, Event.TAKEN, parts.clock.utc())
+            except ProblemError:  # cancelled in this moment
+                continue
+            self._running[job.id] = future = self._handed_over(job.id)
+            self._tell(begun)
             future.add_done_callback(lambda _future: self._wake.set())
 
+    def _handed_over(self, identity: str) -> Future[Ended]:
+        """The job in the executor; in a new one where the end of a worker has broken the one there was."""
+        for _ in range(2):
+            if self._executor is None:
+                self._executor = self._parts.make_executor(self._parts.at_once)
+            try:
+                return self._executor.submit(carry_out, self._folder(identity))
+            except BrokenExecutor:
+                self._executor = None
+            except Exception as error:
+                log.exception("job %s: no worker takes it", identity)
+                return _failed(error)
+        return _failed(BrokenExecutor())
+
     def _collect(self) -> None:
+        """Ends what has been computed. One whose end cannot be written holds up no other."""
         for identity, future in list(self._running.items()):
-            if future.done():
+            if not future.done():
+                continue
+            try:
                 self._end(identity, future)
-                del self._running[identity]
+            except (OSError, OperationalError) as error:
+                # A disk that is full, a database that is locked: the next look may go better.
+                log.warning("job %s: its end is not written yet: %s", identity, error)
+                continue
+            except Exception:
+                log.exception("job %s: its end cannot be written", identity)
+            del self._running[identity]
 
     def _end(self, identity: str, future: Future[Ended]) -> None:
         parts = self._parts
@@ -195,26 +223,30 @@ class JobDesk:
             event, reason = Event.LOST, "its worker process ended: it was killed, or the memory did not suffice"
         except Exception as error:
             log.exception("job %s", identity)
-            event, reason = Event.FAULT, f"program fault: {type(error).__name__}: {error}"
+            event, reason = Event.FAULT, _fault(error)
         else:
             if ended.cancelled:
                 event, reason = Event.STOPPED, "cancelled while it ran"
             elif ended.problem:
                 event, reason = Event.REFUSED, ended.problem
             else:
-                headline = ended.headline
-                model = None if ended.model is None else self._keep_model(identity)
+                try:
+                    model = None if ended.model is None else self._keep_model(identity)
+                    headline = ended.headline
+                except (OSError, OperationalError):
+                    raise
+                except Exception as error:
+                    log.exception("job %s: its model", identity)
+                    event, reason = Event.FAULT, _fault(error)
         self._tell(parts.jobs.change(parts.robot, identity, event, parts.clock.utc(), reason, model, headline))
+        (self._folder(identity) / MODEL).unlink(missing_ok=True)  # not sooner: its end may have to be written again
 
     def _keep_model(self, identity: str) -> str:
         parts = self._parts
         job = parts.jobs.get(parts.robot, identity)
         name = job.request.name if isinstance(job.request, FitRequest | DiagnoseRequest) else None
         path = self._folder(identity) / MODEL
-        try:
-            return parts.models.take_in(path, name or f"{job.request.kind} {identity}", job.submitted_by, identity)
-        finally:
-            path.unlink(missing_ok=True)
+        return parts.models.take_in(path, name or f"{job.request.kind} {identity}", job.submitted_by, identity)
 
     def _tell_progress(self, told: dict[str, Reported]) -> None:
         for identity in self._running:
@@ -222,6 +254,16 @@ class JobDesk:
             if reported is not None and told.get(identity) != reported:
                 told[identity] = reported
                 self._tell(self._parts.jobs.get(self._parts.robot, identity))
+
+
+def _failed(error: Exception) -> Future[Ended]:
+    future: Future[Ended] = Future()
+    future.set_exception(error)
+    return future
+
+
+def _fault(error: Exception) -> str:
+    return f"program fault: {type(error).__name__}: {error}"
 
 
 __all__ = ["REPORT", "RESULT", "JobDesk", "JobParts", "worker_processes"]

@@ -1,0 +1,263 @@
+"""The desk of jobs with an executor that tests hold by hand: what meets in one moment, and what goes wrong once."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Executor, Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy.exc import OperationalError
+
+from daq.contracts.machine import load_machine
+from daq.contracts.service.jobs import CompareRequest, FitRequest, Job
+from model.machine_model.model import base_model
+from server.catalogue.catalogue import Catalogue
+from server.jobs.desk import JobDesk, JobParts
+from server.jobs.mailbox import CANCEL, MODEL
+from server.jobs.models import Models
+from server.jobs.work import Ended
+from server.queue.states import Event
+from server.store.engine import Store
+from server.store.experiments import ExperimentStore
+from server.store.jobs import JobStore
+from server.store.models import ModelStore
+from server.store.traces import TraceStore
+from tests.server.clocks import HandClock
+from tests.server.test_store import _trace
+
+MACHINE = load_machine("ma2000")
+TRACE = f"{1:012x}"
+COMPARE = CompareRequest(traces=(TRACE,), models=("machine",))
+
+
+class HandExecutor(Executor):
+    """Does what it is given as `carry_out` of a test does, at once; `given` are the jobs that it was given."""
+
+    def __init__(self, carry_out: Callable[[Path], Ended]) -> None:
+        self.given: list[str] = []
+        self._carry_out = carry_out
+
+    def submit(self, _function: Any, /, *args: Any, **_named: Any) -> Future[Any]:
+        """As an executor's."""
+        (folder,) = args
+        self.given.append(folder.name)
+        future: Future[Any] = Future()
+        future.set_result(self._carry_out(folder))
+        return future
+
+
+class Bench:
+    """A desk, its stores, and everything that it has told."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder / "jobs"
+        self.store = Store(f"sqlite:///{folder / 'service.sqlite'}")
+        self.store.migrate()
+        self.jobs = JobStore(self.store)
+        self.clock = HandClock()
+        self.traces = TraceStore(self.store)
+        traces = folder / "traces"
+        traces.mkdir()
+        self.catalogue = Catalogue(traces, "ma2000", self.traces, ExperimentStore(self.store))
+        self.traces.insert(_trace(1))
+        (traces / "1.mcap").touch()
+        self.models = Models(folder / "models", "ma2000", MACHINE, ModelStore(self.store), self.clock)
+        self.carry_out: Callable[[Path], Ended] = lambda _folder: Ended(headline="found")
+        self.executor = HandExecutor(self._carry_out)
+        self.make_executor: Callable[[int], Executor] = lambda _count: self.executor
+        self._changed = threading.Condition()
+        self.told: list[Job] = []
+        self.desk = JobDesk(
+            JobParts(
+                robot="ma2000", machine=MACHINE, folder=self.folder, jobs=self.jobs, catalogue=self.catalogue,
+                models=self.models, clock=self.clock, changed=self._hear, at_once=1,
+                make_executor=self._make_executor,
+            )
+        )  # fmt: skip
+
+    def _carry_out(self, folder: Path) -> Ended:
+        return self.carry_out(folder)  # as it is then
+
+    def _make_executor(self, count: int) -> Executor:
+        return self.make_executor(count)
+
+    def _hear(self, job: Job) -> None:
+        with self._changed:
+            self.told.append(job)
+            self._changed.notify_all()
+
+    def end_of(self, job: Job) -> Job:
+        """Waits for it; the test's own time limit ends the wait."""
+        with self._changed:
+            self._changed.wait_for(lambda: self.state_of(job) not in ("queued", "running"))
+        return self.jobs.get("ma2000", job.id)
+
+    def state_of(self, job: Job) -> str:
+        """As the database says."""
+        return self.jobs.get("ma2000", job.id).state
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    """Its desk not yet begun: what is submitted waits."""
+    made = Bench(tmp_path)
+    yield made
+    made.desk.close(10)
+    made.store.close()
+
+
+def _submitted(bench: Bench) -> Job:
+    return bench.desk.submit(COMPARE, "anna", None)[0]
+
+
+def test_a_job_is_running_before_a_worker_has_it(bench: Bench) -> None:
+    job = _submitted(bench)
+    seen: list[str] = []
+
+    def carry_out(_folder: Path) -> Ended:
+        seen.append(bench.state_of(job))
+        return Ended()
+
+    bench.carry_out = carry_out
+    bench.desk.start()
+    assert bench.end_of(job).state == "done"
+    assert seen == ["running"]
+
+
+def test_a_job_that_is_cancelled_as_it_is_handed_over_is_told_to_end_and_the_next_begins(bench: Bench) -> None:
+    def carry_out(folder: Path) -> Ended:
+        if folder.name != first.id:
+            return Ended()
+        assert bench.desk.cancel(first.id, "anna").state == "running"
+        return Ended(cancelled=(folder / CANCEL).exists())
+
+    bench.carry_out = carry_out
+    first, second = _submitted(bench), _submitted(bench)
+    bench.desk.start()
+    assert bench.end_of(second).state == "done"
+    assert bench.end_of(first).state == "cancelled"
+
+
+def test_a_job_that_is_cancelled_just_before_it_is_taken_is_never_computed(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = _submitted(bench), _submitted(bench)
+    waiting = bench.jobs.waiting
+
+    def then_cancelled(robot: str) -> list[Job]:
+        found = waiting(robot)
+        monkeypatch.setattr(bench.jobs, "waiting", waiting)
+        bench.desk.cancel(first.id, "anna")
+        return found
+
+    monkeypatch.setattr(bench.jobs, "waiting", then_cancelled)
+    bench.desk.start()
+    assert bench.end_of(second).state == "done"
+    assert bench.state_of(first) == "cancelled"
+    assert bench.executor.given == [second.id]
+
+
+def test_a_job_that_begins_while_it_is_being_cancelled_is_told_to_end(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = _submitted(bench)
+    change = bench.jobs.change
+
+    def taken_first(*args: Any, **named: Any) -> Job:
+        monkeypatch.setattr(bench.jobs, "change", change)
+        change("ma2000", job.id, Event.TAKEN, bench.clock.utc())
+        return change(*args, **named)
+
+    monkeypatch.setattr(bench.jobs, "change", taken_first)
+    assert bench.desk.cancel(job.id, "anna").state == "running"
+    assert (bench.folder / job.id / CANCEL).exists()
+
+
+def test_a_worker_that_cannot_be_had_ends_its_job_and_no_other(bench: Bench) -> None:
+    class Refusing(HandExecutor):
+        def submit(self, _function: Any, /, *args: Any, **named: Any) -> Future[Any]:
+            if not self.given:
+                self.given.append(args[0].name)
+                raise OSError("no process any more")
+            return super().submit(_function, *args, **named)
+
+    bench.executor = Refusing(lambda _folder: Ended())
+    first, second = _submitted(bench), _submitted(bench)
+    bench.desk.start()
+    assert bench.end_of(second).state == "done"
+    assert bench.end_of(first).reason == "program fault: OSError: no process any more"
+
+
+def test_a_job_whose_executor_is_broken_is_given_to_a_new_one(bench: Bench) -> None:
+    class Broken(HandExecutor):
+        def submit(self, _function: Any, /, *args: Any, **named: Any) -> Future[Any]:
+            raise BrokenExecutor
+
+    executors = [Broken(lambda _folder: Ended()), bench.executor]
+    bench.make_executor = lambda _count: executors.pop(0)
+    job = _submitted(bench)
+    bench.desk.start()
+    assert bench.end_of(job).state == "done"
+
+
+def _makes_a_model(folder: Path) -> Ended:
+    mass = next(one for one in base_model(MACHINE).parameters if one.name.endswith("mass"))
+    model = base_model(MACHINE).with_values({mass.name: 1.01 * mass.value})
+    (folder / MODEL).write_text(model.model_dump_json(), "utf-8")
+    return Ended(model=model.identity, headline="fitted")
+
+
+def test_a_model_that_could_not_be_kept_at_once_is_kept_at_the_next_look(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.carry_out = _makes_a_model
+    take_in = bench.models.take_in
+    refused: list[bool] = []
+
+    def fails_once(*args: Any) -> str:
+        if not refused:
+            refused.append(True)
+            raise OperationalError("INSERT", {}, Exception("database or disk is full"))
+        return take_in(*args)
+
+    monkeypatch.setattr(bench.models, "take_in", fails_once)
+    job = bench.desk.submit(FitRequest(traces=(TRACE,)), "anna", None)[0]
+    bench.desk.start()
+    ended = bench.end_of(job)
+    assert (ended.state, ended.headline) == ("done", "fitted")
+    assert ended.model is not None
+    assert bench.models.path_of(ended.model).is_file()
+    assert refused
+
+
+@pytest.mark.parametrize("error", [ValueError("no model"), OSError("read-only")])
+def test_a_model_that_can_never_be_kept_holds_up_no_other_job(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def fails(*_args: Any) -> str:
+        raise error
+
+    monkeypatch.setattr(bench.models, "take_in", fails)
+    bench.carry_out = lambda folder: _makes_a_model(folder) if folder.name == first.id else Ended()
+    first = bench.desk.submit(FitRequest(traces=(TRACE,)), "anna", None)[0]
+    second = _submitted(bench)
+    bench.desk.start()
+    assert bench.end_of(second).state == "done"
+    if isinstance(error, ValueError):  # nothing that another look could mend
+        assert bench.end_of(first).reason == "program fault: ValueError: no model"
+
+
+def test_what_could_not_be_begun_is_begun_at_the_next_look(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    waiting = bench.jobs.waiting
+
+    def locked(_robot: str) -> list[Job]:
+        monkeypatch.setattr(bench.jobs, "waiting", waiting)
+        raise OperationalError("SELECT", {}, Exception("database is locked"))
+
+    job = _submitted(bench)
+    monkeypatch.setattr(bench.jobs, "waiting", locked)
+    bench.desk.start()
+    assert bench.end_of(job).state == "done"
