@@ -3,13 +3,13 @@
 import {
   api,
   ask,
-  asProblem,
   here,
   type ExperimentPreset,
   type ExperimentSpec,
   type MotionPreview,
   type Problem,
 } from '../../lib/api';
+import { MotionCheck, type Check } from '../../lib/trajectory/check';
 import type { Schema } from '../../lib/trajectory/fields';
 import {
   formField,
@@ -22,18 +22,17 @@ import {
   type SpecRules,
 } from '../../lib/trajectory/form';
 
-/** ms without a key before the motion is asked for. */
-const QUIET = 250;
-
 export class Draft {
   form: SpecForm = $state()!;
   /** The preset that the fields were filled with, while nothing has been changed. */
   preset = $state('');
+  /** What the service says to what is in the fields now. */
+  check = $state.raw<Check<MotionPreview>>({ state: 'unreadable' });
+  /** The last motion that the service worked out; of what is in the fields only while `isCurrent`. */
   motion = $state.raw<MotionPreview | null>(null);
+  isCurrent: boolean = $derived(this.check.state === 'checked');
   /** Why the service cannot work out the motion. */
-  problem = $state.raw<Problem | null>(null);
-  /** Whether `motion` is that of what is in the fields now. */
-  isCurrent = $state(false);
+  problem: Problem | null = $derived(this.check.state === 'failed' ? this.check.problem : null);
   /** The specification as text, while it is edited so; the fields wait meanwhile. */
   text = $state<string | null>(null);
   result: FormResult = $derived.by(() =>
@@ -44,8 +43,14 @@ export class Draft {
     ...this.told(),
     ...this.result.problems,
   }));
-  private asked = 0;
-  private timer: ReturnType<typeof setTimeout> | undefined;
+  private readonly checking = new MotionCheck<ExperimentSpec, MotionPreview>({
+    ask: previewed,
+    after: (seconds, call) => {
+      const timer = setTimeout(call, seconds * 1000);
+      return () => clearTimeout(timer);
+    },
+    told: (check) => this.hear(check),
+  });
 
   constructor(
     readonly rules: SpecRules,
@@ -84,7 +89,7 @@ export class Draft {
   /** Back to the fields. Whether that was possible: only a specification that the service accepts has fields. */
   toFields(): boolean {
     const spec = this.result.spec;
-    if (spec === null || !this.isCurrent || this.motion === null) return false;
+    if (spec === null || !this.isCurrent) return false;
     const preset = this.preset;
     this.text = null;
     this.take(spec);
@@ -96,42 +101,27 @@ export class Draft {
     return this.result.spec as unknown as ExperimentSpec | null;
   }
 
-  /** Whether it may be sent: checked by the service, and nothing speaks against it. */
-  get isAllowed(): boolean {
-    return this.isCurrent && this.motion !== null && this.motion.violations.length === 0;
+  /** Has the motion checked when typing has paused: for an effect that follows `spec`. */
+  checkSoon(spec: ExperimentSpec | null): () => void {
+    this.checking.changed(spec);
+    return () => this.checking.leave();
   }
 
-  /** Works the motion out anew when typing has paused; for an effect that follows `result`. */
-  previewSoon(spec: ExperimentSpec | null): () => void {
-    this.isCurrent = false;
-    clearTimeout(this.timer);
-    if (spec === null) return () => {};
-    this.timer = setTimeout(() => void this.preview(spec), QUIET);
-    return () => clearTimeout(this.timer);
-  }
-
-  private async preview(spec: ExperimentSpec): Promise<void> {
-    const turn = ++this.asked;
-    try {
-      const body = { spec, priority: 0 };
-      const motion = await ask(
-        api.POST('/api/v1/robots/{robot}/experiments/preview', { params: { path: here() }, body }),
-      );
-      if (turn !== this.asked) return;
-      this.motion = motion;
-      this.problem = null;
-    } catch (error) {
-      if (turn !== this.asked) return;
-      this.motion = null;
-      this.problem = asProblem(error);
-    }
-    this.isCurrent = true;
+  private hear(check: Check<MotionPreview>): void {
+    this.check = check;
+    if (check.state === 'checked') this.motion = check.motion;
+    if (check.state === 'failed') this.motion = null;
   }
 
   private told(): Record<string, string> {
-    if (!this.isCurrent || this.problem === null) return {};
+    if (this.problem === null) return {};
     return Object.fromEntries(this.problem.fields.map((one) => [formField(one.field), one.message]));
   }
+}
+
+async function previewed(spec: ExperimentSpec): Promise<MotionPreview> {
+  const body = { spec, priority: 0 };
+  return ask(api.POST('/api/v1/robots/{robot}/experiments/preview', { params: { path: here() }, body }));
 }
 
 function written(spec: Partial<Spec>): string {
