@@ -76,3 +76,5 @@ class Keeper:
                 self._robot.connect()
             except DaqError as error:
                 log.warning("robot %s: %s", self._robot.name, error)
+            except Exception:  # whatever it is, it is tried again: nobody else would
+                log.exception("robot %s", self._robot.name)

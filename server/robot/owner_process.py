@@ -81,22 +81,30 @@ class OwnerProcess:
         return not self._thread.is_alive()
 
     def _listen(self) -> None:
+        assert self._process.stdin is not None
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            report = REPORT.validate_json(line)
-            if isinstance(report, Answer):
-                future = self._asked.pop(report.number, None)
-                if future is not None:
-                    future.set_result(report)
-            else:
-                self._report(report)
+            try:
+                self._hear(REPORT.validate_json(line))
+            except Exception:  # half a line of a process that was killed, or a listener's fault; its end is told below
+                log.exception("owner process %s: %.200r", self.pid, line)
         code = self._process.wait()
         self._process.stdout.close()
         with self._writing:
             self._gone = True
+            with contextlib.suppress(OSError):
+                self._process.stdin.close()
             left, self._asked = self._asked, {}
         why = f"signal {-code}" if code < 0 else f"exit code {code}"
         for future in left.values():
             future.set_exception(OwnerGoneError(f"the process that owned the port has ended ({why})"))
         log.info("owner process %s ended: %s", self.pid, why)
         self._ended(why)
+
+    def _hear(self, report: Report) -> None:
+        if isinstance(report, Answer):
+            future = self._asked.pop(report.number, None)
+            if future is not None:
+                future.set_result(report)
+        else:
+            self._report(report)

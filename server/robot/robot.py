@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from daq.acquisition.messages import EventHappened, Progress
 from daq.contracts.errors import ReachError
@@ -42,6 +42,7 @@ OPEN_WITHIN = 60.0
 ANSWER_WITHIN = 5.0
 """s for an order that moves nothing."""
 log = logging.getLogger("server.robot")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -193,7 +194,11 @@ class Robot:
             robot=place.name,
             memory_map=place.memory_map,
         )
-        self._owner = OwnerProcess(opening, self._heard, self._gone)
+        try:
+            self._owner = OwnerProcess(opening, self._heard, self._gone)
+        except OSError as error:  # no memory, or no file is left for another process
+            self._problem = f"the robot's process cannot be started: {error.strerror or error}"
+            raise ReachError(self._problem) from error
 
     def _heard(self, report: Report) -> None:
         seen = Seen(report, self.clock.monotonic())
@@ -208,8 +213,7 @@ class Robot:
                 self._cannot_open(report)
             case Progress() | EventHappened() | Told() | _:
                 pass
-        for listener in self.listeners:
-            listener(report)
+        _tell_each(self.listeners, report)
 
     def _set_opened(self, report: Opened) -> None:
         identity = RobotIdentity(
@@ -237,5 +241,13 @@ class Robot:
                 self._problem = f"the connection has ended ({why})"
             if self._opened is not None and not self._opened.done():
                 self._opened.set_exception(ReachError(self._problem or f"the robot's process ended: {why}"))
-        for listener in self.disconnected:
-            listener(why)
+        _tell_each(self.disconnected, why)
+
+
+def _tell_each(listeners: Iterable[Callable[[T], None]], news: T) -> None:
+    """A fault of one listener is the log's, and no other's."""
+    for listener in listeners:
+        try:
+            listener(news)
+        except Exception:
+            log.exception("a listener of the robot")
