@@ -67,7 +67,7 @@ def test_a_stop_that_nobody_answers_is_not_called_delivered_and_one_that_arrives
     page = dashboard.until_live()
     with hanging(dashboard.service.process.pid):
         page.keyboard.press("F8")
-        message = page.locator("[data-stop='not delivered']")
+        message = page.locator("[data-stop='not-delivered']")
         expect(message).to_contain_text("Stop NOT DELIVERED")
         expect(message).to_contain_text("Use the emergency stop")
         assert not dashboard.mock.ask("state")["frozen"]
@@ -86,3 +86,13 @@ def test_a_reset_ends_the_stop_and_moves_nothing(dashboard: Dashboard) -> None:
     state = dashboard.mock.ask("state")
     assert not state["frozen"]
     assert all(abs(one - other) <= 2 for one, other in zip(before, state["set_points"], strict=True))
+
+
+def test_a_stop_that_somebody_else_has_ended_is_not_called_confirmed_any_more(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    page.keyboard.press("F8")
+    expect(page.locator(CONFIRMED)).to_be_visible()
+    expect(page.get_by_text("The arm is stopped.")).to_be_visible()
+    assert dashboard.service.robot.post("/reset", json={}).status_code == 200
+    expect(page.locator("[data-stop=past]")).to_contain_text("Past: stopped at")
+    expect(page.locator(CONFIRMED)).not_to_be_attached()

@@ -7,7 +7,7 @@
 
 import { here } from '../api/client';
 import { asProblem, type Problem } from '../api/problem';
-import { isMissing, LiveSocket, type SocketState } from '../api/socket';
+import { isMissing, LiveSocket, SILENT_AFTER, type SocketState } from '../api/socket';
 import type {
   Job,
   LinkMessage,
@@ -22,6 +22,7 @@ import type {
   SampleMessage,
   ServiceEvent,
 } from '../api/types';
+import { armNow } from '../stop/standing';
 import { stop } from '../stop/stop.svelte';
 import { ServiceClock, STALE_AFTER } from './age';
 import { asked, newTicket } from './asked';
@@ -221,6 +222,7 @@ class Live {
         break;
       case 'robot':
         this.robot = message;
+        this.tellStop();
         break;
       case 'link':
         this.link = message;
@@ -257,9 +259,16 @@ class Live {
     if (isFirst) this.tick();
   }
 
+  private tellStop(): void {
+    const at = seconds();
+    const silence = this.clock.silence(at);
+    stop.heard(armNow(this.isOpen && silence !== null && silence < SILENT_AFTER, this.robot), at);
+  }
+
   private tick(): void {
     this.now = seconds();
     this.silence = this.clock.silence(this.now);
+    this.tellStop();
     if (this.newest !== this.sample) this.sample = this.newest;
     this.sampleAge = this.newest === null ? null : this.clock.age(this.newest.host_time, this.now);
     if (this.lateness.length >= 50) {

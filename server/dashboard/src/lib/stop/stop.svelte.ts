@@ -1,15 +1,24 @@
-/** Stop, for the whole page: `stop.press()` from anywhere, `stop.state` tells what became of it. */
+/** Stop, for the whole page: `stop.press()` from anywhere, `stop.words` tells what became of it, and if it still holds. */
 
 import { api, ask, here } from '../api/client';
 import { currentToken } from '../api/token';
 import type { StopResult } from '../api/types';
+import { timeOfDay } from '../format';
+import { type ArmNow, type Standing, StopStanding } from './standing';
 import { isStopKey, StopCall, type StopState } from './stop';
+import { wordsOf } from './words';
 
 class Stop {
   state = $state.raw<StopState>({ kind: 'none' });
+  private standing = $state<Standing>('holds');
+  private arm = $state<ArmNow>('unknown');
+  /** Time of day at which `state` was told. */
+  private time = $state('');
+  words = $derived(wordsOf(this.state, this.standing, this.arm, this.time));
   /** The port of the listener that takes stops alone; null until the service has told it. */
   port: number | null = null;
   private call: StopCall | null = null;
+  private followed = new StopStanding('none');
 
   /** At once, and without a question. */
   press(): void {
@@ -20,9 +29,7 @@ class Stop {
         const timer = setTimeout(call, seconds * 1000);
         return () => clearTimeout(timer);
       },
-      told: (state) => {
-        this.state = state;
-      },
+      told: (state) => this.tell(state),
     });
     this.call.begin();
   }
@@ -30,7 +37,21 @@ class Stop {
   /** The message has been read. */
   dismiss(): void {
     this.call?.leave();
-    this.state = { kind: 'none' };
+    this.tell({ kind: 'none' });
+  }
+
+  /** What is known of the arm at `at` (s): a message that no longer holds is not left standing. */
+  heard(arm: ArmNow, at: number): void {
+    this.arm = arm;
+    this.standing = this.followed.heard(arm, at);
+  }
+
+  private tell(state: StopState): void {
+    this.state = state;
+    if (state.kind === this.followed.kind) return;
+    this.followed = new StopStanding(state.kind);
+    this.standing = 'holds';
+    this.time = timeOfDay(new Date().toISOString());
   }
 
   /** Listens for the keys before anything else on the page does. */

@@ -106,6 +106,27 @@ describe('a press of Stop', () => {
     expect(send).toHaveBeenCalledTimes(ATTEMPTS);
   });
 
+  it('does not say that it is sent again when it no longer is, and stays undelivered', async () => {
+    begin(never);
+    await pass((ATTEMPTS - 1) * AGAIN_AFTER - 0.01);
+    expect(last()).toMatchObject({ text: expect.stringContaining('It is being sent again.') as string });
+    await pass(0.01);
+    const text = (last() as { text: string }).text;
+    expect(last().kind).toBe('not delivered');
+    expect(text).toContain('Use the emergency stop. It is no longer being sent; one may still arrive.');
+    expect(text).not.toContain('sent again.');
+    await pass(60);
+    expect(last()).toEqual({ kind: 'not delivered', text });
+  });
+
+  it('says that none may arrive any more when all were refused', async () => {
+    begin(refused('the service does not answer'));
+    await pass(60);
+    expect(last()).toMatchObject({
+      text: expect.stringContaining('It is no longer being sent. Press') as string,
+    });
+  });
+
   it('tells and sends nothing once another press has taken over', async () => {
     const send = vi.fn(never);
     begin(send).leave();

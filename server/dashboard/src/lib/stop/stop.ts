@@ -6,6 +6,7 @@
  */
 
 import type { StopResult } from '../api/types';
+import { sentence } from './words';
 
 /** s after which an answer that has not come is told as none. Requests stay on their way. */
 export const TELL_AFTER = 0.8;
@@ -42,6 +43,8 @@ export class StopCall {
   private attempts = 0;
   private failures = 0;
   private ended = false;
+  /** Why nobody has taken it, once that has been told. */
+  private undelivered = '';
 
   constructor(private readonly parts: StopParts) {}
 
@@ -66,6 +69,7 @@ export class StopCall {
       (error: unknown) => this.failed(error),
     );
     if (this.attempts < ATTEMPTS) this.timers.push(this.parts.after(AGAIN_AFTER, () => this.attempt()));
+    else if (this.undelivered !== '') this.tellUndelivered(this.undelivered);
   }
 
   private answered(result: StopResult): void {
@@ -78,29 +82,27 @@ export class StopCall {
   private failed(error: unknown): void {
     this.failures += 1;
     if (this.ended || this.failures < this.parts.doors.length) return;
-    const why = error instanceof Error ? error.message : String(error);
-    this.parts.told({ kind: 'not delivered', text: `${sentence(why)} ${EMERGENCY}${this.more()}` });
+    this.tellUndelivered(sentence(error instanceof Error ? error.message : String(error)));
   }
 
   private silent(): void {
-    if (this.ended) return;
-    const text = `The service has not answered within ${TELL_AFTER} s. ${EMERGENCY}${this.more()}`;
-    this.parts.told({ kind: 'not delivered', text });
+    if (!this.ended) this.tellUndelivered(`The service has not answered within ${TELL_AFTER} s.`);
   }
 
-  private more(): string {
-    return this.failures < ATTEMPTS && this.attempts < ATTEMPTS ? ' It is being sent again.' : '';
+  private tellUndelivered(why: string): void {
+    this.undelivered = why;
+    this.parts.told({ kind: 'not delivered', text: `${why} ${EMERGENCY} ${this.prospect()}` });
   }
-}
 
-/** What the service says beyond what the head of the message says already. */
-export function detailOf(text: string): string {
-  return sentence(text.replace(/^stop[^:]*: /i, '').trim());
-}
-
-function sentence(text: string): string {
-  const first = text.charAt(0).toUpperCase() + text.slice(1);
-  return /[.!?]$/.test(first) ? first : `${first}.`;
+  /** What may still come of it: said anew when the last request has been sent, and when the last has failed. */
+  private prospect(): string {
+    if (this.attempts < ATTEMPTS) return 'It is being sent again.';
+    const left =
+      this.failures < ATTEMPTS
+        ? 'It is no longer being sent; one may still arrive.'
+        : 'It is no longer being sent.';
+    return `${left} Press Stop to send it again.`;
+  }
 }
 
 /** Keys that stop, wherever the focus is, also in a form: F8, Pause. */

@@ -1,0 +1,57 @@
+import { describe, expect, it } from 'vitest';
+import { detailOf, sentence, whyStopped, wordsOf } from './words';
+
+const confirmed = { kind: 'confirmed', text: 'stopped, confirmed: frozen at tick 7', seconds: 0.03 } as const;
+const lost = { kind: 'not delivered', text: 'nobody answers' } as const;
+
+describe('the message about a stop', () => {
+  it('is green only while it holds', () => {
+    expect(wordsOf(confirmed, 'holds', 'stopped', '12:00:00')).toMatchObject({
+      look: 'confirmed',
+      head: 'Stopped, confirmed by the board · 30 ms',
+      text: 'Frozen at tick 7.',
+    });
+    expect(wordsOf(confirmed, 'unknown', 'unknown', '12:00:00')).toMatchObject({
+      look: 'delivered',
+      head: 'Stopped at 12:00:00, confirmed by the board then',
+    });
+    expect(wordsOf(confirmed, 'past', 'free', '12:00:00')).toMatchObject({
+      look: 'past',
+      head: 'Past: stopped at 12:00:00, confirmed by the board',
+    });
+  });
+
+  it('is urgent until what was not delivered is past, and says then how the arm is', () => {
+    expect(wordsOf(lost, 'unknown', 'unknown', '')).toMatchObject({
+      look: 'not-delivered',
+      text: 'Nobody answers.',
+    });
+    expect(wordsOf(lost, 'past', 'free', '12:00:00')).toMatchObject({
+      look: 'past',
+      head: 'Past: the stop of 12:00:00 was NOT DELIVERED',
+      text: 'The arm is not stopped now: press Stop if it shall be.',
+    });
+    expect(wordsOf(lost, 'past', 'stopped', '')?.text).toBe('The arm is stopped now.');
+  });
+
+  it('is none where nothing was stopped', () => {
+    expect(wordsOf({ kind: 'none' }, 'past', 'free', '')).toBeNull();
+  });
+});
+
+it.each([
+  [
+    'stopped on request, by daq stop or through the service',
+    'On request, by daq stop or through the service.',
+  ],
+  ['the arm has been stopped: nobody is there', 'Nobody is there.'],
+  ['stopped', ''],
+  ['a limit of joint 2', 'A limit of joint 2.'],
+])('why it is stopped: %s', (cause, said) => {
+  expect(whyStopped(cause)).toBe(said);
+});
+
+it('says nothing twice, and ends sentences', () => {
+  expect(detailOf('stop NOT DELIVERED: no robot is connected')).toBe('No robot is connected.');
+  expect(sentence('is it on?')).toBe('Is it on?');
+});

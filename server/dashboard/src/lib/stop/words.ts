@@ -1,0 +1,69 @@
+/** A stop in words: what became of it, whether that still holds, and why an arm is stopped. Pure. */
+
+import type { ArmNow, Standing } from './standing';
+import type { StopState } from './stop';
+
+export interface StopWords {
+  /** Of which kind the message is: its colour and its sign follow from it. */
+  look: 'sending' | 'confirmed' | 'delivered' | 'not-delivered' | 'past';
+  sign: string;
+  head: string;
+  text: string;
+}
+
+/** The message about a stop, told at `time` (of day); null where there is none. */
+export function wordsOf(state: StopState, standing: Standing, arm: ArmNow, time: string): StopWords | null {
+  if (state.kind === 'none') return null;
+  if (state.kind === 'sending') return { look: 'sending', sign: '◐', head: 'Stop is being sent', text: '' };
+  if (standing === 'past') return pastOf(state.kind, arm, time);
+  const text = detailOf(state.text);
+  if (state.kind === 'not delivered') {
+    return { look: 'not-delivered', sign: '✕', head: 'Stop NOT DELIVERED', text };
+  }
+  const after = `${Math.round(state.seconds * 1000)} ms`;
+  if (state.kind === 'delivered') {
+    return { look: 'delivered', sign: '▲', head: `Stop sent, NOT CONFIRMED · ${after}`, text };
+  }
+  if (standing === 'unknown') {
+    const head = `Stopped at ${time}, confirmed by the board then`;
+    return { look: 'delivered', sign: '▲', head, text: 'How the arm is now is not known.' };
+  }
+  return { look: 'confirmed', sign: '✓', head: `Stopped, confirmed by the board · ${after}`, text };
+}
+
+function pastOf(kind: 'confirmed' | 'delivered' | 'not delivered', arm: ArmNow, time: string): StopWords {
+  if (kind === 'confirmed') {
+    const head = `Past: stopped at ${time}, confirmed by the board`;
+    return { look: 'past', sign: '○', head, text: 'That stop has been ended since.' };
+  }
+  const what = kind === 'delivered' ? 'was sent and NOT CONFIRMED' : 'was NOT DELIVERED';
+  const now = {
+    stopped: 'The arm is stopped now.',
+    free: 'The arm is not stopped now: press Stop if it shall be.',
+    unknown: 'How the arm is now is not known.',
+  }[arm];
+  return {
+    look: 'past',
+    sign: arm === 'stopped' ? '○' : '▲',
+    head: `Past: the stop of ${time} ${what}`,
+    text: now,
+  };
+}
+
+/** What the service says beyond what the head of the message says already. */
+export function detailOf(text: string): string {
+  return sentence(text.replace(/^stop[^:]*: /i, ''));
+}
+
+/** Why the arm is stopped, behind words that say that it is: "stopped by a signal" becomes "By a signal." */
+export function whyStopped(cause: string): string {
+  return sentence(cause.replace(/^(the arm )?(is |was |has been )?stopped\b[\s:,.]*/i, ''));
+}
+
+/** With a capital letter and a full stop; nothing remains nothing. */
+export function sentence(text: string): string {
+  const whole = text.trim();
+  if (whole === '') return '';
+  const first = whole.charAt(0).toUpperCase() + whole.slice(1);
+  return /[.!?]$/.test(first) ? first : `${first}.`;
+}
