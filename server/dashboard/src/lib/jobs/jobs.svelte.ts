@@ -2,6 +2,7 @@
 
 import { api, ask, asProblem, here, type Job, type JobRequest, type Problem } from '../api';
 import { live } from '../live/live.svelte';
+import { afterSeconds, Reload } from '../reload/reload';
 import { merged, type JobKind } from './jobs';
 
 const AT_ONCE = 100;
@@ -16,8 +17,15 @@ export class Jobs {
     this.loaded === null ? null : merged(this.loaded, live.jobs, this.kinds),
   );
 
+  private readonly reload = new Reload({ load: () => void this.load(), after: afterSeconds });
+
   constructor(kinds: readonly JobKind[]) {
     this.kinds = kinds;
+  }
+
+  /** For an effect that follows how often the connection has come back. */
+  afterHealing(times: number): void {
+    this.reload.afterHealing(times);
   }
 
   /** Loads the newest. */

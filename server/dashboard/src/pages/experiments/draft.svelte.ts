@@ -9,6 +9,7 @@ import {
   type MotionPreview,
   type Problem,
 } from '../../lib/api';
+import { afterSeconds } from '../../lib/reload/reload';
 import { MotionCheck, type Check } from '../../lib/trajectory/check';
 import type { Schema } from '../../lib/trajectory/fields';
 import {
@@ -45,10 +46,7 @@ export class Draft {
   }));
   private readonly checking = new MotionCheck<ExperimentSpec, MotionPreview>({
     ask: previewed,
-    after: (seconds, call) => {
-      const timer = setTimeout(call, seconds * 1000);
-      return () => clearTimeout(timer);
-    },
+    after: afterSeconds,
     told: (check) => this.hear(check),
   });
 

@@ -2,12 +2,13 @@
 
 import { api, ask, asProblem, here, type Experiment, type Problem, type Schedule } from '../../lib/api';
 import { live } from '../../lib/live/live.svelte';
+import { afterSeconds, Reload } from '../../lib/reload/reload';
 import { reordered } from '../../lib/trajectory/order';
 
 /** Topics after which the lists may have changed. */
 const TOPICS = new Set(['queue', 'event', 'robot']);
-/** ms in which several changes are taken together. */
-const TOGETHER = 150;
+/** s in which several changes are taken together. */
+const TOGETHER = 0.15;
 const ENDED_SHOWN = 12;
 const ENDS = ['done', 'failed', 'cancelled', 'interrupted'] as const;
 
@@ -21,18 +22,23 @@ export class QueueLists {
   refused = $state.raw<Problem | null>(null);
   loaded = $state(false);
   busy = $state(false);
-  private timer: ReturnType<typeof setTimeout> | undefined;
+  private readonly reload = new Reload({ load: () => void this.load(), after: afterSeconds });
 
   /** Follows the service until the returned function is called. */
   follow(): () => void {
     void this.load();
     const end = live.onMessage((message) => {
-      if (TOPICS.has(message.topic)) this.loadSoon();
+      if (TOPICS.has(message.topic)) this.reload.soon(TOGETHER);
     });
     return () => {
       end();
-      clearTimeout(this.timer);
+      this.reload.leave();
     };
+  }
+
+  /** For an effect that follows how often the connection has come back. */
+  afterHealing(times: number): void {
+    this.reload.afterHealing(times);
   }
 
   async load(): Promise<void> {
@@ -129,10 +135,5 @@ export class QueueLists {
     }
     await this.load();
     this.busy = false;
-  }
-
-  private loadSoon(): void {
-    clearTimeout(this.timer);
-    this.timer = setTimeout(() => void this.load(), TOGETHER);
   }
 }

@@ -1,11 +1,13 @@
 /** The list of traces: searched, filtered, a part at a time, and followed as new ones are recorded. */
 
+import { untrack } from 'svelte';
 import { api, ask, asProblem, here, type CatalogueEntry, type Problem } from '../../lib/api';
 import { live } from '../../lib/live/live.svelte';
+import { afterSeconds, Reload } from '../../lib/reload/reload';
+import { Listing } from '../../lib/traces/listing';
 
-/** ms without a key before it is searched. */
-const QUIET = 200;
-const PART = 40;
+/** s without a key before it is searched. */
+const QUIET = 0.2;
 
 export type Source = 'mock' | 'real' | 'imported';
 export type Outcome = 'complete' | 'stopped' | 'fault' | 'interrupted';
@@ -23,55 +25,56 @@ export class Catalogue {
   isFiltered: boolean = $derived(
     this.text !== '' || this.tag !== '' || this.source !== '' || this.outcome !== '',
   );
+  private readonly listing = new Listing<CatalogueEntry>();
+  private readonly reload = new Reload({ load: () => void this.load(), after: afterSeconds });
   private asked = 0;
-  private timer: ReturnType<typeof setTimeout> | undefined;
 
   /** Follows the service: a new trace appears by itself. */
   follow(): () => void {
     return live.onMessage((message) => {
-      if (message.topic === 'event') this.loadSoon();
+      if (message.topic === 'event') this.reload.soon(QUIET);
     });
+  }
+
+  /** For an effect that follows how often the connection has come back. */
+  afterHealing(times: number): void {
+    this.reload.afterHealing(times);
   }
 
   /** For an effect that follows the fields of the search. */
   searchSoon(): () => void {
     void [this.text, this.tag, this.source, this.outcome];
-    this.loadSoon();
-    return () => clearTimeout(this.timer);
+    this.listing.beginAnew();
+    this.reload.soon(untrack(() => this.loaded) ? QUIET : 0);
+    return () => this.reload.leave();
   }
 
   clear(): void {
     this.text = this.tag = this.source = this.outcome = '';
   }
 
-  async load(): Promise<void> {
-    await this.ask(null);
-  }
-
   async more(): Promise<void> {
-    if (this.next !== null) await this.ask(this.next);
+    this.listing.more(this.items.length);
+    await this.load();
   }
 
-  private loadSoon(): void {
-    clearTimeout(this.timer);
-    this.timer = setTimeout(() => void this.load(), this.loaded ? QUIET : 0);
-  }
-
-  private async ask(cursor: string | null): Promise<void> {
+  /** Loads it anew, as far as it is shown. */
+  async load(): Promise<void> {
     const turn = ++this.asked;
     this.busy = true;
-    const query = {
-      limit: PART,
+    const search = {
       ...(this.text === '' ? {} : { q: this.text }),
       ...(this.tag === '' ? {} : { tag: this.tag }),
       ...(this.source === '' ? {} : { source: this.source }),
       ...(this.outcome === '' ? {} : { outcome: this.outcome }),
-      ...(cursor === null ? {} : { cursor }),
     };
     try {
-      const page = await ask(api.GET('/api/v1/robots/{robot}/traces', { params: { path: here(), query } }));
+      const page = await this.listing.load((limit, cursor) => {
+        const query = { limit, ...search, ...(cursor === null ? {} : { cursor }) };
+        return ask(api.GET('/api/v1/robots/{robot}/traces', { params: { path: here(), query } }));
+      });
       if (turn !== this.asked) return;
-      this.items = cursor === null ? page.items : [...this.items, ...page.items];
+      this.items = page.items;
       this.next = page.next;
       this.problem = null;
     } catch (error) {
