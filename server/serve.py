@@ -60,11 +60,16 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         host, port = listener.getsockname()[:2]
         address = f"http://{f'[{host}]' if ':' in host else host}:{port}"
         stop_listener = _stop_listener(services, gate, beside, port)
+
+        def ending() -> None:
+            for one in services.robots():
+                one.hub.end_waiting()
+
         # The web server raises its signal again when it has ended in order; the rest ends in order after it.
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         try:
             with suppress(KeyboardInterrupt):  # the service has ended in order by then
-                _Server(config, lambda: ready(address)).run([listener])
+                _Server(config, lambda: ready(address), ending).run([listener])
         finally:
             stop_listener.close()
 
@@ -94,11 +99,12 @@ def _stop_listener(services: Services, gate: Gate, listener: socket.socket, serv
 
 
 class _Server(uvicorn.Server):
-    """Says when it answers."""
+    """Says when it answers, and when it begins to end."""
 
-    def __init__(self, config: uvicorn.Config, ready: Callable[[], None]) -> None:
+    def __init__(self, config: uvicorn.Config, ready: Callable[[], None], ending: Callable[[], None]) -> None:
         super().__init__(config)
         self._ready = ready
+        self._ending = ending
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """As uvicorn's, then ready."""
@@ -106,3 +112,8 @@ class _Server(uvicorn.Server):
         if self.started:
             keep_steady()
             self._ready()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """As uvicorn's, which gives what is under way a moment only."""
+        self._ending()
+        await super().shutdown(sockets)

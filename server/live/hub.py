@@ -58,6 +58,8 @@ class Hub:
     def __init__(self, clock: Clock, history: History, status: Callable[[], RobotStatus]) -> None:
         self.history = history
         self.dropped = 0
+        self.ending = False
+        """Whether nobody is to wait for news any more: the service ends."""
         self.looking_back = asyncio.Lock()
         """Held while a client's history is put together: many that join at once have it one after the other, so that
         the threads that do it take turns with everything else and not with each other."""
@@ -76,6 +78,12 @@ class Hub:
         self._loop = asyncio.get_running_loop()
         self._experiment = experiment
         self._watching = self._loop.create_task(self._watch())
+
+    def end_waiting(self) -> None:
+        """Whoever waits for news answers now, whatever the state is."""
+        self.ending = True
+        for client in self._clients:
+            client.something.set()
 
     async def close(self) -> None:
         """No more messages."""

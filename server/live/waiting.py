@@ -21,7 +21,8 @@ T = TypeVar("T")
 
 
 async def when_ended(hub: Hub, topics: set[Topic], look: Callable[[], T], ended: Callable[[T], bool], wait: float) -> T:
-    """What `look` (on a thread) finds as soon as it has ended; after `wait` s at the latest, whatever it is then."""
+    """What `look` (on a thread) finds as soon as it has ended; after `wait` s at the latest, or when the service ends,
+    whatever it is then."""
     loop = asyncio.get_running_loop()
     until = loop.time() + wait
     with hub.listening(topics) as news:
@@ -29,7 +30,7 @@ async def when_ended(hub: Hub, topics: set[Topic], look: Callable[[], T], ended:
             news.clear()
             found = await run_in_threadpool(look)
             left = until - loop.time()
-            if ended(found) or left <= 0:
+            if ended(found) or left <= 0 or hub.ending:
                 return found
             try:
                 async with asyncio.timeout(min(left, LOOK_EVERY)):

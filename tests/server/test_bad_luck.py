@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import json
 import os
 import resource
@@ -56,10 +57,11 @@ def test_whatever_process_is_killed_its_work_is_interrupted_and_what_waits_waits
     with log.open("wb") as stream, running_service(tmp_path, log=stream) as service:
         service.until_connected()
         trace = _after_the_server(service, running, waiting)
-        _without_the_acquisition_process(service)
+        waiting = _without_the_acquisition_process(service)
         _without_the_worker(service, trace)
         service.robot.post("/disconnect")
-        assert service.end() == 0
+        _ends_while_somebody_waits(service, waiting)
+    assert "Exception in ASGI" not in log.read_text()
     assert "leaked" not in log.read_text()  # of what its worker processes shared with it
 
 
@@ -79,7 +81,7 @@ def _after_the_server(service: Service, running: str, waiting: str) -> str:
     return trace
 
 
-def _without_the_acquisition_process(service: Service) -> None:
+def _without_the_acquisition_process(service: Service) -> str:
     running, waiting = _left_behind(service)
     os.kill(_owner_of(service.process.pid), signal.SIGKILL)
     ended = service.end_of(running)
@@ -87,6 +89,18 @@ def _without_the_acquisition_process(service: Service) -> None:
     queue = service.robot.get("/queue").json()
     assert queue["paused"], queue
     assert service.robot.get(f"/experiments/{waiting}").json()["state"] == "queued"
+    return waiting
+
+
+def _ends_while_somebody_waits(service: Service, waiting: str) -> None:
+    """Whoever waits for an end that does not come is told how it is when the service ends."""
+    waits = http.client.HTTPConnection("127.0.0.1", int(service.url.rpartition(":")[2]), timeout=60)
+    waits.request("GET", f"/api/v1/robots/ma2000/experiments/{waiting}?wait=60")
+    service.status()  # what was sent before has begun by now
+    assert service.end() == 0
+    answer = waits.getresponse()
+    assert (answer.status, json.loads(answer.read())["state"]) == (200, "queued")
+    waits.close()
 
 
 def _without_the_worker(service: Service, trace: str) -> None:
