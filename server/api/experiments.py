@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
@@ -21,12 +20,12 @@ from daq.contracts.service.experiments import (
     MotionViolation,
 )
 from daq.safety import Violation, check_plan
-from daq.traces.room import RESERVE
 from daq.trajectories import Plan, plan, start_angles
 from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
 from server.queue.length import LONGEST, longest_length
+from server.queue.room import require_room
 from server.services import RobotServices
 
 MOST_SHOWN = 5000
@@ -39,6 +38,7 @@ StateFilter = Annotated[list[ExperimentState] | None, Query(description="Only th
 def submit_experiment(
     request: ExperimentRequest,
     one: RobotPart,
+    found: ServicesPart,
     who: Operator,
     response: Response,
     idempotency_key: IdempotencyKey = None,
@@ -47,9 +47,11 @@ def submit_experiment(
 
     The same Idempotency-Key gives the same experiment (200), and never a second one.
     """
-    require_possible(one, request.spec)
-    _require_room(one)
-    experiment, new = one.queue.submit(request, who.name, idempotency_key)
+    experiment, new = found.experiments.made_before(one.robot.name, request, idempotency_key), False
+    if experiment is None:  # what was accepted once stays so, whatever the disk says by now
+        require_possible(one, request.spec)
+        require_room(one.catalogue.folder)
+        experiment, new = one.queue.submit(request, who.name, idempotency_key)
     response.status_code = 201 if new else 200
     response.headers["Location"] = f"/api/v1/robots/{one.robot.name}/experiments/{experiment.id}"
     return one.queue.as_told(experiment)
@@ -145,11 +147,3 @@ def require_possible(one: RobotServices, spec: ExperimentSpec) -> None:
         more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""
         line = f"spec.trajectory: {violations[0]}{more}"
         raise ProblemError(422, "beyond-limits", line, "POST …/experiments/preview shows the motion and its violations")
-
-
-def _require_room(one: RobotServices) -> None:
-    folder = one.catalogue.folder
-    free = shutil.disk_usage(folder).free
-    if free < RESERVE:
-        line = f"{free / 1e6:.0f} MB are free for traces, {RESERVE / 1e6:.0f} MB stay free"
-        raise ProblemError(507, "no-room", line, "make room on the disk of the traces")

@@ -97,10 +97,7 @@ def change_trace(
 @router.delete("/{trace}", status_code=204)
 def delete_trace(trace: Identity, one: RobotPart, found: ServicesPart, who: Operator) -> Response:
     """Deletes a trace for good. Refused while a model or a job refers to it."""
-    path = one.catalogue.path_of(trace)
-    found.traces.require_unused(trace)
-    found.traces.remove(one.robot.name, trace)
-    path.unlink(missing_ok=True)
+    path = one.catalogue.remove(trace)
     found.tell(one.robot.name, "trace", f"trace {trace} ({path.name}) was deleted", actor=who.name)
     return Response(status_code=204)
 

@@ -6,10 +6,10 @@ import logging
 import threading
 from pathlib import Path
 
-from daq.traces import layout
+from daq.traces import disk, layout
 from daq.traces.catalogue import TraceSummary, summary_of
 from daq.traces.salvage import salvage_folder
-from server.problems import ProblemError, not_found
+from server.problems import ProblemError, conflict, not_found
 from server.store.experiments import ExperimentStore
 from server.store.traces import NewTrace, TraceStore
 
@@ -45,6 +45,30 @@ class Catalogue:
         """Takes in one finished file. Returns its number; None when it is no trace, which the log tells."""
         with self._lock:
             return summary.trace_id if (summary := self._summary(path)) and self._insert(path, summary) else None
+
+    def move_in(self, source: Path, target: Path) -> bool:
+        """Takes in a finished file from elsewhere on this disk, as `target` of the folder; False, and nothing is
+        changed, when a trace of this number is there. Raises a 409 when a file of this name is."""
+        with self._lock:  # whoever else looks into the folder finds both file and row, or neither
+            if target.exists():
+                advice = "it is the same trace: nothing needs to be done"
+                raise conflict("trace-exists", f"{target.name} is there already", advice)
+            disk.rename(source, target)
+            taken = False
+            try:
+                taken = self._take_in(target)
+            finally:
+                if not taken:
+                    target.unlink()
+            return taken
+
+    def remove(self, identity: str) -> Path:
+        """Takes a trace away for good; where its file was. Raises a 404, and a 409 when something refers to it."""
+        path = self.path_of(identity)
+        with self._lock:
+            self._traces.remove(self._robot, identity)
+            path.unlink(missing_ok=True)
+        return path
 
     def path_of(self, identity: str) -> Path:
         """The file of a trace. Raises a 404, also when the file has been taken away."""

@@ -63,17 +63,11 @@ def _take_in(path: Path, one: RobotServices, found: Services, who: Caller) -> Ca
         advice = "letters, digits, - and _ are allowed"
         raise ProblemError(422, "not-a-trace", "its number is not one of a trace", advice)
     target = trace_path(one.catalogue.folder, record)
-    if target.exists():
-        raise conflict(
-            "trace-exists", f"{target.name} is there already", "it is the same trace: nothing needs to be done"
-        )
+    made = path
     if path.suffix == ".csv":
-        write_trace(trace, target)
-    else:
-        path.replace(target)
-    identity = one.catalogue.add(target)
-    if identity is None:
-        target.unlink(missing_ok=True)
+        made = path.with_name(target.name)
+        write_trace(trace, made)
+    if not one.catalogue.move_in(made, target):
         raise conflict("trace-exists", f"trace {record.trace_id} is there already", "nothing needs to be done")
-    found.tell(one.robot.name, "trace", f"trace {identity} was uploaded", actor=who.name)
-    return found.traces.get(one.robot.name, identity)
+    found.tell(one.robot.name, "trace", f"trace {record.trace_id} was uploaded", actor=who.name)
+    return found.traces.get(one.robot.name, record.trace_id)

@@ -74,6 +74,9 @@ class JobDesk:
     def submit(self, request: JobRequest, by: str, key: str | None) -> tuple[Job, bool]:
         """Takes a job in. Raises a 404 for a trace or model that is not there, a 409 for a key used otherwise."""
         parts = self._parts
+        before = parts.jobs.made_before(parts.robot, request, key)
+        if before is not None:  # whatever has become of its traces and models since
+            return before, False
         task = Task(
             request=request,
             machine=parts.machine,
@@ -81,11 +84,18 @@ class JobDesk:
             models={number: parts.models.path_of(number) for number in models_of(request) if number != MACHINE},
             names={number: parts.models.name_of(number) for number in models_of(request)},
         )
-        job, new = parts.jobs.submit(parts.robot, request, parts.clock.utc(), by, key)
-        if new:
-            folder = self._folder(job.id)
+
+        def prepare(identity: str) -> None:
+            folder = self._folder(identity)
             folder.mkdir(parents=True)
-            Mailbox(folder).write(REQUEST, task.model_dump(mode="json"))
+            try:
+                Mailbox(folder).write(REQUEST, task.model_dump(mode="json"))
+            except OSError:  # no room: nothing of it stays
+                shutil.rmtree(folder, ignore_errors=True)
+                raise
+
+        job, new = parts.jobs.submit(parts.robot, request, parts.clock.utc(), by, key, prepare)
+        if new:
             self._tell(job)
             self._wake.set()
         return job, new

@@ -44,6 +44,12 @@ class ExperimentStore:
                 waiting = _count_waiting(session, robot)
             self._waiting[robot] = waiting
 
+    def made_before(self, robot: str, request: ExperimentRequest, key: str | None) -> Experiment | None:
+        """What the same key made. Raises a 409 when it was used for something else."""
+        with self._store.reading() as session:
+            found = made_before(session, ExperimentRow, robot, key, digest_of(request))
+            return None if found is None else as_experiment(found)
+
     def submit(
         self,
         robot: str,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime
 
 from pydantic import TypeAdapter
@@ -25,7 +25,7 @@ from server.queue.states import Event, IllegalEventError, advance
 from server.store.engine import Store
 from server.store.pages import newest_first
 from server.store.submitted import digest_of, made_before, new_columns
-from server.store.tables import JobRow, TraceUseRow
+from server.store.tables import JobRow, TraceRow, TraceUseRow
 
 _REQUEST: TypeAdapter[FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest] = TypeAdapter(JobRequest)
 
@@ -46,8 +46,26 @@ class JobStore:
     def __init__(self, store: Store) -> None:
         self._store = store
 
-    def submit(self, robot: str, request: JobRequest, now: datetime, by: str, key: str | None) -> tuple[Job, bool]:
-        """A new job, queued, and True; or the one that the same key made before, and False. Raises a 409."""
+    def made_before(self, robot: str, request: JobRequest, key: str | None) -> Job | None:
+        """What the same key made. Raises a 409 when it was used for something else."""
+        with self._store.reading() as session:
+            found = made_before(session, JobRow, robot, key, digest_of(request))
+            return None if found is None else as_job(found)
+
+    def submit(
+        self,
+        robot: str,
+        request: JobRequest,
+        now: datetime,
+        by: str,
+        key: str | None,
+        prepare: Callable[[str], None] = lambda _identity: None,
+    ) -> tuple[Job, bool]:
+        """A new job, queued, and True; or the one that the same key made before, and False.
+
+        `prepare` lays out, for the number that the job will have, what its worker needs: when it raises there is no
+        job. Raises a 409, and a 404 for a trace that is not there any more.
+        """
         digest = digest_of(request)
         with self._store.writing() as session:
             if (found := made_before(session, JobRow, robot, key, digest)) is not None:
@@ -60,8 +78,11 @@ class JobStore:
             )
             session.add(row)
             for trace in traces_of(request):
+                if session.get(TraceRow, trace) is None:
+                    raise not_found(f"trace {trace!r}", "GET …/traces lists those there are")
                 session.merge(TraceUseRow(trace=trace, used_by=f"job {row.id}"))
             session.flush()
+            prepare(row.id)
             return as_job(row), True
 
     def get(self, robot: str, identity: str) -> Job:

@@ -141,23 +141,15 @@ class TraceStore:
             row.searched = _searched(row, tags)
             return _entry(row, tags)
 
-    def refer(self, session: Session, traces: Iterable[str], used_by: str) -> None:
-        """Notes, within a transaction of the caller's, that `used_by` refers to traces."""
-        for trace in traces:
-            session.merge(TraceUseRow(trace=trace, used_by=used_by))
-
-    def require_unused(self, identity: str) -> None:
-        """Raises a 409 when a model or a job refers to it."""
-        with self._store.reading() as session:
-            users = list(session.scalars(select(TraceUseRow.used_by).filter_by(trace=identity).limit(5)))
-        if users:
-            line = f"trace {identity} is what {', '.join(users)} was made from"
-            raise conflict("trace-in-use", line, "it is kept as long as they are")
-
     def remove(self, robot: str, identity: str) -> None:
-        """Takes the row away. Raises a 404."""
+        """Takes the row away. Raises a 404, and a 409 when a model or a job refers to it."""
         with self._store.writing() as session:
-            session.delete(_row(session, robot, identity))
+            row = _row(session, robot, identity)
+            users = list(session.scalars(select(TraceUseRow.used_by).filter_by(trace=identity).limit(5)))
+            if users:
+                line = f"trace {identity} is what {', '.join(users)} was made from"
+                raise conflict("trace-in-use", line, "it is kept as long as they are")
+            session.delete(row)
 
 
 def _row(session: Session, robot: str, identity: str) -> TraceRow:

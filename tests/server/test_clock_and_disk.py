@@ -13,6 +13,9 @@ from typing import Any, NoReturn
 import httpx
 import pytest
 
+from daq.contracts.trace import Trace
+from daq.traces.store import write_trace
+from server.catalogue.catalogue import Catalogue
 from tests.server.inside import WrongClock, service_inside
 
 SHORT = {"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1], "settle": 0, "hold": 0}
@@ -85,8 +88,10 @@ def _full(_path: object) -> Any:
 
 
 def test_a_full_disk_refuses_new_experiments_and_says_so(api: httpx.Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    waiting = _submit(api)
+    waiting = api.post("experiments", json={"spec": SHORT}, headers={"Idempotency-Key": "1"}).json()["id"]
     monkeypatch.setattr(shutil, "disk_usage", _full)
+    again = api.post("experiments", json={"spec": SHORT}, headers={"Idempotency-Key": "1"})
+    assert (again.status_code, again.json()["id"]) == (200, waiting)  # accepted once, accepted for good
     refused = api.post("experiments", json={"spec": SHORT})
     assert (refused.status_code, refused.json()["type"]) == (507, "docs/service.md#no-room")
     assert refused.json()["detail"] == "1 MB are free for traces, 20 MB stay free"
@@ -107,3 +112,27 @@ def test_a_file_that_finds_no_room_is_refused_and_leaves_nothing(
     assert (answer.status_code, answer.json()["type"]) == (507, "docs/service.md#no-room"), answer.text
     assert _listed(api, "traces") == []
     assert list((tmp_path / "traces").glob("*.mcap")) == []
+
+
+def test_a_look_into_the_folder_while_a_trace_is_uploaded_takes_nothing_away(
+    api: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    catalogues: list[Catalogue] = []
+    path_of = Catalogue.path_of
+
+    def known(self: Catalogue, identity: str) -> Path:
+        catalogues.append(self)
+        return path_of(self, identity)
+
+    def then_looked(trace: Trace, path: Path) -> Path:
+        write_trace(trace, path)
+        catalogues[0].bring_up_to_date()
+        return path
+
+    monkeypatch.setattr(Catalogue, "path_of", known)
+    api.get("traces/none/data.mcap")
+    monkeypatch.setattr("server.catalogue.upload.write_trace", then_looked)
+    table = "time,position_1\n" + "\n".join(f"{0.02 * n:.2f},{0.001 * n}" for n in range(50))
+    answer = api.post("traces", content=table, headers={"Content-Type": "text/csv"})
+    assert answer.status_code == 201, answer.text
+    assert api.get(f"traces/{answer.json()['id']}/data.mcap").status_code == 200

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,11 +15,13 @@ from sqlalchemy.exc import OperationalError
 from daq.contracts.machine import load_machine
 from daq.contracts.service.jobs import CompareRequest, FitRequest, Job
 from model.machine_model.model import base_model
+from server.api.traces import delete_trace
 from server.catalogue.catalogue import Catalogue
 from server.jobs.desk import JobDesk, JobParts
-from server.jobs.mailbox import CANCEL, MODEL
+from server.jobs.mailbox import CANCEL, MODEL, Mailbox
 from server.jobs.models import Models
 from server.jobs.work import Ended
+from server.problems import ProblemError
 from server.queue.states import Event
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
@@ -261,3 +264,63 @@ def test_what_could_not_be_begun_is_begun_at_the_next_look(bench: Bench, monkeyp
     monkeypatch.setattr(bench.jobs, "waiting", locked)
     bench.desk.start()
     assert bench.end_of(job).state == "done"
+
+
+def _kept(bench: Bench) -> tuple[Job, ...]:
+    return bench.jobs.page("ma2000", (), None, None, 10).items
+
+
+def test_there_is_no_job_without_its_request(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    class KilledError(OSError):
+        """The disk takes no more, or the process ends."""
+
+    def killed(_self: Mailbox, _name: str, _data: Any) -> None:
+        raise KilledError
+
+    monkeypatch.setattr(Mailbox, "write", killed)
+    with pytest.raises(KilledError):
+        _submitted(bench)
+    assert _kept(bench) == ()
+    assert list(bench.folder.iterdir()) == []
+
+
+def test_the_same_key_is_the_same_job_whatever_became_of_its_traces(bench: Bench) -> None:
+    first, new = bench.desk.submit(COMPARE, "anna", "key")
+    assert new
+    bench.catalogue.path_of(TRACE).unlink()
+    assert bench.desk.submit(COMPARE, "anna", "key") == (first, False)
+    with pytest.raises(ProblemError, match="used for another request"):
+        bench.desk.submit(FitRequest(traces=(TRACE,)), "anna", "key")
+    with pytest.raises(ProblemError, match="there is no file for trace"):
+        bench.desk.submit(COMPARE, "anna", "another key")
+
+
+def test_a_job_refers_to_no_trace_that_is_deleted_as_it_is_submitted(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    submit = bench.jobs.submit
+
+    def deleted_first(*args: Any) -> tuple[Job, bool]:
+        bench.traces.remove("ma2000", TRACE)
+        return submit(*args)
+
+    monkeypatch.setattr(bench.jobs, "submit", deleted_first)
+    with pytest.raises(ProblemError, match="there is no trace"):
+        _submitted(bench)
+    assert _kept(bench) == ()
+
+
+def test_a_trace_is_not_deleted_when_a_job_comes_to_refer_to_it_meanwhile(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    remove = bench.traces.remove
+
+    def submitted_first(*args: Any) -> None:
+        _submitted(bench)
+        remove(*args)
+
+    monkeypatch.setattr(bench.traces, "remove", submitted_first)
+    one = SimpleNamespace(robot=SimpleNamespace(name="ma2000"), catalogue=bench.catalogue)
+    with pytest.raises(ProblemError, match="was made from"):
+        delete_trace(TRACE, one, SimpleNamespace(traces=bench.traces), None)  # type: ignore[arg-type]
+    assert bench.catalogue.path_of(TRACE).is_file()
