@@ -29,7 +29,8 @@ CLIENT_PATIENCE = 0.1
 class EndCause(Enum):
     """Why a run is ended from outside."""
 
-    STOP = "stopped from another terminal"
+    STOP = "stopped on request, by daq stop or through the service"
+    """Through the stop socket, which does not tell who asks."""
     PARENT = "stopped by Ctrl-C, or by the program that started the run"
     SIGNAL = "stopped by a signal"
     ORPHANED = "the process that started this run is gone"

@@ -61,7 +61,7 @@ def ask_at_the_socket(_process: Running) -> None:
     [
         (send_signal(signal.SIGTERM), "stopped by a signal"),
         (speak, "stopped by Ctrl-C, or by the program that started the run"),
-        (ask_at_the_socket, "stopped from another terminal"),
+        (ask_at_the_socket, "stopped on request, by daq stop or through the service"),
     ],
     ids=["SIGTERM", "its parent", "the stop socket"],
 )

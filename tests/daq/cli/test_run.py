@@ -82,7 +82,7 @@ def test_stop_from_another_terminal(daq: CommandLine) -> None:
     (answer,) = json.loads(said.out)
     assert (answer["robot"], answer["delivered"], answer["confirmed"]) == ("ma2000", True, True)
     assert code == 6
-    assert b"stopped from another terminal" in person.seen
+    assert b"stopped on request, by daq stop or through the service" in person.seen
 
 
 def test_a_command_line_that_is_killed_leaves_an_interrupted_trace() -> None:

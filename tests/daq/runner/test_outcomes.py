@@ -60,11 +60,11 @@ def test_a_stop_in_the_middle_freezes_the_arm_and_a_second_more_is_recorded(arm:
     arm.ears.at_sample[12] = arm.stop_as_the_guardian_does
     result = arm.run(LONG_RAMP)
     state = arm.ask("state")
-    with pytest.raises(StoppedError, match="stopped from another terminal"):
+    with pytest.raises(StoppedError, match="stopped on request, by daq stop or through the service"):
         arm.run()
     trace = read_trace(result.trace)
     assert (result.outcome, trace.record.outcome) == ("stopped", "stopped")
-    assert result.reason == "stopped from another terminal"
+    assert result.reason == "stopped on request, by daq stop or through the service"
     assert state["frozen"]
     assert AFTERMATH_PERIODS <= len(trace) - 12 <= AFTERMATH_PERIODS + 2
     assert trace.set_point is not None
@@ -84,7 +84,7 @@ def test_a_stop_by_another_host_is_noticed_on_the_board(arm: Rig) -> None:
 def test_a_stop_on_the_way_to_the_start_leaves_a_frozen_arm_and_no_trace(arm: Rig, tmp_path: Path) -> None:
     far = SHORT.model_copy(update={"start": {1: math.radians(200)}})
     arm.ears.at_event["note"] = arm.stop_as_the_guardian_does  # "slow move starts"
-    with pytest.raises(StoppedError, match=r"move to the start.*another terminal.*nothing was recorded"):
+    with pytest.raises(StoppedError, match=r"move to the start.*on request.*nothing was recorded"):
         arm.run(far)
     state = arm.ask("state")
     assert state["frozen"]

@@ -73,10 +73,10 @@ def test_a_stop_in_the_moment_of_the_end_is_not_taken_for_a_good_end(arm: Watche
     def ended() -> bool:
         if len(arm.seen) < 10:
             return False
-        arm.control.stop("stopped from another terminal")
+        arm.control.stop("stopped on request, by daq stop or through the service")
         return True
 
-    with pytest.raises(StoppedError, match="from another terminal; the board confirmed: set points are frozen"):
+    with pytest.raises(StoppedError, match="through the service; the board confirmed: set points are frozen"):
         jog(arm, MA2000, MA2000.limits, lambda _row: None, ended, print)
     with pytest.raises(StoppedError):
         arm.set_points({1: 600})
