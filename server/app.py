@@ -50,7 +50,7 @@ def bare_app(services: Services | None) -> FastAPI:
         version=version("ma2000-daq"),
         description=DESCRIPTION,
         lifespan=life,
-        openapi_url=f"{API}/openapi.json",
+        openapi_url=None,
         docs_url=None,
         redoc_url=None,
         generate_unique_id_function=_name,
@@ -64,6 +64,7 @@ def bare_app(services: Services | None) -> FastAPI:
     app.include_router(system.plain)
     app.include_router(page_router())
     description.install(app)
+    description.serve(app, f"{API}/openapi.json")
     return app
 
 

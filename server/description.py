@@ -1,10 +1,14 @@
-"""Completes the description of the API: examples of every body, and problems under the media type that they have."""
+"""Completes the description of the API: examples of every body, and problems under the media type that they have; and
+serves it."""
 
 from __future__ import annotations
 
+import asyncio
+import json
 from typing import Any
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request, Response
+from fastapi.concurrency import run_in_threadpool
 
 from server.api.examples import UNTYPED, examples
 from server.api.problem_examples import PROBLEM_EXAMPLES
@@ -25,6 +29,25 @@ def install(app: FastAPI) -> None:
         return known if known is not None else completed(plain())
 
     app.openapi = openapi  # type: ignore[method-assign]
+
+
+def serve(app: FastAPI, address: str) -> None:
+    """From now on `address` tells it. Putting it together takes seconds, so a thread does it, once it is asked for."""
+    encoded: bytes | None = None
+    putting_together = asyncio.Lock()
+
+    async def described(_request: Request) -> Response:
+        nonlocal encoded
+        async with putting_together:
+            if encoded is None:
+                encoded = await run_in_threadpool(_encoded, app)
+        return Response(encoded, media_type=JSON)
+
+    app.add_route(address, described, include_in_schema=False)
+
+
+def _encoded(app: FastAPI) -> bytes:
+    return json.dumps(app.openapi(), ensure_ascii=False, separators=(",", ":")).encode()
 
 
 def completed(document: Document) -> Document:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +65,30 @@ def test_the_types_of_the_live_stream_are_in_it(described: dict[str, Any]) -> No
     assert {"LiveFrame", "SampleMessage", "RobotMessage", "QueueMessage", "JobMessage"} <= set(
         described["components"]["schemas"]
     )
+
+
+def test_nobody_waits_while_it_is_put_together() -> None:
+    app, asked, answered, times = bare_app(None), threading.Event(), threading.Event(), 0
+
+    def slow() -> dict[str, Any]:
+        nonlocal times
+        times += 1
+        asked.set()
+        assert answered.wait(60), "the event loop waits for it"
+        return {"openapi": "3.1.0"}
+
+    app.openapi = slow  # type: ignore[method-assign]
+
+    async def three() -> list[httpx.Response]:
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://127.0.0.1") as client:
+            waiting = [asyncio.create_task(client.get("/api/v1/openapi.json")) for _ in range(2)]
+            await asyncio.to_thread(asked.wait)
+            assert (await client.get("/healthz")).status_code == 200
+            answered.set()
+            return [*await asyncio.gather(*waiting), await client.get("/api/v1/openapi.json")]
+
+    assert [answer.json() for answer in asyncio.run(three())] == [{"openapi": "3.1.0"}] * 3
+    assert times == 1
 
 
 CHECKS = "status_code_conformance,content_type_conformance,response_schema_conformance"
