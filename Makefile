@@ -8,8 +8,8 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 FOR_USE := .venv/installed-for-use
 FOR_DEVELOPMENT := .venv/installed-for-development
 
-# Each worker has half of the tests against the clock. One process: make test WORKERS=
-WORKERS ?= -n 2 --dist loadgroup
+# Each file of tests stays with one worker. One process: make test WORKERS=
+WORKERS ?= -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:

@@ -43,27 +43,6 @@ def lab_data(request: pytest.FixtureRequest) -> Path:
     return folder
 
 
-AGAINST_THE_CLOCK = (("server",), ("contract", "daq"))
-"""Folders whose tests run mock and host in real time, in two halves that take about as long."""
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """For two workers (`-n 2 --dist loadgroup`): each begins with a half of the tests against the clock, which stays
-    together, so that no two of them disturb each other there; of all others, each file is a group."""
-
-    def half(item: pytest.Item) -> int:
-        for number, folders in enumerate(AGAINST_THE_CLOCK):
-            if any(item.path.is_relative_to(ROOT / "tests" / folder) for folder in folders):
-                return number
-        return len(AGAINST_THE_CLOCK)
-
-    for item in items:
-        against = half(item) < len(AGAINST_THE_CLOCK)
-        item.add_marker(pytest.mark.xdist_group(AGAINST_THE_CLOCK[half(item)][0] if against else str(item.path)))
-    if hasattr(config, "workerinput"):
-        items.sort(key=half)
-
-
 def pytest_runtest_setup(item: pytest.Item) -> None:
     if item.get_closest_marker("hardware") and not item.config.getoption("--port"):
         pytest.skip("needs a real controller: --port URL")
