@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import datetime, timedelta
 from typing import Protocol
 
 from daq.contracts.errors import DaqError
@@ -15,11 +15,12 @@ from daq.contracts.service.experiments import Experiment, ExperimentRequest
 from daq.contracts.service.queue import QueueStatus
 from server.clock import Clock
 from server.owner.messages import Answer, HaltRun, RunExperiment
-from server.problems import conflict
+from server.problems import ProblemError, conflict
 from server.queue.endings import Ending, ending_of
 from server.queue.order import next_due
 from server.queue.readiness import Circumstances, what_is_missing
-from server.queue.states import Event, IllegalEventError
+from server.queue.room import require_room
+from server.queue.states import Event, IllegalEventError, advance
 from server.robot.control import ControlDesk
 from server.robot.robot import Robot
 from server.store.experiments import ExperimentStore
@@ -82,6 +83,8 @@ class QueueDesk:
         self._attended_until: float | None = None
         self._running: Running | None = None
         self._waiting_for = ""
+        self._hindered: dict[str, type[Exception]] = {}
+        """Schedules whose run is due and cannot be submitted, and what has been said about it."""
         self._state = self._state_at_start()
         self._worker = threading.Thread(target=self._work, name="queue", daemon=True)
 
@@ -238,17 +241,38 @@ class QueueDesk:
             self._changed.wait(LOOK_EVERY)
 
     def _submit_scheduled(self) -> None:
-        parts, now = self._parts, self._parts.clock.utc()
+        """A run that cannot be submitted stays due, and is tried again; it holds up no other, and not the queue."""
+        now = self._parts.clock.utc()
+        for identity in self._parts.schedules.due(self._parts.robot.name, now):
+            try:
+                self._submit_run(identity, now)
+                self._hindered.pop(identity, None)
+            except Exception as error:
+                if self._hindered.get(identity) is type(error):
+                    continue  # it has been said
+                self._hindered[identity] = type(error)
+                log.exception("schedule %s", identity)
+                why = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: see the log"
+                self._parts.told("schedule", f"schedule {identity}: its run waits: {why}")
+
+    def _submit_run(self, identity: str, now: datetime) -> None:
+        parts = self._parts
         name = parts.robot.name
-        if not parts.schedules.any_due(name, now):
+        schedule = parts.schedules.get(name, identity)
+        if parts.experiments.page(name, ("queued", "running"), identity, None, 1).items:
+            parts.schedules.leave_out(name, identity, now)
+            parts.told("schedule", f"schedule {identity}: the run before still waits; this one is left out")
             return
-        for schedule in parts.schedules.take_due(name, now):
-            if parts.experiments.page(name, ("queued", "running"), schedule.id, None, 1).items:
-                parts.told("schedule", f"schedule {schedule.id}: the run before still waits; this one is left out")
-                continue
-            request = ExperimentRequest(spec=schedule.spec, priority=schedule.priority)
-            made, _ = parts.experiments.submit(name, request, now, f"schedule {schedule.id}", schedule=schedule.id)
-            parts.told("experiment", f"queued by schedule {schedule.id}", experiment=made.id)
+        require_room(parts.robot.place.folder)
+        made, _ = parts.experiments.submit(
+            name,
+            ExperimentRequest(spec=schedule.spec, priority=schedule.priority),
+            now,
+            f"schedule {identity}",
+            schedule=identity,
+            also=lambda session: parts.schedules.count_run(session, name, identity, now),
+        )
+        parts.told("experiment", f"queued by schedule {identity}", experiment=made.id)
 
     def _take(self) -> Experiment | None:
         """The next experiment, with the control of the robot; None when none may begin now."""
@@ -296,7 +320,8 @@ class QueueDesk:
             parts.control.give_back_for_queue()
         with self._lock:
             ending = self._as_wished(ending, self._running)
-            why = f"experiment {experiment.id} was {ending.event} ({ending.reason}): look at the arm, then resume"
+            state = advance("running", ending.event)
+            why = f"experiment {experiment.id} ended as {state} ({ending.reason}): look at the arm, then resume"
             try:
                 held = ending.holds_queue and self._hold(why)  # whoever hears of the end finds the queue paused
                 parts.experiments.end(
@@ -304,7 +329,8 @@ class QueueDesk:
                 )
             finally:
                 self._running = None
-        parts.told("experiment", f"{ending.event}: {ending.reason}".rstrip(": "), experiment=experiment.id)
+        what = "completed" if ending.event is Event.COMPLETED else state
+        parts.told("experiment", f"{what}: {ending.reason}".rstrip(": "), experiment=experiment.id)
         if held:
             parts.told("queue", f"paused: {why}")
 

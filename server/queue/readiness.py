@@ -34,7 +34,7 @@ def what_is_missing(now: Circumstances) -> Missing | None:
         return Missing(f"the robot is not connected. {now.connection_problem}".strip())
     state, cause = now.arm.arm, now.arm.cause
     found = [
-        (now.arm.link == "lost", Missing("the link to the robot is lost")),
+        (now.arm.link == "lost" or state == "disconnected", Missing("the link to the robot is lost")),
         (
             state in ("stopped", "fault"),
             Missing(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 
@@ -58,10 +58,12 @@ class ExperimentStore:
         by: str,
         key: str | None = None,
         schedule: str | None = None,
+        also: Callable[[Session], None] = lambda _session: None,
     ) -> tuple[Experiment, bool]:
         """A new experiment, queued, and True; or the one that the same key made before, and False.
 
-        Raises a 409 when the key was used for something else.
+        `also` is done in the transaction that makes the experiment: both, or neither. Raises a 409 when the key was
+        used for something else.
         """
         digest = digest_of(request)
         with self._changing(robot) as session:
@@ -77,6 +79,7 @@ class ExperimentStore:
             )
             session.add(row)
             session.flush()
+            also(session)
             return as_experiment(row), True
 
     def get(self, robot: str, identity: str) -> Experiment:

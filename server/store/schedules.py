@@ -69,24 +69,23 @@ class ScheduleStore:
         with self._store.writing() as session:
             session.delete(_row(session, robot, identity))
 
-    def take_due(self, robot: str, now: datetime) -> list[Schedule]:
-        """Those whose run is due now; the run counts as made, and the next one is set."""
-        with self._store.writing() as session:
-            rows = session.scalars(select(ScheduleRow).filter_by(robot=robot, active=True))
-            due = [row for row in rows if is_due(row.next, now)]
-            for row in due:
-                assert row.next is not None
-                row.submitted_runs += 1
-                plan = Plan(row.starts, row.every, row.count)
-                row.next = following(plan, row.submitted_runs, row.next, now)
-            session.flush()
-            return [_schedule(row) for row in due]
-
-    def any_due(self, robot: str, now: datetime) -> bool:
-        """Whether `take_due` would return something: without the write lock."""
+    def due(self, robot: str, now: datetime) -> list[str]:
+        """Those whose run is due now."""
         with self._store.reading() as session:
-            query = select(ScheduleRow.next).filter_by(robot=robot, active=True)
-            return any(is_due(moment, now) for moment in session.scalars(query))
+            rows = session.execute(select(ScheduleRow.id, ScheduleRow.next).filter_by(robot=robot, active=True))
+            return [identity for identity, moment in rows if is_due(moment, now)]
+
+    def leave_out(self, robot: str, identity: str, now: datetime) -> None:
+        """The run that is due counts as made, though it is not. Raises a 404."""
+        with self._store.writing() as session:
+            self.count_run(session, robot, identity, now)
+
+    def count_run(self, session: Session, robot: str, identity: str, now: datetime) -> None:
+        """The run that is due counts as made, in the transaction that makes it; the next one is set. Raises a 404."""
+        row = _row(session, robot, identity)
+        assert row.next is not None
+        row.submitted_runs += 1
+        row.next = following(Plan(row.starts, row.every, row.count), row.submitted_runs, row.next, now)
 
 
 def _schedule(row: ScheduleRow) -> Schedule:

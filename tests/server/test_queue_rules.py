@@ -158,6 +158,7 @@ MOCK = REAL.model_copy(update={"simulated": True})
     [
         (Circumstances(None, None, "no such port", True, True), "the robot is not connected. no such port", False),
         (Circumstances(MOCK, _arm(link="lost"), "", True, True), "the link to the robot is lost", False),
+        (Circumstances(MOCK, _arm(arm="disconnected"), "", True, True), "the link to the robot is lost", False),
         (Circumstances(MOCK, _arm(arm="stopped", cause="x"), "", True, True), "the arm is stopped", True),
         (Circumstances(MOCK, _arm(arm="fault"), "", True, True), "the arm is fault", True),
         (Circumstances(MOCK, _arm(activity="jog"), "", True, True), "the arm is busy: jog", False),
