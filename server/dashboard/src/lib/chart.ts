@@ -1,6 +1,7 @@
 /** What a chart is made of, and how it is turned into uPlot's options. The component only draws it. */
 
 import uPlot from 'uplot';
+import { placedFlags } from './chart_flags';
 import { sparingPath } from './drawing/paths';
 
 export interface ChartSeries {
@@ -149,6 +150,9 @@ function select(plot: uPlot, drawing: ChartDrawing): void {
   plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
 }
 
+/** Which names are written first where there is not room for all; cursors are `warn`. */
+const RANKS = { bad: 0, warn: 1, plain: 2, tick: 3 } as const;
+
 /** Vertical lines with a flag, the names in words: colour is not their only sign. */
 function drawMarkers(plot: uPlot, drawing: ChartDrawing): void {
   const { ctx, bbox } = plot;
@@ -158,24 +162,35 @@ function drawMarkers(plot: uPlot, drawing: ChartDrawing): void {
   ctx.font = `${11 * ratio}px ${drawing.colours.font}`;
   ctx.textBaseline = 'top';
   ctx.textAlign = 'left';
-  let free = -Infinity;
-  for (const marker of drawing.markers()) {
-    if (marker.x < min || marker.x > max) continue;
-    const x = Math.round(plot.valToPos(marker.x, 'x', true));
-    const tone = marker.tone ?? 'plain';
-    const { soft, warn, bad } = drawing.colours;
-    ctx.strokeStyle = ctx.fillStyle = { plain: soft, tick: soft, warn, bad }[tone];
+  const { soft, warn, bad } = drawing.colours;
+  const colours = { plain: soft, tick: soft, warn, bad };
+  const marks = drawing
+    .markers()
+    .filter((marker) => marker.x >= min && marker.x <= max)
+    .map(({ x, label, tone = 'plain' }) => ({
+      x: Math.round(plot.valToPos(x, 'x', true)),
+      label,
+      tone,
+      rank: RANKS[tone],
+    }));
+  for (const { x, tone } of marks) {
+    ctx.strokeStyle = colours[tone];
     ctx.lineWidth = ratio;
     ctx.setLineDash(tone === 'plain' ? [2 * ratio, 3 * ratio] : []);
     ctx.beginPath();
     ctx.moveTo(x, tone === 'tick' ? bbox.top + bbox.height - 6 * ratio : bbox.top);
     ctx.lineTo(x, bbox.top + bbox.height);
     ctx.stroke();
-    const wide = ctx.measureText(marker.label).width;
-    if (wide > 0 && x + 4 * ratio > free && x + wide + 4 * ratio < bbox.left + bbox.width) {
-      ctx.fillText(marker.label, x + 4 * ratio, bbox.top + 2 * ratio);
-      free = x + wide + 10 * ratio;
-    }
+  }
+  const room = {
+    left: bbox.left,
+    right: bbox.left + bbox.width,
+    gap: 4 * ratio,
+    width: (text: string) => ctx.measureText(text).width,
+  };
+  for (const { left, text, index } of placedFlags(marks, room)) {
+    ctx.fillStyle = colours[marks[index]?.tone ?? 'plain'];
+    ctx.fillText(text, left, bbox.top + 2 * ratio);
   }
   ctx.restore();
 }
