@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { indexAfter, indexAt, measureStep } from './measures';
+import { goesOneWay, indexAfter, indexAt, measureStep, ONE_GO } from './measures';
 
 const PERIOD = 0.001;
 const time = Array.from({ length: 8001 }, (_, index) => index * PERIOD);
@@ -79,6 +79,43 @@ describe('what a window does not tell', () => {
     const early = measureStep({ time, position: secondOrder(0.4, 5), setPoint }, 0.9, 1.1)!;
     expect([early.riseTime, early.settlingTime]).toEqual([null, null]);
     expect(measureStep({ time, position: time, setPoint: null }, 1, 1.0005)).toBeNull();
+  });
+});
+
+describe('a motion that is no step', () => {
+  const control = Array.from({ length: 400 }, (_, index) => index * 0.02);
+  const oneWay = (goal: (moment: number) => number): boolean => goesOneWay(control, control.map(goal));
+
+  it('has neither rise time nor overshoot nor settling time', () => {
+    const goal = time.map((moment) => Math.sin(moment) + 0.1 * moment);
+    const found = measureStep({ time, position: goal, setPoint: goal }, 0, 8)!;
+    expect([found.isStep, found.riseTime, found.overshoot, found.settlingTime]).toEqual([
+      false,
+      null,
+      null,
+      null,
+    ]);
+    expect(found.finalError).toBe(0);
+  });
+
+  it('goes back, or rests in between', () => {
+    expect(oneWay((moment) => Math.sin(5 * moment))).toBe(false);
+    expect(oneWay((moment) => Math.floor(moment / (2 * ONE_GO)))).toBe(false);
+    expect(oneWay(() => 1)).toBe(false);
+  });
+
+  it('is none where it goes up or down in one go, also in small counts', () => {
+    expect(oneWay((moment) => (moment > 1 ? 5 : 2))).toBe(true);
+    expect(oneWay((moment) => -Math.floor(Math.min(10, Math.max(0, 10 * (moment - 1)))))).toBe(true);
+  });
+});
+
+describe('rise time', () => {
+  it('is of the way of the set point, as the service has it: an error at the beginning does not change it', () => {
+    const ramp = time.map((moment) => Math.min(10, Math.max(0, 5 * (moment - 1))));
+    const behind = ramp.map((value) => value + 1);
+    const found = measureStep({ time, position: behind, setPoint: ramp }, 0, 8)!;
+    expect(found.riseTime).toBeCloseTo(1.6, 2);
   });
 });
 

@@ -1,6 +1,7 @@
 /**
  * What a response between two cursors tells: rise time, overshoot, settling time, as they are defined in control
- * engineering and as the service computes them for a whole trace.
+ * engineering and as the service computes them for a whole trace: of the way of the set point, from where the window
+ * begins.
  */
 
 /** Rise time is counted between these shares of the way. */
@@ -19,6 +20,9 @@ export interface Response {
   readonly setPoint: ArrayLike<number> | null;
 }
 
+/** Sets of the set point further apart than this, s, are motions of their own. */
+export const ONE_GO = 0.5;
+
 /** A quantity that the window does not tell is null. Times in s, values in the unit of the position. */
 export interface StepMeasures {
   readonly begin: number;
@@ -27,6 +31,8 @@ export interface StepMeasures {
   /** The last set point of the window, or where the position ends when there is none. */
   readonly target: number;
   readonly targetIsSetPoint: boolean;
+  /** Whether the set point goes one way in one go. Only then are rise time, overshoot and settling time told. */
+  readonly isStep: boolean;
   /** From 10 % to 90 % of the way. */
   readonly riseTime: number | null;
   /** Beyond the target, in the direction of the motion. */
@@ -48,8 +54,9 @@ export function measureStep(response: Response, from: number, to: number): StepM
   const target = setPoint
     ? setPoint[end - 1]!
     : meanOf(position, end - Math.max(1, Math.round((end - first) * TAIL)), end);
-  const way = target - initial;
-  const moves = Math.abs(way) > spreadOf(position, first, end) * 1e-3;
+  const way = target - (setPoint ? setPoint[first]! : initial);
+  const isStep = setPoint === null || goesOneWay(time, setPoint, first, end);
+  const moves = isStep && Math.abs(way) > spreadOf(position, first, end) * 1e-3;
   const overshoot = moves ? overshootOf(position, first, end, target, Math.sign(way)) : null;
   return {
     begin: time[first]!,
@@ -57,12 +64,36 @@ export function measureStep(response: Response, from: number, to: number): StepM
     initial,
     target,
     targetIsSetPoint: setPoint !== null,
+    isStep,
     riseTime: moves ? riseTimeOf(response, first, end, initial, way) : null,
     overshoot,
     overshootShare: overshoot === null ? null : overshoot / Math.abs(way),
     settlingTime: moves ? settlingTimeOf(response, first, end, target, Math.abs(way)) : null,
     finalError: target - position[end - 1]!,
   };
+}
+
+/**
+ * Whether a set point goes one way in one go, as a step and a ramp do: never back, and never resting in between. A
+ * multisine or a staircase has no rise time.
+ */
+export function goesOneWay(
+  time: ArrayLike<number>,
+  setPoint: ArrayLike<number>,
+  first = 0,
+  end = setPoint.length,
+): boolean {
+  let direction = 0;
+  let last: number | null = null;
+  for (let index = first + 1; index < end; index++) {
+    const change = setPoint[index]! - setPoint[index - 1]!;
+    if (change === 0) continue;
+    if (direction === 0) direction = Math.sign(change);
+    const isRested = last !== null && time[index]! - last > ONE_GO;
+    if (Math.sign(change) !== direction || isRested) return false;
+    last = time[index]!;
+  }
+  return direction !== 0;
 }
 
 function riseTimeOf(
