@@ -182,6 +182,13 @@ class Robot:
         if owner is not None:
             owner.send(order)
 
+    def note_stop(self) -> None:
+        """The board has confirmed a stop: the arm is stopped, whenever its owner's report of that comes. No waiting."""
+        arm = self.arm
+        if arm is not None and arm.arm not in ("stopped", "fault"):
+            stopped = arm.model_copy(update={"arm": "stopped", "cause": "a stop that the board has confirmed"})
+            self._arm = Seen(stopped, self.clock.monotonic())
+
     def _begin(self) -> None:
         place = self.place
         self._problem = ""

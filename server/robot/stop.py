@@ -38,6 +38,7 @@ class StopDesk:
         begun = self._clock.monotonic()
         answer = self._ask()
         if answer.confirmed:
+            self._robot.note_stop()
             text = f"stopped, confirmed by the board: set points frozen at tick {answer.tick}. {answer.text}".strip()
         elif answer.delivered:
             text = f"stop sent, NOT CONFIRMED by the board: {answer.text}. Use the emergency stop."

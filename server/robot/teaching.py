@@ -44,6 +44,7 @@ class TeachingDesk:
         """The newest command of whoever holds the key. Raises a 409 when the arm will not, SpecError for a joint that
         is not there or too fast."""
         self._require_possible(velocities)
+        self._require_not_stopped()
         said = self._robot.clock.monotonic()
         with self._changed:
             if self._under_way is None or self._under_way[0] != "jog":
@@ -94,9 +95,7 @@ class TeachingDesk:
         if self._under_way is not None:
             line = f"the arm is busy: {self._under_way[0]}"
             raise conflict("arm-busy", line, "wait for its end, or stop it")
-        arm = self._robot.arm
-        if arm is not None and arm.arm in ("stopped", "fault"):
-            raise conflict("arm-stopped", f"the arm is {arm.arm}: {arm.cause}", "reset the robot when it is safe")
+        self._require_not_stopped()
         asked = self._robot.ask(order, **fields)
         self._result = self._problem = ""
         self._under_way = (activity, asked)
@@ -121,6 +120,11 @@ class TeachingDesk:
                 self._lines.append(
                     TeachingLine(number=next(self._numbers), at=self._robot.clock.utc(), text=report.text)
                 )
+
+    def _require_not_stopped(self) -> None:
+        arm = self._robot.arm
+        if arm is not None and arm.arm in ("stopped", "fault"):
+            raise conflict("arm-stopped", f"the arm is {arm.arm}: {arm.cause}", "reset the robot when it is safe")
 
     def _require_possible(self, velocities: dict[int, float]) -> None:
         machine = self._robot.machine

@@ -1,0 +1,69 @@
+"""Between the board's word that it has stopped and its owner's report of that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Future
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from daq.acquisition.stop_socket import StopAnswer
+from daq.contracts.machine import load_machine
+from daq.contracts.service.robot import ArmState
+from server.owner.messages import Answer, ArmReport
+from server.problems import ProblemError
+from server.robot.robot import Robot, RobotPlace
+from server.robot.stop import StopDesk
+from server.robot.teaching import TeachingDesk
+from tests.server.clocks import HandClock
+
+JOG = {2: 0.1}
+
+
+@pytest.fixture
+def robot(monkeypatch: pytest.MonkeyPatch) -> Robot:
+    """Connected, idle; what it is asked goes on."""
+    robot = Robot(RobotPlace("ma2000", "mock://", load_machine("ma2000"), Path()), HandClock())
+    monkeypatch.setattr(robot, "ask", lambda *_, **__: Future[Answer]())
+    robot._heard(_report("idle"))
+    return robot
+
+
+@pytest.fixture
+def desk(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> Iterator[StopDesk]:
+    """Whose stops are confirmed."""
+    answer = StopAnswer(robot="ma2000", port="mock://", delivered=True, confirmed=True, tick=7, text="")
+    monkeypatch.setattr("server.robot.stop.request_stop", lambda *_: [SimpleNamespace(answer=answer)])
+    desk = StopDesk(robot, HandClock())
+    yield desk
+    desk.close()
+
+
+def _report(arm: ArmState) -> ArmReport:
+    return ArmReport(arm=arm, cause="", activity="none", limp=(), link="connected", counters={})
+
+
+@pytest.mark.parametrize("jogging", [True, False])
+def test_nothing_is_jogged_after_a_confirmed_stop(robot: Robot, desk: StopDesk, jogging: bool) -> None:
+    teaching = TeachingDesk(robot, lambda _line: None)
+    if jogging:
+        teaching.jog(JOG)
+    assert desk.stop_now().confirmed
+    with pytest.raises(ProblemError) as refused:
+        teaching.jog(JOG)
+    assert (refused.value.status, refused.value.kind) == (409, "arm-stopped")
+    robot._heard(_report("stopped"))
+    with pytest.raises(ProblemError):
+        teaching.jog(JOG)
+    robot._heard(_report("idle"))  # after a reset
+    teaching.jog(JOG)
+    assert teaching.status().activity == "jog"
+
+
+def test_a_fault_keeps_its_cause_when_it_is_stopped_too(robot: Robot, desk: StopDesk) -> None:
+    fault = _report("fault").model_copy(update={"cause": "joint 2 moved"})
+    robot._heard(fault)
+    assert desk.stop_now().confirmed
+    assert robot.arm == fault
