@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import logging
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -39,6 +40,10 @@ TITLES = {
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """What the system says when nothing more can be written."""
+
+
+NO_FIELD = re.compile(r"(constrained|function)-.*|(dict|list|set|tuple)\[.*\]|\[key\]")
+"""Parts of a place of pydantic's that say which of a union's types was tried, or that a key is meant."""
 
 
 class ProblemError(Exception):
@@ -130,7 +135,7 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(RequestValidationError)
     async def not_valid(request: Request, error: RequestValidationError) -> JSONResponse:
-        fields = [FieldProblem(field=_where(one["loc"]), message=_what(one)) for one in error.errors()[:20]]
+        fields = [FieldProblem(field=_where(one), message=_what(one)) for one in error.errors()[:20]]
         detail = f"{fields[0].field}: {fields[0].message}" if fields else "the request is not valid"
         advice = "correct the fields named; /api/v1/openapi.json says what is allowed"
         return response(request, ProblemError(422, "not-valid", detail, advice, fields))
@@ -165,10 +170,14 @@ def install(app: FastAPI) -> None:
         return response(request, ProblemError(500, "fault", detail, "the log has more, under the request's id"))
 
 
-def _where(place: tuple[int | str, ...]) -> str:
-    """A field as a client writes it: what pydantic says about unions and bodies is left out."""
+def field_of(place: Sequence[int | str]) -> str:
+    """A field as a client writes it: what pydantic says about unions, keys and bodies is left out."""
     parts = [str(part) for part in place if part not in ("body", "query", "path", "header")]
-    return ".".join(part for part in parts if not part.startswith(("constrained-", "function-"))) or "body"
+    return ".".join(part for part in parts if not NO_FIELD.fullmatch(part)) or "body"
+
+
+def _where(error: Mapping[str, Any]) -> str:
+    return "body" if error["type"] == "json_invalid" else field_of(error["loc"])  # which has the byte's number
 
 
 def _what(error: Mapping[str, Any]) -> str:

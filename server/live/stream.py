@@ -14,7 +14,7 @@ from daq.contracts.service.live import JogCommand, LiveRequest, RefusedMessage, 
 from server.access.caller import Caller
 from server.live.hub import Client
 from server.live.outbox import Outbox
-from server.problems import ProblemError
+from server.problems import ProblemError, field_of
 from server.services import RobotServices
 
 BASE_RATE = 50
@@ -23,6 +23,7 @@ TOO_SLOW = 1013
 GOING_AWAY = 1001
 LOOK_EVERY = 1.0
 """s between two looks at whether a client that takes nothing is to be dropped."""
+ADVICE = "docs/service.md tells what this socket takes"
 log = logging.getLogger("server.live")
 
 
@@ -72,13 +73,19 @@ async def _send(socket: WebSocket, one: RobotServices, client: Client) -> None:
 
 async def _receive(socket: WebSocket, one: RobotServices, client: Client, who: Caller) -> None:
     while True:
-        text = await socket.receive_text()
+        message = await socket.receive()
+        if message["type"] == "websocket.disconnect":
+            return
+        text = message.get("text")
+        if text is None:
+            _refuse(one, client, "a message is text, not bytes", ADVICE)
+            continue
         try:
             await _take(LiveRequest.model_validate_json(text), one, client, who)
         except ValidationError as error:
             first = error.errors()[0]
-            where = ".".join(str(part) for part in first["loc"]) or "message"
-            _refuse(one, client, f"{where}: {first['msg']}", "docs/service.md tells what this socket takes")
+            where = field_of(first["loc"]) if first["loc"] else "message"
+            _refuse(one, client, f"{where}: {first['msg']}", ADVICE)
         except ProblemError as error:
             _refuse(one, client, error.detail, error.advice)
         except DaqError as error:

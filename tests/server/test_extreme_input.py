@@ -42,3 +42,28 @@ def test_a_body_nested_beyond_measure_is_refused(service: Service, body: bytes) 
     assert (model.status_code, model.json()["type"]) == (422, "docs/service.md#not-a-model"), model.text
     experiment = service.robot.post("/experiments", content=body, headers=headers)
     assert experiment.status_code in (400, 422), experiment.text
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "fields"),
+    [
+        ("/experiments", "{", ["body"]),
+        ("/experiments", "{}}", ["body"]),
+        (
+            "/experiments",
+            '{"spec": {"trajectory": {"kind": "ramp", "amplitude": [1]}}}',
+            ["spec.trajectory.ramp.amplitude"],
+        ),
+        (
+            "/experiments",
+            '{"spec": {"trajectory": {"kind": "ramp", "amplitude": {"9": 1}}}}',
+            ["spec.trajectory.ramp.amplitude", "spec.trajectory.ramp.amplitude.9"],
+        ),
+        ("/experiments", '{"spec": {"gains": {"9": [1, 2, 3]}}}', ["spec.gains.9"]),
+        ("/teaching/jog", '{"velocities": {"9": 1}}', ["velocities.9"]),
+    ],
+)
+def test_a_field_is_named_as_its_client_writes_it(service: Service, path: str, body: str, fields: list[str]) -> None:
+    answer = service.robot.post(path, content=body, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 422
+    assert sorted({one["field"] for one in answer.json()["fields"]}) == fields

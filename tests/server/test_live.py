@@ -79,10 +79,12 @@ def test_a_stop_is_seen_by_whoever_watches(service: Service) -> None:
 
 def test_what_is_not_understood_is_refused_in_one_line_and_the_stream_goes_on(service: Service) -> None:
     with watching(service, subscribe=["robot"]) as socket:
-        for text in ("{", "[]", '{"subscribe":["everything"]}', '{"rate":7}', '{"shell":"ls"}'):
+        for text in ("{", "[]", b"{}", b"\xff", '{"subscribe":["everything"]}', '{"rate":7}', '{"shell":"ls"}'):
             socket.send(text)
             refused = next(messages(socket, "refused"))
             assert refused.detail
+        socket.send('{"jog": {"lease": "no lease", "velocities": {"9": 0.1}}}')
+        assert next(messages(socket, "refused")).detail.startswith("jog.velocities.9: ")
         socket.send('{"history":1}')
         assert next(messages(socket, "history"))
 
