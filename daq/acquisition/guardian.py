@@ -22,6 +22,8 @@ from daq.acquisition.stop_socket import StopAnswer
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _CLOSE = b"\0"
 """In the wake-up pipe, beside the numbers of signals."""
+CANCEL = b"cancel\n"
+"""What a parent says that is a service; anything else is a stop too."""
 CLIENT_PATIENCE = 0.1
 """s that a client may take to accept its answer, a line that fits into any socket's buffer."""
 
@@ -32,6 +34,7 @@ class EndCause(Enum):
     STOP = "stopped on request, by daq stop or through the service"
     """Through the stop socket, which does not tell who asks."""
     PARENT = "stopped by Ctrl-C, or by the program that started the run"
+    CANCELLED = "stopped by the service: what ran was cancelled, or nobody had the control any more"
     SIGNAL = "stopped by a signal"
     ORPHANED = "the process that started this run is gone"
     DEAF = "this run could no longer be stopped from outside"
@@ -122,7 +125,8 @@ class Guardian:
     def _parent_speaks(self) -> bool:
         assert self._parent is not None
         said = os.read(self._parent, 4096)
-        self._end(EndCause.PARENT if said else EndCause.ORPHANED)
+        by = EndCause.CANCELLED if said.startswith(CANCEL) else EndCause.PARENT
+        self._end(by if said else EndCause.ORPHANED)
         return bool(said)
 
     def _answer_client(self) -> None:

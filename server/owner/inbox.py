@@ -13,6 +13,7 @@ from contextlib import contextmanager
 
 from pydantic import ValidationError
 
+from daq.acquisition.guardian import CANCEL
 from daq.contracts.errors import SpecError
 from server.owner.messages import (
     ORDER,
@@ -102,7 +103,7 @@ class Inbox:
     def _put(self, order: Order) -> None:
         match order:
             case HaltRun():
-                self._end_what_runs()
+                self._end_what_runs(CANCEL)
             case Finish():
                 self.finish.set()
             case JogDrive():
@@ -118,14 +119,14 @@ class Inbox:
             case _:
                 self._waiting.put(order)
 
-    def _end_what_runs(self) -> None:
+    def _end_what_runs(self, said: bytes) -> None:
         with self._lock:
             if self.busy.is_set():
-                os.write(self._to_guardian, b"stop\n")
+                os.write(self._to_guardian, said)
 
     def _leave(self, told: bool) -> None:
         """The guardian takes the end of its pipe as the loss of whoever started the work."""
         if told:
-            self._end_what_runs()
+            self._end_what_runs(b"stop\n")
         elif self.busy.is_set():
             os.close(self._to_guardian)

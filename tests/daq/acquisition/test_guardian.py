@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from daq.acquisition import stop_socket
-from daq.acquisition.guardian import EndCause, Guardian
+from daq.acquisition.guardian import CANCEL, EndCause, Guardian
 from daq.acquisition.stop_socket import StopAnswer, request_stop, stop_listener
 
 CONFIRMED = StopAnswer(robot="arm", delivered=True, confirmed=True, tick=7)
@@ -97,6 +97,13 @@ def test_a_word_of_the_parent_is_a_stop_and_its_end_the_loss_of_it() -> None:
         scene.freezes.wait()
         assert scene.freezes.causes[-1] == EndCause.ORPHANED.value
         assert scene.guardian.cause is EndCause.PARENT, "the first cause is kept"
+
+
+def test_a_cancel_of_the_service_is_called_one_however_often_it_is_said() -> None:
+    with guarded() as scene:
+        os.write(scene.parent, 2 * CANCEL)
+        scene.freezes.wait()
+        assert scene.guardian.cause is EndCause.CANCELLED
 
 
 def test_the_loss_of_the_parent_is_told_once() -> None:
