@@ -10,7 +10,7 @@ import createClient from 'openapi-fetch';
 import { notAnswered, Problem, problemOf } from './problem';
 import type { paths } from './schema';
 import { currentToken } from './token';
-import type { Told } from './types';
+import type { Health, Told } from './types';
 
 export const api = createClient<paths>({ baseUrl: location.origin });
 
@@ -52,6 +52,16 @@ export async function ask<T>(request: Promise<Answer<T>>): Promise<Told<T>> {
   }
   if (!answer.response.ok) throw problemOf(answer.response.status, answer.error);
   return answer.data as Told<T>;
+}
+
+/** How the service is. One that is not ready says so with a 503, whose body is what is wanted. Throws a Problem. */
+export async function readiness(): Promise<Health> {
+  const answer = await fetch('/readyz').catch(() => {
+    throw notAnswered();
+  });
+  const body: unknown = await answer.json().catch(() => null);
+  if (!(answer.ok || answer.status === 503) || body === null) throw problemOf(answer.status, body);
+  return body as Health;
 }
 
 /** The address of a file to download: a picture, a trace. With a token the file is fetched first: see `download`. */

@@ -1,3 +1,3 @@
-export { addressOf, api, ask, download, here } from './client';
+export { addressOf, api, ask, download, here, readiness } from './client';
 export { asProblem, Problem } from './problem';
 export type * from './types';

@@ -45,13 +45,14 @@ export function problemOf(status: number, body: unknown): Problem {
   return new Problem(status, kind, details.detail, details.advice ?? '', details.fields ?? []);
 }
 
-/** Anything that was thrown, as a problem. */
+/** What browsers throw where nobody has answered: Chromium, Firefox, Safari. */
+const UNANSWERED = /^(failed to fetch|networkerror when attempting to fetch resource|load failed)\.?$/i;
+
+/** Anything that was thrown, as a problem. What the page has thrown with words of its own is told in them alone. */
 export function asProblem(error: unknown): Problem {
   if (error instanceof Problem) return error;
-  return new Problem(
-    0,
-    'fault',
-    error instanceof Error ? error.message : String(error),
-    'load the page again',
-  );
+  const text = error instanceof Error ? error.message : String(error);
+  if (error instanceof TypeError && UNANSWERED.test(text)) return notAnswered();
+  const isFault = !(error instanceof Error) || error.name !== 'Error';
+  return new Problem(0, 'fault', text, isFault ? 'load the page again' : '');
 }

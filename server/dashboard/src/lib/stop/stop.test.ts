@@ -90,6 +90,14 @@ describe('a press of Stop', () => {
     expect(last()).toMatchObject({ text: expect.stringContaining('sent again') as string });
   });
 
+  it('says in words of its own that nobody answers', async () => {
+    begin(() => Promise.reject(new TypeError('Failed to fetch')));
+    await pass(0);
+    expect((last() as { text: string }).text).toMatch(
+      /^The service does not answer\. Use the emergency stop\./,
+    );
+  });
+
   it('is confirmed by an answer that comes late', async () => {
     let answer: (result: StopResult) => void = () => {};
     begin(() => new Promise((resolve) => (answer = resolve)));

@@ -5,6 +5,7 @@
  * nothing about a browser: what sends, and what tells the time, is handed in.
  */
 
+import { asProblem } from '../api/problem';
 import type { StopResult } from '../api/types';
 import { sentence } from './words';
 
@@ -82,7 +83,7 @@ export class StopCall {
   private failed(error: unknown): void {
     this.failures += 1;
     if (this.ended || this.failures < this.parts.doors.length) return;
-    this.tellUndelivered(sentence(error instanceof Error ? error.message : String(error)));
+    this.tellUndelivered(sentence(asProblem(error).detail));
   }
 
   private silent(): void {
