@@ -6,9 +6,7 @@
 import { api, ask, here } from '../api/client';
 import { asProblem, type Problem } from '../api/problem';
 import type { ControlLease } from '../api/types';
-
-/** Share of the time between heartbeats that the service asks for: a busy browser is late. */
-const EARLY = 0.6;
+import { LeaseKeeper } from './lease';
 
 class ControlHeld {
   /** The lease, while this tab has the control. */
@@ -16,7 +14,22 @@ class ControlHeld {
   problem = $state.raw<Problem | null>(null);
   /** Whether the operator's word for a real arm is what is missing. */
   needsConsent: boolean = $derived(this.problem?.kind === 'consent-needed');
-  private timer: ReturnType<typeof setTimeout> | undefined;
+  private readonly keeper = new LeaseKeeper({
+    renew: (lease) => {
+      const params = { path: here(), header: { 'Control-Lease': lease } };
+      return ask(api.PUT('/api/v1/robots/{robot}/control', { params }));
+    },
+    after: (seconds, call) => {
+      const timer = setTimeout(call, seconds * 1000);
+      return () => clearTimeout(timer);
+    },
+    told: (lease) => {
+      this.lease = lease;
+    },
+    lost: (problem) => {
+      this.problem = problem;
+    },
+  });
 
   constructor() {
     addEventListener('pagehide', () => this.leave());
@@ -32,7 +45,8 @@ class ControlHeld {
     this.problem = null;
     try {
       const body = { moves_real_arm: movesRealArm };
-      this.keep(await ask(api.POST('/api/v1/robots/{robot}/control', { params: { path: here() }, body })));
+      const params = { path: here() };
+      this.keeper.keep(await ask(api.POST('/api/v1/robots/{robot}/control', { params, body })));
     } catch (error) {
       this.problem = asProblem(error);
     }
@@ -40,34 +54,11 @@ class ControlHeld {
 
   async giveBack(): Promise<void> {
     const header = this.header();
-    this.forget();
+    this.keeper.forget();
     try {
       await ask(api.DELETE('/api/v1/robots/{robot}/control', { params: { path: here(), header } }));
     } catch (error) {
       this.problem = asProblem(error);
-    }
-  }
-
-  private keep(lease: ControlLease): void {
-    this.lease = lease;
-    clearTimeout(this.timer);
-    this.timer = setTimeout(() => void this.renew(), EARLY * lease.heartbeat_every * 1000);
-  }
-
-  private async renew(): Promise<void> {
-    if (this.lease === null) return;
-    const params = { path: here(), header: this.header() };
-    try {
-      this.keep(await ask(api.PUT('/api/v1/robots/{robot}/control', { params })));
-    } catch (error) {
-      const problem = asProblem(error);
-      if (problem.status === 0) {
-        // The service may be back before the lease lapses.
-        this.timer = setTimeout(() => void this.renew(), 1000);
-        return;
-      }
-      this.forget();
-      this.problem = problem;
     }
   }
 
@@ -76,11 +67,6 @@ class ControlHeld {
     if (this.lease === null) return;
     const params = { path: here(), header: this.header() };
     void api.DELETE('/api/v1/robots/{robot}/control', { params, keepalive: true }).catch(() => {});
-  }
-
-  private forget(): void {
-    clearTimeout(this.timer);
-    this.lease = null;
   }
 }
 
