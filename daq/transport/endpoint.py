@@ -129,7 +129,7 @@ def _is_busy(error: Exception) -> bool:
 def _why_serial_failed(device: str, error: Exception) -> str:
     text = str(error)
     if _is_busy(error):
-        return f"{device} is in use by another program: end that one, or stop the arm with `daq stop`"
+        return f"{device} is in use by another program: end that one, or stop the arm with `daq stop` as its user"
     if "No such file" in text:
         return f"{device} does not exist: `daq ports` lists the ports that do"
     if "Permission denied" in text:

@@ -16,7 +16,8 @@ from daq.contracts.errors import DaqError
 from server.owner.messages import REPORT, Answer, Close, Open, Order, Report
 
 GRACE = 4.0
-"""s that the process has to freeze the arm and close its trace when the service ends; it goes on alone after that."""
+"""s that the process has to freeze the arm and close its trace when the service ends; it goes on alone after that,
+as the unit in deploy/ lets it."""
 log = logging.getLogger("server.robot")
 
 
