@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { DiagnosisData, DiagnosisStep, SignalError } from '../api/types';
-import { gapOf, goneOf, logBounds, logPlace, logTicks } from './gap';
+import { gapOf, goneOf, ticksFromZero } from './gap';
 
 const error = (before: number, after: number): SignalError => ({
   joint: 2,
@@ -59,11 +59,12 @@ describe('the gap, step by step', () => {
     expect(goneOf(0.12, 0.1, 0.1)).toBeNull();
   });
 
-  it('has round bounds and ticks on a logarithmic scale', () => {
-    expect(logBounds([0.03, 0.9])).toEqual([0.02, 1]);
-    expect(logTicks(0.02, 1)).toEqual([0.02, 0.05, 0.1, 0.2, 0.5, 1]);
-    expect(logPlace(0.1, 0.01, 1)).toBeCloseTo(0.5);
-    expect(logPlace(0, 0.01, 1)).toBe(0);
-    expect(logBounds([])).toEqual([0.1, 1]);
+  it('has an axis from 0, so that the height of the noise floor can be compared', () => {
+    expect(ticksFromZero([0.03, 0.9])).toEqual([0, 0.5, 1]);
+    expect(ticksFromZero([2.1])).toEqual([0, 1, 2, 3]);
+    expect(ticksFromZero([0.021, 0.02])).toEqual([0, 0.01, 0.02, 0.03]);
+    expect(ticksFromZero([])).toEqual([0, 1]);
+    for (const most of [0.0123, 0.95, 1, 7.7, 333])
+      expect(ticksFromZero([most]).at(-1)).toBeGreaterThan(most);
   });
 });

@@ -75,39 +75,16 @@ export function goneOf(before: number, after: number, floor: number): number | n
   return (before ** 2 - after ** 2) / (before ** 2 - floor ** 2);
 }
 
-/** A place from 0 to 1 on a logarithmic scale between two errors. */
-export function logPlace(value: number, low: number, high: number): number {
-  if (!(low > 0) || !(high > low)) return 0;
-  return Math.min(1, Math.max(0, Math.log(Math.max(value, low) / low) / Math.log(high / low)));
-}
-
-/** Round bounds of a logarithmic scale that holds all of these values: 1, 2 or 5 times a power of ten. */
-export function logBounds(values: readonly number[]): [number, number] {
-  const own = values.filter((value) => value > 0);
-  if (own.length === 0) return [0.1, 1];
-  const low = roundDown(Math.min(...own) / 1.1);
-  const high = roundUp(Math.max(...own) * 1.1);
-  return [low, high > low ? high : low * 10];
-}
-
-/** The round values between two bounds. */
-export function logTicks(low: number, high: number): number[] {
-  const ticks: number[] = [];
-  for (let power = Math.floor(Math.log10(low)); power <= Math.ceil(Math.log10(high)); power += 1) {
-    for (const digit of [1, 2, 5]) {
-      const value = digit * 10 ** power;
-      if (value >= low * 0.999 && value <= high * 1.001) ticks.push(Number(value.toPrecision(3)));
-    }
-  }
-  return ticks;
+/** Round values from 0 to beyond the largest of these: the ticks of an axis, the last one its end. */
+export function ticksFromZero(values: readonly number[]): number[] {
+  const most = Math.max(0, ...values);
+  if (most === 0) return [0, 1];
+  const step = roundUp(most / 4);
+  const count = Math.ceil((most * 1.05) / step);
+  return Array.from({ length: count + 1 }, (_, index) => Number((index * step).toPrecision(3)));
 }
 
 const ROUND = [1, 2, 5, 10];
-
-function roundDown(value: number): number {
-  const power = 10 ** Math.floor(Math.log10(value));
-  return power * (ROUND.findLast((digit) => digit * power <= value * 1.0001) ?? 1);
-}
 
 function roundUp(value: number): number {
   const power = 10 ** Math.floor(Math.log10(value));

@@ -55,11 +55,17 @@ export function proper(text: string): string {
     .replace(/\bback emf\b/g, 'back-EMF');
 }
 
-/** The first letter of a sentence as a capital one, and a full stop at its end. */
+/** A sentence of the service: its first letter a capital one, a full stop at its end, and in words that people use. */
 export function sentence(text: string): string {
   if (text === '') return '';
-  const begun = text.charAt(0).toUpperCase() + text.slice(1);
+  const begun = capital(plain(text));
   return /[.!?]$/.test(begun) ? begun : `${begun}.`;
+}
+
+function plain(text: string): string {
+  return text
+    .replace(/\b(\d+) trace\(s\)/g, (_, count: string) => `${count} trace${count === '1' ? '' : 's'}`)
+    .replace(/\b(\d+) nats more/g, 'more (information gain $1)');
 }
 
 /** `a`, `a and b`, `a, b and c`. */

@@ -1,0 +1,41 @@
+/** Sentences that say why two things on the page of a diagnosis do not contradict each other. */
+
+import type { DiagnosisData, PhaseCell } from '../api/types';
+import { fixed } from '../format';
+import { candidateName } from './words';
+
+/** Evidence from which on an effect is named. */
+export const NEEDED = 12;
+
+/** Why a residual that goes surely with something is no finding; empty where the diagnosis names one. */
+export function whyNotCounted(
+  found: Pick<DiagnosisData, 'verdict' | 'steps'>,
+  where: { readonly joint: number | null },
+): string {
+  if (found.verdict !== 'nothing-significant') return '';
+  const size =
+    where.joint === null
+      ? 'σ tells how surely the mean goes with it, not how large it is: no joint is off by more than noise. '
+      : '';
+  const [best] = found.steps
+    .flatMap((step) => step.candidates)
+    .sort((one, other) => other.evidence - one.evidence);
+  const nearest =
+    best === undefined ? '' : `; the best, ${candidateName(best)}, has ${fixed(best.evidence, 0)}`;
+  return `${size}It is no finding: an effect is named from evidence ${NEEDED} on${nearest}.`;
+}
+
+/** What a cell of the map is, beside a sentence about whole phases; empty without a cell. */
+export function cellMeaning(cells: readonly PhaseCell[], trace: number, chance: number): string {
+  const own = cells.filter((cell) => cell.trace === trace);
+  if (own.length === 0) return '';
+  const length = Math.max(...own.map((cell) => cell.end - cell.start));
+  const quiet = own.filter((cell) => cell.significance <= chance);
+  const most = Math.max(0, ...quiet.map((cell) => Math.sqrt(cell.mean_square)));
+  const reached =
+    quiet.length === 0 ? '' : `, which chance alone takes up to ${fixed(most, 1)} times the noise here`;
+  return (
+    `The sentence above is of all windows of a joint's phase together; a cell is one window of ${fixed(length, 1)} s, ` +
+    `or the few that share its place${reached}. Beyond chance: ${own.length - quiet.length} of ${own.length} windows.`
+  );
+}
