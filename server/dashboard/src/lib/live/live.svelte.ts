@@ -26,6 +26,7 @@ import { armNow } from '../stop/standing';
 import { stop } from '../stop/stop.svelte';
 import { ServiceClock, STALE_AFTER } from './age';
 import { asked, newTicket } from './asked';
+import { ReceivedRate } from './rate';
 import { Recording } from './recording';
 
 const SHOWN_EVERY = 100;
@@ -81,6 +82,10 @@ class Live {
   now = $state(seconds());
   /** Largest lateness of samples in the last second, s. */
   jitter = $state<number | null>(null);
+  /** Samples a second that arrive, Hz; null while none do. */
+  rate = $state<number | null>(null);
+  /** Whether the service has lately left out samples for this page, which did not take them in time. */
+  isThinned = $state(false);
   isOpen: boolean = $derived(this.socket.phase === 'open');
   /** Whether there is no connection where there was one, or should be. */
   isMissing: boolean = $derived(isMissing(this.socket, this.silence !== null));
@@ -93,6 +98,7 @@ class Live {
   newest: SampleMessage | null = null;
   private listeners = new Set<(message: LiveMessage) => void>();
   private lateness: number[] = [];
+  private readonly received = new ReceivedRate();
   /** What was said before it was known what the robot is, and when. */
   private unheard: [LiveFrame, number][] = [];
   private connection: LiveSocket | null = null;
@@ -247,6 +253,7 @@ class Live {
         this.refused = message.detail;
         break;
       case 'thinned':
+        this.received.thinned(seconds());
         break;
     }
   }
@@ -256,6 +263,7 @@ class Live {
     this.newest = sample;
     this.recording?.addSample(sample);
     this.lateness.push(sample.lateness);
+    this.received.heard(seconds());
     if (isFirst) this.tick();
   }
 
@@ -268,6 +276,8 @@ class Live {
   private tick(): void {
     this.now = seconds();
     this.silence = this.clock.silence(this.now);
+    this.rate = this.received.rate(this.now);
+    this.isThinned = this.received.isThinned(this.now);
     this.tellStop();
     if (this.newest !== this.sample) this.sample = this.newest;
     this.sampleAge = this.newest === null ? null : this.clock.age(this.newest.host_time, this.now);
