@@ -67,18 +67,43 @@ def judge(observation: Observation, point: Point) -> Judged:
 
 
 def refitted(observation: Observation, before: Judged, probed: Probed) -> Refitted | None:
-    """A candidate fitted from where its probe points to; None where the simulation does not stay finite."""
-    candidate = probed.candidate
-    start = _started(before.point, probed)
-    changing = _indices(start.unknowns, [p.name for p in candidate.free])
-    try:
-        point = point_at(observation, start.model, start.unknowns, start.values, start.noise, start.tangents)
-        if not np.isfinite(point.weighted).all():
-            return None
-        point = searched(observation, point, STEPS, changing)
-    except SpecError:
-        return None
-    return _with_evidence(observation, before, candidate, point, probed.gain)
+    """A candidate fitted from where its probe points to, and, where that leads nowhere, from the numbers that are
+    expected: a strong effect may have driven the tolerance parameters far off. None where no simulation stays finite.
+    """
+    found: list[Point] = []
+    for fit in (_nearby, _from_expected):
+        try:
+            point = fit(observation, before.point, probed)
+        except SpecError:
+            continue  # at the brink of instability, where a delay is missing
+        if point is not None:
+            found.append(point)
+            if point.cost < before.point.cost:
+                break
+    best = min(found, key=lambda p: p.cost, default=None)
+    return None if best is None else _with_evidence(observation, before, probed.candidate, best, probed.gain)
+
+
+def _nearby(observation: Observation, before: Point, probed: Probed) -> Point | None:
+    """A fit from where the probe points to."""
+    start = _started(before, probed)
+    changing = _indices(start.unknowns, [p.name for p in probed.candidate.free])
+    point = point_at(observation, start.model, start.unknowns, start.values, start.noise, start.tangents)
+    return searched(observation, point, STEPS, changing) if np.isfinite(point.weighted).all() else None
+
+
+def _from_expected(observation: Observation, before: Point, probed: Probed) -> Point | None:
+    """A fit from the expected values of all that has a prior, and the best of the candidate's trials there."""
+    best: Point | None = None
+    for trial in probed.candidate.trials:
+        start = _started(before, replace(probed, start=trial, moved=np.zeros_like(probed.moved)))
+        values = np.array(
+            [u.expected if u.deviation is not None else v for u, v in zip(start.unknowns, start.values, strict=True)]
+        )
+        tried = point_at(observation, start.model, start.unknowns, values, observation.quiet, start.tangents)
+        if np.isfinite(tried.weighted).all() and (best is None or tried.cost < best.cost):
+            best = tried
+    return None if best is None else settled(observation, best, STEPS)
 
 
 def polished(observation: Observation, before: Judged, found: Refitted) -> Refitted:
@@ -152,7 +177,10 @@ def _with_evidence(
     price = len(candidate.free) * math.log(observation.samples)
     if candidate.name in TONES:
         price += 2 * math.log(MOST_TONES) - math.log(observation.samples)  # the tries are what the frequency costs
-    return Refitted(candidate, after, before.description - after.description - price, promised)
+    fall = before.description - after.description
+    if point.cost > before.point.cost:  # the fit did not come to its end: what more freedom leaves is never more
+        fall = min(fall, before.point.cost - point.cost)
+    return Refitted(candidate, after, fall - price, promised)
 
 
 def _indices(unknowns: Sequence[Unknown], names: Sequence[str]) -> list[int]:

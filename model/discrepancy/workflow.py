@@ -226,10 +226,11 @@ def _turn(
     observation, model = case.observation, best.judged.point.model
     best = replace(best, judged=judge(observation, settled(observation, best.judged.point, LAST_STEPS)))
     held = _held(case, current.point, best.judged.point)
-    rejected = _rejected(case, best, *held)
+    held_errors = _held_errors(case, model, *held)
+    removed = excess_removed(held_errors)
+    rejected = _rejected(case, best, *held, removed)
     where = _where(case, current.point)
     values = found_values(observation, best)
-    held_errors = _held_errors(case, model, *held)
     candidates = tuple(listed(r) for r in ranking.fitted) + only_probed(ranking, observation.samples)
     reason = reasons.reason(
         best.candidate.name, best.candidate.joints, values, best.evidence, decision.margin,
@@ -240,7 +241,7 @@ def _turn(
         effect=best.candidate.name, joints=best.candidate.joints, parameters=values, evidence=best.evidence,
         margin=decision.margin, candidates=candidates, group=tuple(listed(r) for r in decision.group),
         rmse_fit=errors(observation, model, current.point.residuals, best.judged.point.residuals, case.floor),
-        rmse_holdout=held_errors, excess_removed_holdout=excess_removed(held_errors),
+        rmse_holdout=held_errors, excess_removed_holdout=removed,
         sum_lambda2_before=_sum_lambda2(current.point, current.point),
         sum_lambda2_after=_sum_lambda2(best.judged.point, current.point),
         where=where, reason=reason, adopted=rejected is None, rejected_because=rejected,
@@ -257,10 +258,13 @@ def _held_errors(case: _Case, model: Model, before: Signals, after: Signals) -> 
     return () if case.held is None else errors(case.held.observation, model, before, after, case.floor_held)
 
 
-def _rejected(case: _Case, best: Refitted, before: Signals, after: Signals) -> str | None:
-    """Why the step is not taken, if held-out traces speak against it."""
+def _rejected(case: _Case, best: Refitted, before: Signals, after: Signals, removed: float | None) -> str | None:
+    """Why the step is not taken, if held-out traces speak against it. `removed`: share of their excess that it takes
+    off, None where they show none."""
     if case.held is None:
         return None
+    if removed is not None and removed < 0.0:
+        return f"the error on the held-out traces grows, by {-removed:.0%} of what is beyond noise there"
     rise, deviation = case.held.rise(before, after)
     if rise > min(case.thresholds.worse * deviation, best.evidence - case.thresholds.significant):
         return (
