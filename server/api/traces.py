@@ -8,10 +8,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import FileResponse
-from pydantic import AwareDatetime
 from starlette.background import BackgroundTask
 
-from daq.contracts.service.base import Page
+from daq.contracts.service.base import Moment, Page
 from daq.contracts.service.traces import (
     CatalogueEntry,
     Source,
@@ -51,8 +50,8 @@ async def list_traces(
     source: Source | None = None,
     outcome: Outcome | None = None,
     kind: Annotated[str | None, Query(max_length=32)] = None,
-    since: AwareDatetime | None = None,
-    until: AwareDatetime | None = None,
+    since: Moment | None = None,
+    until: Moment | None = None,
     limit: Limit = 50,
     cursor: CursorOf = None,
 ) -> Page[CatalogueEntry]:

@@ -21,6 +21,13 @@ def test_a_moment_that_utc_does_not_have_is_refused(service: Service, path: str,
     assert "years 1 to 9999" in answer.json()["detail"]
 
 
+@pytest.mark.parametrize("moment", NO_MOMENTS)
+@pytest.mark.parametrize("field", ["since", "until"])
+def test_traces_of_such_a_moment_are_not_looked_for(service: Service, field: str, moment: str) -> None:
+    answer = service.robot.get("/traces", params={field: moment})
+    assert (answer.status_code, [one["field"] for one in answer.json()["fields"]]) == (422, [field]), answer.text
+
+
 def _cursor(text: str) -> str:
     return base64.urlsafe_b64encode(text.encode()).decode()
 

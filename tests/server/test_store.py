@@ -37,6 +37,14 @@ def store(tmp_path: Path) -> Iterator[Store]:
     made.close()
 
 
+def test_nobody_else_may_read_the_database(store: Store, tmp_path: Path) -> None:
+    with store.engine.begin() as connection:
+        connection.execute(text("CREATE TABLE written (x INTEGER)"))
+        files = [path for path in tmp_path.iterdir() if path.name.startswith("service.sqlite")]
+        assert files
+        assert not [path.name for path in files if path.stat().st_mode & 0o077]
+
+
 def test_tables_are_those_of_the_migrations(store: Store) -> None:
     with store.engine.connect() as connection:
         assert compare_metadata(MigrationContext.configure(connection), Table.metadata) == []
