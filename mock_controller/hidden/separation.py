@@ -60,7 +60,7 @@ _FIRST_DAMPING, _LESS_DAMPING, _MORE_DAMPING = 1000.0, 10.0, 4.0
 _NEAR_DAMPING = 1.0
 """The refit's damping at first where it begins from a place that the tangents have led to."""
 _CLEAR = 15.0
-"""d′ far above what counts as detectable: its value is then wanted to a tenth only, and the tangents give that."""
+"""d′ far above what counts as detectable: its value then decides nothing. The tangents give it within a third or so."""
 _MOSTLY_EXPLAINED = 0.2
 """Share of the difference: where no more is left, the tangents have explained so much that they need a look."""
 _SMALL_MOVE = 0.5

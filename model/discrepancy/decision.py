@@ -25,7 +25,7 @@ class Decision:
 
 
 def decide(
-    ranking: Ranking, thresholds: Thresholds, collected: float = 0.0, added: Collection[str] = ()
+    ranking: Ranking, thresholds: Thresholds, collected: float = 0.0, added: Collection[str | None] = ()
 ) -> Decision:  # fmt: skip
     """Nothing significant, one name, or a group.
 

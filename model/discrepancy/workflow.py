@@ -108,7 +108,7 @@ def diagnose(
         turn, current = _ranked_in(case, current, joints, share, progress, cancel, probes)
         probes = (*probes, *turn.probed)
         taken = [s for s in steps[len(findings) :] if s.adopted]
-        decision = decide(turn, case.thresholds, sum(s.evidence for s in taken), {s.effect or "" for s in taken})
+        decision = decide(turn, case.thresholds, sum(s.evidence for s in taken), {s.effect for s in taken})
         step, following = _turn(case, current, turn, decision)
         if step is not None:
             steps.append(step)
