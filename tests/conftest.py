@@ -14,6 +14,20 @@ SKIPS_ARE_ERRORS = os.environ.get("CI", "").lower() in ("1", "true")
 # The same examples in every run, and no test that fails because the machine was busy.
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
+AGAINST_THE_CLOCK = (
+    "contract",
+    "daq/acquisition",
+    "daq/cli",
+    "daq/client",
+    "daq/link",
+    "daq/transport",
+    "mock/process",
+    "server",
+)
+"""Folders of tests with processes in real time. A machine that gives them no processor for half a second makes them
+fail, rightly (a mock that is silent for so long is a controller that has gone), and says nothing of the product. A
+fault fails every time."""
+ATTEMPTS = 3
 MAY_ALWAYS_SKIP = ("hardware", "lab_data")
 """Marks of tests that need what nobody can install: a real arm, and traces that are kept outside the repository."""
 
@@ -41,6 +55,14 @@ def lab_data(request: pytest.FixtureRequest) -> Path:
     """The folder of measured traces (`--lab-data`); a test that asks for it is marked `lab_data`."""
     folder: Path = request.config.getoption("--lab-data")
     return folder
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    folders = [ROOT / "tests" / folder for folder in AGAINST_THE_CLOCK]
+    for item in items:
+        if any(item.path.is_relative_to(folder) for folder in folders):
+            item.add_marker("against_the_clock")
+            item.add_marker(pytest.mark.flaky(reruns=ATTEMPTS - 1))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from firmware_protocol.commands import REPLIES, Request, Sample, Stop
+from firmware_protocol.commands import REPLIES, Hello, Request, Sample, Stop
 from firmware_protocol.framing import FRAME_OVERHEAD, MAX_PAYLOAD
 
 REPLY_MARGIN_S = 0.025
@@ -13,6 +13,9 @@ STOP_MARGIN_S = 0.010
 """A stop is asked again sooner: a repetition costs nothing."""
 RETRIES = 8
 """Repetitions of one request. With one frame in ten damaged, one transaction in 10^6 fails for good."""
+HELLO_RETRIES = 40
+"""A greeting moves nothing, so it may take its time, some 2 s: an adapter that resets the bridge when its port is opened
+needs that long, and so does a controller whose machine is busy."""
 STOP_RETRIES = 50
 STOP_COPIES = 2
 """A stop is written twice at once: the second copy costs 0.8 ms at 115200 baud, a time-out 20 times that."""
@@ -48,7 +51,9 @@ class LinkTiming:
 
     def retries_of(self, request: Request) -> int:
         """How often `request` is repeated before it counts as failed."""
-        return STOP_RETRIES if isinstance(request, Stop) else self.retries
+        if isinstance(request, Stop):
+            return STOP_RETRIES
+        return max(HELLO_RETRIES, self.retries) if isinstance(request, Hello) else self.retries
 
 
 def copies_of(request: Request) -> int:

@@ -30,6 +30,7 @@ from firmware_protocol.framing import encode_frame
 from tests.contract.conftest import UnderContract
 
 REPLY_S = 5.0
+QUIET_S = 0.1
 pytestmark = pytest.mark.motion
 
 
@@ -63,6 +64,8 @@ def set_points(under_contract: UnderContract) -> tuple[tuple[int, int], ...]:
 @pytest.fixture
 def line(set_points: tuple[tuple[int, int], ...], under_contract: UnderContract) -> Iterator[Line]:
     with closing(under_contract.channel()) as channel:
+        while channel.read(QUIET_S):
+            pass  # late replies to what the connection before asked twice
         line = Line(channel)
         assert isinstance(line.ask(0, Hello()), HelloReply)
         yield line
