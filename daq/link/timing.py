@@ -14,8 +14,8 @@ STOP_MARGIN_S = 0.010
 RETRIES = 8
 """Repetitions of one request. With one frame in ten damaged, one transaction in 10^6 fails for good."""
 HELLO_RETRIES = 40
-"""A greeting moves nothing, so it may take its time, some 2 s: an adapter that resets the bridge when its port is opened
-needs that long, and so does a controller whose machine is busy."""
+"""A greeting moves nothing, so it may take its time, some 2 s: an adapter that resets the bridge when its port is
+opened needs that long, and so does a controller whose machine is busy."""
 STOP_RETRIES = 50
 STOP_COPIES = 2
 """A stop is written twice at once: the second copy costs 0.8 ms at 115200 baud, a time-out 20 times that."""
