@@ -175,6 +175,8 @@ class Diagnosis(_Part):
     format: Annotated[int, Field(ge=1)] = ANSWER_FORMAT
     verdict: Verdict
     summary: str
+    significant: float | None = None
+    """Evidence from which a first effect is named; None in answers from before it was told."""
     steps: tuple[Step, ...]
     rmse_fit: tuple[SignalError, ...] = ()
     """From the model as it was given to the model that comes out, on the traces it was fitted to."""

@@ -133,7 +133,8 @@ def diagnose(
         traces=case.names, holdout=tuple(t.record.trace_id for t in holdout),
         rmse_fit=errors(observation, model, given.residuals, current.point.residuals, case.floor),
         rmse_holdout=_held_errors(case, model, *_held(case, given, current.point)),
-        seconds=time.perf_counter() - begun, robot_seconds=float(sum(t.time[-1] - t.time[0] for t in traces)),
+        significant=case.thresholds.significant, seconds=time.perf_counter() - begun,
+        robot_seconds=float(sum(t.time[-1] - t.time[0] for t in traces)),
         notes=_notes(case) + (() if asked.note is None else (asked.note,)), next_experiment=asked.experiment,
     )  # fmt: skip
     progress(1.0, "done")

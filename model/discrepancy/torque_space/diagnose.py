@@ -230,7 +230,8 @@ class _Workflow:
         return Diagnosis(
             verdict=verdict, summary=_summary(adopted, bool(shapes)), steps=tuple(self.steps), remaining=shapes,
             model_before=before, model_after=after, traces=tuple(traces), holdout=tuple(holdout), seconds=seconds,
-            robot_seconds=robot, notes=(self._shares(), *_assumptions(cutoff), *self.notes),
+            robot_seconds=robot, significant=self.options.least_evidence,
+            notes=(self._shares(), *_assumptions(cutoff), *self.notes),
         )  # fmt: skip
 
 

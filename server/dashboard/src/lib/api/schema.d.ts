@@ -1658,6 +1658,8 @@ export interface components {
             verdict: "nothing-significant" | "named" | "ambiguous" | "unknown-effect";
             /** Summary */
             summary: string;
+            /** Significant */
+            significant?: number | null;
             /** Steps */
             steps: components["schemas"]["DiagnosisStep"][];
             /**

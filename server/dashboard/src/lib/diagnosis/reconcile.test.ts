@@ -3,9 +3,13 @@ import type { DiagnosisData, PhaseCell } from '../api/types';
 import { cellMeaning, whyNotCounted } from './reconcile';
 
 const candidate = (effect: string, evidence: number): unknown => ({ effect, joints: [2], evidence });
-const found = (verdict: DiagnosisData['verdict']): Pick<DiagnosisData, 'verdict' | 'steps'> =>
+const found = (
+  verdict: DiagnosisData['verdict'],
+  significant: number | null = 30,
+): Pick<DiagnosisData, 'verdict' | 'steps' | 'significant'> =>
   ({
     verdict,
+    significant,
     steps: [{ candidates: [candidate('backlash', 1), candidate('coulomb_friction', 4.4)] }],
   }) as unknown as DiagnosisData;
 
@@ -13,14 +17,19 @@ describe('a residual that goes with something although nothing is missing', () =
   it('is told why it does not count, with what came nearest', () => {
     expect(whyNotCounted(found('nothing-significant'), { joint: null })).toBe(
       'σ tells how surely the mean goes with it, not how large it is: no joint is off by more than noise. ' +
-        'It is no finding: an effect is named from evidence 12 on; the best, Coulomb friction, joint 2, has 4.',
+        'It is no finding: an effect is named from evidence 30 on; the best, Coulomb friction, joint 2, has evidence 4.',
     );
   });
 
   it('is not said to be within noise where a joint is off', () => {
     const said = whyNotCounted(found('nothing-significant'), { joint: 2 });
     expect(said).not.toContain('noise');
-    expect(said).toContain('evidence 12');
+    expect(said).toContain('evidence 30');
+  });
+
+  it('names no number that an older answer does not tell', () => {
+    const said = whyNotCounted(found('nothing-significant', null), { joint: 2 });
+    expect(said).toBe('It is no finding: the best, Coulomb friction, joint 2, has evidence 4.');
   });
 
   it('needs no word where something is named', () => {

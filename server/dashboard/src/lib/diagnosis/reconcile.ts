@@ -4,12 +4,9 @@ import type { DiagnosisData, PhaseCell } from '../api/types';
 import { fixed } from '../format';
 import { candidateName } from './words';
 
-/** Evidence from which on an effect is named. */
-export const NEEDED = 12;
-
 /** Why a residual that goes surely with something is no finding; empty where the diagnosis names one. */
 export function whyNotCounted(
-  found: Pick<DiagnosisData, 'verdict' | 'steps'>,
+  found: Pick<DiagnosisData, 'verdict' | 'steps' | 'significant'>,
   where: { readonly joint: number | null },
 ): string {
   if (found.verdict !== 'nothing-significant') return '';
@@ -21,8 +18,11 @@ export function whyNotCounted(
     .flatMap((step) => step.candidates)
     .sort((one, other) => other.evidence - one.evidence);
   const nearest =
-    best === undefined ? '' : `; the best, ${candidateName(best)}, has ${fixed(best.evidence, 0)}`;
-  return `${size}It is no finding: an effect is named from evidence ${NEEDED} on${nearest}.`;
+    best === undefined ? '' : `the best, ${candidateName(best)}, has evidence ${fixed(best.evidence, 0)}`;
+  const needed =
+    found.significant === null ? '' : `an effect is named from evidence ${fixed(found.significant, 0)} on`;
+  const said = [needed, nearest].filter((part) => part !== '').join('; ');
+  return `${size}It is no finding${said === '' ? '' : `: ${said}`}.`;
 }
 
 /** What a cell of the map is, beside a sentence about whole phases; empty without a cell. */
