@@ -10,6 +10,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from model.comparison.compare import TraceSignals
+from model.discrepancy.thresholds import THRESHOLDS
 from model.effects.library import library
 from server.jobs import headlines
 from server.jobs.diagnosis_data import diagnosis_data
@@ -64,6 +65,12 @@ def test_a_diagnosis_is_told_with_its_pictures() -> None:
     assert (without.models, without.signals) == ((), ())
 
 
+def test_an_answer_from_before_it_told_what_is_significant_still_opens() -> None:
+    stored = diagnosis_data(an_answer(4.0)[0], None).model_dump(mode="json")
+    del stored["significant"]
+    assert DiagnosisData.model_validate(stored).significant is None
+
+
 def test_headlines_name_what_was_found() -> None:
     answer, comparison = an_answer(4.0)
     step = answer.steps[0]
@@ -115,6 +122,7 @@ def test_a_sound_arm_is_called_sound_and_the_queue_takes_what_the_diagnosis_asks
     }  # fmt: skip
     job, found = result_of(sound_service, request)
     assert (found.verdict, job["headline"]) == ("nothing-significant", "nothing significant"), found.summary
+    assert found.significant == THRESHOLDS.significant
     assert found.next_experiment is not None, found.notes
     assert found.next_experiment.name == "diagnostic"
     spec = found.next_experiment.spec.model_dump(mode="json")
