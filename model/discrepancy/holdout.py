@@ -34,7 +34,9 @@ class HeldOut:
 
     def floor(self, point: Point) -> Floats:
         """(n,) rad, as `noise_floor`, where each arm starts being estimated here as well."""
-        return noise_floor(self.observation, point, lambda made: replace(self, observation=made).residuals(point))
+        unknowns, values = self._here(point)
+        here = replace(point, unknowns=unknowns, values=values)
+        return noise_floor(self.observation, here, lambda made: replace(self, observation=made).residuals(point))
 
     def residuals(self, point: Point) -> Signals:
         """Measured − simulated (m, n) rad of every held-out trace, with the point's values.
@@ -42,16 +44,21 @@ class HeldOut:
         Where each arm starts, within a count or so, is estimated from the trace itself: friction holds the arm there,
         and nothing that was fitted elsewhere can know it.
         """
-        kept = [k for k, u in enumerate(point.unknowns) if not u.name.startswith(INITIAL + ".")]
-        held = [replace(point.unknowns[k], deviation=None) for k in kept]  # no prior and no derivative: they stay
-        unknowns = (*held, *self.starts)
-        values = np.concatenate([point.values[kept], [u.start for u in self.starts]])
+        unknowns, values = self._here(point)
         observation = self.observation
         none = np.zeros((len(unknowns), observation.samples))
         begun = point_at(observation, point.model, unknowns, values, observation.quiet, none)
         if not np.isfinite(begun.weighted).all():
             return begun.residuals
-        return searched(observation, begun, START_STEPS, range(len(held), len(unknowns))).residuals
+        return searched(
+            observation, begun, START_STEPS, range(len(unknowns) - len(self.starts), len(unknowns))
+        ).residuals
+
+    def _here(self, point: Point) -> tuple[tuple[Unknown, ...], Floats]:
+        """A point's unknowns and values for the held-out traces: where these begin, in place of the fitted ones."""
+        kept = [k for k, u in enumerate(point.unknowns) if not u.name.startswith(INITIAL + ".")]
+        held = [replace(point.unknowns[k], deviation=None) for k in kept]  # no prior and no derivative: they stay
+        return (*held, *self.starts), np.concatenate([point.values[kept], [u.start for u in self.starts]])
 
     def rise(self, before: Signals, after: Signals) -> tuple[float, float]:
         """How much the weighted sum of squares of residuals rises, and the standard deviation that noise
