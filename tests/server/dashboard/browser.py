@@ -17,6 +17,7 @@ from playwright.sync_api import (
     Browser,
     BrowserContext,
     ConsoleMessage,
+    Locator,
     Page,
     Playwright,
     Request,
@@ -162,3 +163,8 @@ def watched(context: BrowserContext, service: Service, mock: MockControl | None 
     page.on("pageerror", lambda error: tab.complaints.append(f"exception: {error}"))
     page.on("request", requested)
     return tab
+
+
+def row_of(page: Page, trace: str) -> Locator:
+    """The line of a trace where traces are chosen: it is called by its name and time there, and leads to it."""
+    return page.get_by_role("row").filter(has=page.locator(f'a[href$="/traces/{trace}"]'))

@@ -74,6 +74,13 @@ export function padded(low: number, high: number, least = 0): [number, number] {
   return [middle - span * 0.56, middle + span * 0.56];
 }
 
+const PLAIN = new Intl.NumberFormat('en-GB', { maximumFractionDigits: 9 });
+
+/** A number at an axis: with a true minus sign, as everywhere. */
+function plain(value: number): string {
+  return PLAIN.format(value).replace('-', '−');
+}
+
 export function optionsOf(drawing: ChartDrawing, width: number, height: number): uPlot.Options {
   const { colours, axes } = drawing;
   const font = `${AXIS_FONT_SIZE}px ${colours.font}`;
@@ -83,12 +90,10 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
     grid: { stroke: colours.grid, width: 1 },
     ticks: { show: false },
   };
-  const written = (write?: (value: number) => string) =>
-    write === undefined
-      ? {}
-      : {
-          values: (_: uPlot, values: number[]) => values.map((value) => (value === null ? '' : write(value))),
-        };
+  const written = (write: (value: number) => string = plain) => ({
+    values: (_: uPlot, values: (number | null)[]) =>
+      values.map((value) => (value === null ? '' : write(value))),
+  });
   const places = axes.splits;
   return {
     width,

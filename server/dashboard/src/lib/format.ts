@@ -51,6 +51,15 @@ const DAY_AND_TIME = new Intl.DateTimeFormat('en-GB', {
   minute: '2-digit',
 });
 
+const DAY_AND_SECOND = new Intl.DateTimeFormat('en-GB', {
+  day: '2-digit',
+  month: 'short',
+  year: 'numeric',
+  hour: '2-digit',
+  minute: '2-digit',
+  second: '2-digit',
+});
+
 /** The time of day of an ISO moment, in this computer's time zone. */
 export function timeOfDay(moment: string): string {
   return TIME.format(new Date(moment));
@@ -59,4 +68,9 @@ export function timeOfDay(moment: string): string {
 /** Day and time of an ISO moment, in this computer's time zone. */
 export function dayAndTime(moment: string): string {
   return DAY_AND_TIME.format(new Date(moment));
+}
+
+/** The same to the second. */
+export function dayAndSecond(moment: string): string {
+  return DAY_AND_SECOND.format(new Date(moment));
 }

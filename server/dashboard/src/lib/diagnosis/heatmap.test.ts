@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { PhaseCell } from '../api/types';
-import { disagreementMap, levelName, levelOf, LEVELS, phaseSummaries } from './heatmap';
+import { disagreementMap, levelName, levelOf, LEVELS, phaseSummaries, timeTicks } from './heatmap';
 
 const cell = (joint: number, start: number, phase: PhaseCell['phase'], square: number): PhaseCell => ({
   joint,
@@ -52,6 +52,13 @@ describe('the map of disagreement', () => {
       const counted = map.rows.flatMap((row) => row.cells).reduce((sum, one) => sum + (one?.windows ?? 0), 0);
       expect(counted).toBe(cells.length);
     }
+  });
+
+  it('has round moments below it, wherever its columns end', () => {
+    expect(timeTicks([0, 0.35, 3.16], 8)).toEqual([0, 0.5, 1, 1.5, 2, 2.5, 3]);
+    expect(timeTicks([0.7, 55.2], 8)).toEqual([10, 20, 30, 40, 50]);
+    expect(timeTicks([0, 0.3], 8)).toEqual([0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3]);
+    expect(timeTicks([], 8)).toEqual([]);
   });
 
   it('is empty for a trace that it has nothing about', () => {

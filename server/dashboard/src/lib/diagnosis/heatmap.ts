@@ -87,6 +87,18 @@ export function disagreementMap(
   return { edges, rows, joints };
 }
 
+/** Round moments (s) within the map, at most so many. */
+export function timeTicks(edges: readonly number[], most: number): number[] {
+  const begin = edges[0] ?? 0;
+  const end = edges.at(-1) ?? 0;
+  if (!(end > begin)) return [];
+  const power = 10 ** Math.floor(Math.log10((end - begin) / most));
+  const step = power * ([1, 2, 5, 10].find((one) => (end - begin) / (one * power) < most) ?? 10);
+  const first = Math.ceil(begin / step - 1e-9);
+  const count = Math.floor((end + 1e-9 * step) / step) - first + 1;
+  return Array.from({ length: count }, (_, index) => Number(((first + index) * step).toPrecision(12)));
+}
+
 function merged(windows: readonly PhaseCell[], chance: number): MapCell | null {
   if (windows.length === 0) return null;
   const length = (one: PhaseCell): number => one.end - one.start;

@@ -38,8 +38,8 @@ const PROPER: Record<string, string> = { coulomb: 'Coulomb', stribeck: 'Stribeck
 export function effectName(name: string): string {
   if (name.startsWith('back_emf'))
     return `back-EMF ${name.slice('back_emf_'.length).replaceAll('_', ' ')}`.trim();
-  const words = name.split('_').map((word) => PROPER[word] ?? word);
-  return words.join(' ');
+  const words = name.replaceAll('_dependent', '-dependent').split('_');
+  return words.map((word) => PROPER[word] ?? word).join(' ');
 }
 
 /** An effect and its joints: "Coulomb friction, joint 2". */
@@ -52,7 +52,8 @@ export function candidateName(one: Pick<TriedEffect, 'effect' | 'joints'>): stri
 export function proper(text: string): string {
   return text
     .replace(/\b(coulomb|stribeck)\b/g, (word) => PROPER[word] ?? word)
-    .replace(/\bback emf\b/g, 'back-EMF');
+    .replace(/\bback emf\b/g, 'back-EMF')
+    .replace(/\b(load|direction) dependent\b/g, '$1-dependent');
 }
 
 /** A sentence of the service: its first letter a capital one, a full stop at its end, and in words that people use. */
@@ -63,7 +64,7 @@ export function sentence(text: string): string {
 }
 
 function plain(text: string): string {
-  return text
+  return proper(text)
     .replace(/\b(\d+) trace\(s\)/g, (_, count: string) => `${count} trace${count === '1' ? '' : 's'}`)
     .replace(/\b(\d+) nats more/g, 'more (information gain $1)');
 }

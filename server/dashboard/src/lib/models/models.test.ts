@@ -1,7 +1,17 @@
 import { describe, expect, it } from 'vitest';
 import type { Fidelity, FittedParameter, ModelParameter } from '../api/types';
 import { contributionBar, curvePicture, jointOf, pathOf, type Distortion } from './distortion';
-import { grouped, groupName, ofDiagnosis, ofFit, parameterRows, whisker } from './parameters';
+import { shortLabels } from './labels';
+import {
+  grouped,
+  groupName,
+  ofDiagnosis,
+  ofFit,
+  inWords,
+  parameterName,
+  parameterRows,
+  whisker,
+} from './parameters';
 
 const parameter = (name: string, value: number, deviation: number | null): ModelParameter => ({
   name,
@@ -32,9 +42,17 @@ describe('parameters', () => {
     ofFit([fitted('joint2.motor.resistance', 1.0, 1.5), fitted('link1.mass', null, null)]),
   );
 
+  it('are called as people write them where no heading says whose they are', () => {
+    expect(
+      ['joint2.motor.back_emf_constant', 'joint3.load_dependent_friction.arm', 'link1.mass', 'load.mass'].map(
+        parameterName,
+      ),
+    ).toEqual(['J2 motor back-EMF constant', 'J3 load-dependent friction arm', 'link 1 mass', 'load mass']);
+  });
+
   it('carry what a fit found of them', () => {
     expect(rows.map((one) => [one.group, one.short, one.known])).toEqual([
-      ['joint2', 'motor.resistance', 'known'],
+      ['joint2', 'motor resistance', 'known'],
       ['link1', 'mass', 'unknown'],
       ['g', 'g', 'given'],
     ]);
@@ -126,5 +144,24 @@ describe('curves of the error', () => {
         40,
       ),
     ).toBe('M0.0 20.0L100.0 0.0');
+  });
+});
+
+describe('models beside each other', () => {
+  it('are called by their names, and by their numbers where these are alike', () => {
+    expect(shortLabels(['ma2000 (machine)', 'first fit (d9770bd3fec5)'])).toEqual([
+      'ma2000 (machine)',
+      'first fit',
+    ]);
+    const alike = ['fit (d9770bd3fec5)', 'fit (a9770bd3fec5)'];
+    expect(shortLabels(alike)).toEqual(alike);
+  });
+});
+
+describe('what a fit cannot tell', () => {
+  it('names its parameters as people do', () => {
+    expect(inWords('together joint2.viscous_friction.coefficient -0.066 %, link1.mass +1 %')).toBe(
+      'together J2 viscous friction coefficient −0.066 %, link 1 mass +1 %',
+    );
   });
 });

@@ -69,6 +69,29 @@ export function ofDiagnosis(found: Pick<DiagnosisData, 'steps'>): Map<string, Fo
   return intervals;
 }
 
+/** `joint2.motor.torque_constant` as people write it where no heading says whose it is: J2 motor torque constant. */
+export function parameterName(name: string): string {
+  const [group = '', ...rest] = name.split('.');
+  const joint = /^joint(\d+)$/.exec(group);
+  const whose = joint === null ? groupName(group) : `J${joint[1]}`;
+  return [whose, ...rest.map(words)].join(' ');
+}
+
+/** A sentence of a fit with its parameters' names as people write them. */
+export function inWords(text: string): string {
+  return text.replace(/\b[a-z]+\d*(\.[a-z_\d]*[a-z][a-z_\d]*)+/g, parameterName).replace(/ -(?=\d)/g, ' −');
+}
+
+/** Words of one part of a parameter's name. */
+function words(part: string): string {
+  return part
+    .replaceAll('_dependent', '-dependent')
+    .replace('back_emf', 'back-EMF')
+    .replace(/^coulomb/, 'Coulomb')
+    .replace(/^stribeck/, 'Stribeck')
+    .replaceAll('_', ' ');
+}
+
 /** One row a parameter of the model, with what was found of it. */
 export function parameterRows(
   parameters: readonly ModelParameter[],
@@ -80,7 +103,7 @@ export function parameterRows(
     return {
       name: one.name,
       group,
-      short: rest.length === 0 ? one.name : rest.join('.').replaceAll('_', ' '),
+      short: rest.length === 0 ? one.name : rest.map(words).join(' '),
       unit: one.unit,
       value: one.value,
       low: own?.low ?? null,

@@ -1,15 +1,20 @@
 /** What a trace is called where it is chosen: people know it by its name and its time, not by its number. */
 
-import { dayAndTime } from '../format';
+import { dayAndSecond } from '../format';
 
 export interface Named {
+  readonly id: string;
   readonly name: string | null;
   readonly kind: string | null;
   readonly created: string;
 }
 
-/** `ramp, 21 Nov 2026, 10:22`; its number where nothing is known of it. */
-export function traceLabel(id: string, entry: Named | undefined): string {
-  if (entry === undefined) return id;
-  return `${entry.name ?? entry.kind?.replaceAll('_', ' ') ?? id}, ${dayAndTime(entry.created)}`;
+/** Its name, else its kind. */
+export function traceName(entry: Named): string {
+  return entry.name ?? entry.kind?.replaceAll('_', ' ') ?? entry.id;
+}
+
+/** `ramp, 21 Nov 2026, 10:22:05`: to the second, for a short motion is repeated within a minute. */
+export function traceLabel(entry: Named): string {
+  return `${traceName(entry)}, ${dayAndSecond(entry.created)}`;
 }

@@ -1,6 +1,8 @@
 /** One trace that is shown: its signals, finer where it is zoomed to, what it says about itself, and its simulation. */
 
 import { api, ask, asProblem, here, type Problem, type TraceDetails, type TraceSignals } from '../../lib/api';
+import { dayAndSecond } from '../../lib/format';
+import { traceName } from '../../lib/traces/label';
 import { isThinned, refined, type Range, type Signals } from '../../lib/traces/columns';
 import { serves, toAsk } from '../../lib/traces/zoom';
 import { Simulating } from './simulating.svelte';
@@ -26,7 +28,12 @@ export class ShownTrace {
   }
 
   get name(): string {
-    return this.details?.entry.name ?? this.details?.entry.kind ?? this.id;
+    return this.details === null ? this.id : traceName(this.details.entry);
+  }
+
+  /** Day and time at which it was recorded; empty until that is known. */
+  get when(): string {
+    return this.details === null ? '' : dayAndSecond(this.details.entry.created);
   }
 
   async load(): Promise<void> {

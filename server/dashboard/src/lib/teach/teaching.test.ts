@@ -1,0 +1,81 @@
+import { describe, expect, it } from 'vitest';
+import { Problem } from '../api/problem';
+import type { Machine, TeachingStatus } from '../api/types';
+import { Teaching, type TeachRequests } from './teaching.svelte';
+
+const machine = {
+  name: 'arm',
+  joints: [{ sensor: {} }, { sensor: {} }, { sensor: {} }],
+  modelled_joints: [1, 2],
+};
+const status = { activity: 'none', lines: [], result: '', problem: '', path: null } as TeachingStatus;
+const path = { joints: [1], times: [0, 0.02], positions: [[0], [0.1]] };
+const refused = (): Promise<never> => Promise.reject(new Problem(409, 'arm-busy', 'the arm is busy'));
+
+function teaching(answers: Partial<TeachRequests>): Teaching {
+  const well = (): Promise<TeachingStatus> => Promise.resolve(status);
+  return new Teaching(machine as unknown as Machine, { run: well, lead: well, finish: well, ...answers });
+}
+
+describe('teaching', () => {
+  it('leads the joints that the machine file describes, or those that are chosen', async () => {
+    const asked: (readonly number[])[] = [];
+    const taught = teaching({ lead: (joints) => (asked.push(joints), Promise.resolve(status)) });
+    await taught.lead();
+    taught.choose(3);
+    taught.choose(1);
+    await taught.lead();
+    expect(asked).toEqual([
+      [1, 2],
+      [2, 3],
+    ]);
+    expect(taught.led).toEqual([2, 3]);
+  });
+
+  it('keeps the path that was led, and nothing where it did not end', async () => {
+    const answers = [refused(), Promise.resolve({ ...status, path })];
+    const taught = teaching({ finish: () => answers.shift()! });
+    await taught.lead();
+    await taught.finish();
+    expect([taught.instructions, taught.led, taught.problem?.detail]).toEqual([
+      [],
+      [1, 2],
+      'the arm is busy',
+    ]);
+    await taught.finish();
+    expect([taught.instructions, taught.led, taught.problem]).toEqual([
+      [{ kind: 'path', path, rate: 1 }],
+      [],
+      null,
+    ]);
+  });
+
+  it('does not say that joints are led where that was refused', async () => {
+    const taught = teaching({ lead: refused });
+    await taught.lead();
+    expect([taught.led, taught.problem?.status]).toEqual([[], 409]);
+  });
+
+  it('runs the instructions in the order in which they stand', async () => {
+    const ran: unknown[] = [];
+    const taught = teaching({ run: (program) => (ran.push(program), Promise.resolve(status)) });
+    taught.keep({ kind: 'wait', duration: 1 });
+    taught.keep({ kind: 'gripper', closed: true });
+    taught.keep({ kind: 'wait', duration: 2 });
+    taught.move(1, -1);
+    taught.takeAway(2);
+    await taught.run('mine');
+    expect(ran).toEqual([
+      {
+        version: 1,
+        name: 'mine',
+        machine: 'arm',
+        notes: '',
+        instructions: [
+          { kind: 'gripper', closed: true },
+          { kind: 'wait', duration: 1 },
+        ],
+      },
+    ]);
+  });
+});
