@@ -89,6 +89,15 @@ def tone(model: Model, name: str, joint: int, values: Mapping[str, float]) -> Ca
     return _candidate(model, name, name, (joint,), (dict(values),), proportional=False)
 
 
+def on_joints(model: Model, alike: Sequence[Candidate], values: Mapping[str, float]) -> Candidate | None:
+    """One law on all the joints of candidates for single ones, with one trial: `values` by full name."""
+    first = alike[0]
+    joints = tuple(sorted(j for c in alike for j in c.joints))
+    bounds = {name: own for c in alike for name, own in c.bounds.items()}
+    law = first.free[0].effect or first.name
+    return _candidate(model, first.name, law, joints, (dict(values),), proportional=False, bounds=bounds)
+
+
 def _variants(model: Model, name: str, joints: tuple[int, ...]) -> list[Candidate]:
     found: list[Candidate | None] = []
     if name == "stribeck_friction":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -24,22 +24,21 @@ class Decision:
     group: tuple[Refitted, ...]
 
 
-def decide(
-    ranking: Ranking, thresholds: Thresholds, collected: float = 0.0, added: Collection[str | None] = ()
-) -> Decision:  # fmt: skip
-    """Nothing significant, one name, or a group.
+@dataclass(frozen=True)
+class Added:
+    """An effect that has been added, where, and the evidence it had."""
 
-    Args:
-        collected: evidence of the effects that were added before. added: their names: what one joint has, another one
-            of the same build is likelier to have.
-    """
+    effect: str | None
+    joints: tuple[int, ...]
+    evidence: float
+
+
+def decide(ranking: Ranking, thresholds: Thresholds, added: Sequence[Added] = ()) -> Decision:
+    """Nothing significant, one name, or a group."""
     fits = ranking.fitted
     if not fits:
         return Decision("nothing", None, 0.0, ())
-    needed = thresholds.significant + thresholds.echo * collected
-    if fits[0].candidate.name in added:
-        needed *= thresholds.kin
-    if fits[0].evidence < needed:
+    if fits[0].evidence < _needed(fits[0], thresholds, added):
         return Decision("nothing", fits[0], 0.0, ())
     best = fits[0]
     rivals = [f for f in fits[1:] if not same_answer(f, best)]
@@ -48,6 +47,18 @@ def decide(
     return Decision("group" if len(group) > 1 else "named", best, margin, group if len(group) > 1 else ())
 
 
-def same_answer(one: Refitted, other: Refitted) -> bool:
-    """Whether two candidates say the same of the machine."""
-    return one.candidate.name == other.candidate.name and one.candidate.joints == other.candidate.joints
+def same_answer(one: Refitted, best: Refitted) -> bool:
+    """Whether a candidate says the same of the machine as the best one, or only some of it: on fewer of its joints, or
+    on more joints without being any better."""
+    if one.candidate.name != best.candidate.name:
+        return False
+    joints, of_best = set(one.candidate.joints), set(best.candidate.joints)
+    return joints <= of_best or joints > of_best
+
+
+def _needed(found: Refitted, thresholds: Thresholds, added: Sequence[Added]) -> float:
+    joints = set(found.candidate.joints)
+    near = [not joints or not a.joints or bool(joints & set(a.joints)) for a in added]
+    here = sum(a.evidence for a, on in zip(added, near, strict=True) if on)
+    elsewhere = sum(a.evidence for a, on in zip(added, near, strict=True) if not on)
+    return thresholds.needed(here, elsewhere, kin=any(a.effect == found.candidate.name for a in added))

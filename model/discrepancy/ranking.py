@@ -10,8 +10,9 @@ from model.discrepancy.candidates import FLEXIBLE, TONES, candidates
 from model.discrepancy.observation import Observation
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.probing import Probed, probed, still_promising
-from model.discrepancy.refitting import Judged, Refitted, finished, polished, refitted
+from model.discrepancy.refitting import Judged, Refitted, begun_again, finished, polished, refitted
 from model.discrepancy.thresholds import Thresholds
+from model.discrepancy.together import fitted_together
 from model.discrepancy.tones import proposed_tones
 
 FLAGGED_SHARE = 0.1
@@ -69,9 +70,12 @@ def ranked(
         found = refitted(observation, current, one)
         if found is not None:
             fits.append(found)
+    _stop_if(cancel)
+    fits += fitted_together(observation, current, fits, probes, thresholds)
     fits.sort(key=lambda r: -r.evidence)
     _stop_if(cancel)
     head = [polished(observation, current, r) for r in fits[: options.polished] if r.evidence > 0]
+    head = [begun_again(observation, current, r) for r in head]
     head = _told_apart(observation, current, head, thresholds)
     fits = sorted([*head, *fits[len(head) :]], key=lambda r: -r.evidence)
     return Ranking(_one_a_name(fits), tuple(probes))

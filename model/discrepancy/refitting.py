@@ -28,6 +28,8 @@ STEPS = 8
 POLISHING = 4
 DEEPER = 3.0
 """Fall of the cost from which a fit counts as better, not as ended elsewhere on the same flat ground."""
+STRANGE = 1.15
+"""Misfit at which a fit has not explained the record, perhaps because it ended at a wrong place: it is tried again."""
 SHAPE_PRIOR = 3.0
 """Expected deviations within which a parameter that only shapes an effect is looked for: keeps it from running away
 where the effect is too small to show its shape."""
@@ -48,12 +50,16 @@ class Judged:
 
 @dataclass(frozen=True)
 class Refitted:
-    """A candidate, fitted: evidence, the point that it leads to, and what the probe had promised."""
+    """A candidate, fitted: the probe that it began from, the point that it leads to, and its evidence."""
 
-    candidate: Candidate
+    probed: Probed
     judged: Judged
     evidence: float
-    promised: float
+
+    @property
+    def candidate(self) -> Candidate:
+        """What was fitted."""
+        return self.probed.candidate
 
     @property
     def misfit(self) -> float:
@@ -68,8 +74,8 @@ def judge(observation: Observation, point: Point) -> Judged:
 
 def refitted(observation: Observation, before: Judged, probed: Probed) -> Refitted | None:
     """A candidate fitted from where its probe points to, and, where that leads nowhere, from the numbers that are
-    expected: a strong effect may have driven the tolerance parameters far off. None where no simulation stays finite.
-    """
+    expected: a strong effect may have driven the tolerance parameters far off, and effects on several joints mostly
+    have. None where no simulation stays finite."""
     found: list[Point] = []
     for fit in (_nearby, _from_expected):
         try:
@@ -81,7 +87,7 @@ def refitted(observation: Observation, before: Judged, probed: Probed) -> Refitt
             if point.cost < before.point.cost:
                 break
     best = min(found, key=lambda p: p.cost, default=None)
-    return None if best is None else _with_evidence(observation, before, probed.candidate, best, probed.gain)
+    return None if best is None else _with_evidence(observation, before, probed, best)
 
 
 def _nearby(observation: Observation, before: Point, probed: Probed) -> Point | None:
@@ -119,8 +125,21 @@ def polished(observation: Observation, before: Judged, found: Refitted) -> Refit
         point = searched(observation, replace(point, tangents=tangents), POLISHING, free)
     except SpecError:
         return found
-    better = _with_evidence(observation, before, found.candidate, point, found.promised)
+    better = _with_evidence(observation, before, found.probed, point)
     return better if better.judged.point.cost < found.judged.point.cost else found
+
+
+def begun_again(observation: Observation, before: Judged, found: Refitted) -> Refitted:
+    """The same, or, where it leaves the record unexplained, a better fit from the expected numbers."""
+    if found.misfit < STRANGE:
+        return found
+    try:
+        point = _from_expected(observation, before.point, found.probed)
+    except SpecError:
+        return found
+    if point is None or not point.cost < found.judged.point.cost - DEEPER:
+        return found
+    return _with_evidence(observation, before, found.probed, point)
 
 
 def finished(observation: Observation, before: Judged, found: Refitted) -> Refitted:
@@ -129,7 +148,7 @@ def finished(observation: Observation, before: Judged, found: Refitted) -> Refit
         point = settled(observation, found.judged.point, POLISHING)
     except SpecError:
         return found
-    better = _with_evidence(observation, before, found.candidate, point, found.promised)
+    better = _with_evidence(observation, before, found.probed, point)
     return better if better.judged.point.cost < found.judged.point.cost else found
 
 
@@ -170,17 +189,15 @@ def _started(point: Point, probed: Probed) -> Point:
     )  # fmt: skip
 
 
-def _with_evidence(
-    observation: Observation, before: Judged, candidate: Candidate, point: Point, promised: float
-) -> Refitted:
+def _with_evidence(observation: Observation, before: Judged, probed: Probed, point: Point) -> Refitted:
     after = judge(observation, point)
-    price = len(candidate.free) * math.log(observation.samples)
-    if candidate.name in TONES:
+    price = len(probed.candidate.free) * math.log(observation.samples)
+    if probed.candidate.name in TONES:
         price += 2 * math.log(MOST_TONES) - math.log(observation.samples)  # the tries are what the frequency costs
     fall = before.description - after.description
     if point.cost > before.point.cost:  # the fit did not come to its end: what more freedom leaves is never more
         fall = min(fall, before.point.cost - point.cost)
-    return Refitted(candidate, after, fall - price, promised)
+    return Refitted(probed, after, fall - price)
 
 
 def _indices(unknowns: Sequence[Unknown], names: Sequence[str]) -> list[int]:

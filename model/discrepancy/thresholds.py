@@ -13,13 +13,16 @@ class Thresholds:
         significant: evidence from which an effect counts as found.
         echo: share of the evidence already collected that a further effect must bring besides: where the law of an
             effect that has been added is not exactly the arm's, what is left of it is no effect of its own.
+            distant_echo: the same of what was collected on other joints.
         kin: share of both that suffices for an effect that another joint has been found to have.
         margin: evidence over the next answer from which one name is given, instead of a group.
         unexplained: variance of a joint's error above its floor, in floors, above which something is missing that none
             of the known effects is. unnamed: the same on the traces fitted to, while no effect has been added.
         least_share: share of a joint's excess that effects must explain, or they only resemble what is missing.
-        worse: rise of the held-out sum of squares, in its own standard deviations, at which a step is rejected. It is
-            also rejected where the rise takes the evidence below what is significant.
+        worse: rise of the held-out sum of squares, in its own standard deviations, at which a step is rejected, unless
+            it is less than the share `lost` of the evidence that as many samples have brought in the fit: the tolerance
+            parameters, none of them known for sure, have moved too. It is also rejected where the rise takes the
+            evidence below what is significant.
         close: evidence within which rivals are fitted to their ends before they are compared.
         quiet_joint: misfit of a joint up to which, once an effect has been added, nothing more is looked for there.
         interesting: gain of a probe from which a candidate is worth a fit.
@@ -27,15 +30,26 @@ class Thresholds:
 
     significant: float = 12.0
     echo: float = 0.05
+    distant_echo: float = 0.01
     kin: float = 0.5
     margin: float = 4.0
     unexplained: float = 0.3
     unnamed: float = 0.12
     least_share: float = 0.8
     worse: float = 2.0
+    lost: float = 0.5
     close: float = 40.0
     quiet_joint: float = 1.08
     interesting: float = 12.0
+
+    def needed(self, here: float = 0.0, elsewhere: float = 0.0, *, kin: bool = False) -> float:
+        """Evidence from which a further effect counts as found; so much was collected on its joints, and on others.
+
+        Args:
+            kin: whether the effect has been found on another joint.
+        """
+        line = self.significant + self.echo * here + self.distant_echo * elsewhere
+        return line * self.kin if kin else line
 
 
 THRESHOLDS = Thresholds()

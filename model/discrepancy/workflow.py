@@ -26,7 +26,7 @@ from model.discrepancy.answer import (
 )
 from model.discrepancy.candidates import OF_THE_CONTROLLER
 from model.discrepancy.controller_check import ControllerFinding, check_controller, with_used_set_points
-from model.discrepancy.decision import Decision, decide
+from model.discrepancy.decision import Added, Decision, decide
 from model.discrepancy.distortion import sum_of_contributions
 from model.discrepancy.estimates import found_values, listed, only_probed, runner_up
 from model.discrepancy.excess import excess_removed
@@ -107,8 +107,8 @@ def diagnose(
         joints = _to_search(case, current, number)
         turn, current = _ranked_in(case, current, joints, share, progress, cancel, probes)
         probes = (*probes, *turn.probed)
-        taken = [s for s in steps[len(findings) :] if s.adopted]
-        decision = decide(turn, case.thresholds, sum(s.evidence for s in taken), {s.effect for s in taken})
+        taken = [Added(s.effect, s.joints, s.evidence) for s in steps[len(findings) :] if s.adopted]
+        decision = decide(turn, case.thresholds, taken)
         step, following = _turn(case, current, turn, decision)
         if step is not None:
             steps.append(step)
@@ -229,7 +229,7 @@ def _turn(
     held = _held(case, current.point, best.judged.point)
     held_errors = _held_errors(case, model, *held)
     removed = excess_removed(held_errors)
-    rejected = _rejected(case, best, *held, removed)
+    rejected = _rejected(case, best, *held, _on(best.candidate.joints, held_errors))
     where = _where(case, current.point)
     values = found_values(observation, best)
     candidates = tuple(listed(r) for r in ranking.fitted) + only_probed(ranking, observation.samples)
@@ -259,15 +259,25 @@ def _held_errors(case: _Case, model: Model, before: Signals, after: Signals) -> 
     return () if case.held is None else errors(case.held.observation, model, before, after, case.floor_held)
 
 
-def _rejected(case: _Case, best: Refitted, before: Signals, after: Signals, removed: float | None) -> str | None:
-    """Why the step is not taken, if held-out traces speak against it. `removed`: share of their excess that it takes
-    off, None where they show none."""
+def _on(joints: Sequence[int], found: Sequence[SignalError]) -> tuple[SignalError, ...]:
+    """Errors of an effect's own joints; of all, where it is the whole machine's."""
+    return tuple(e for e in found if not joints or e.joint in joints)
+
+
+def _rejected(
+    case: _Case, best: Refitted, before: Signals, after: Signals, own: Sequence[SignalError]
+) -> str | None:  # fmt: skip
+    """Why the step is not taken, if held-out traces speak against it. `own`: their errors on the effect's joints; on
+    others, something else may be missing, which the tolerance parameters bend to make up for."""
     if case.held is None:
         return None
+    removed = excess_removed(own)
     if removed is not None and removed < 0.0:
         return f"the error on the held-out traces grows, by {-removed:.0%} of what is beyond noise there"
     rise, deviation = case.held.rise(before, after)
-    if rise > min(case.thresholds.worse * deviation, best.evidence - case.thresholds.significant):
+    lines, share = case.thresholds, case.held.observation.samples / case.observation.samples
+    by_chance = max(lines.worse * deviation, lines.lost * best.evidence * share)
+    if rise > min(by_chance, best.evidence - lines.significant):
         return (
             f"the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} variances of "
             "a reading"

@@ -7,11 +7,11 @@ from typing import Any, cast
 
 import pytest
 
-from model.discrepancy.decision import decide
+from model.discrepancy.decision import Added, decide
 from model.discrepancy.ranking import Ranking
 from model.discrepancy.thresholds import Thresholds
 
-LINES = Thresholds(significant=12.0, margin=4.0, echo=0.05)
+LINES = Thresholds(significant=12.0, margin=4.0, echo=0.05, distant_echo=0.01)
 
 
 def ranking(*fits: tuple[str, int, float]) -> Ranking:
@@ -48,10 +48,26 @@ def test_the_margin_of_a_lone_candidate_is_its_evidence() -> None:
 def test_an_echo_of_what_was_found_is_no_effect() -> None:
     small = ranking(("dead_zone", 3, 30.0))
     assert decide(small, LINES).kind == "named"
-    assert decide(small, LINES, collected=1000.0).kind == "nothing"
+    assert decide(small, LINES, [Added("backlash", (3,), 1000.0)]).kind == "nothing"
+    assert decide(small, LINES, [Added("base_tilt", (), 1000.0)]).kind == "nothing"
+
+
+def test_other_joints_echo_less() -> None:
+    small = ranking(("dead_zone", 3, 30.0))
+    assert decide(small, LINES, [Added("backlash", (2,), 1000.0)]).kind == "named"
+    assert decide(small, LINES, [Added("backlash", (2,), 3000.0)]).kind == "nothing"
 
 
 def test_what_one_joint_has_another_is_likelier_to_have() -> None:
     small = ranking(("dead_zone", 3, 8.0))
-    assert decide(small, LINES, collected=40.0, added={"backlash"}).kind == "nothing"
-    assert decide(small, LINES, collected=40.0, added={"dead_zone"}).kind == "named"
+    assert decide(small, LINES, [Added("backlash", (2,), 40.0)]).kind == "nothing"
+    assert decide(small, LINES, [Added("dead_zone", (2,), 40.0)]).kind == "named"
+
+
+def test_the_same_effect_on_fewer_joints_is_no_rival() -> None:
+    both, one, other = ranking(("gear_loss", 1, 90.0), ("gear_loss", 2, 88.0), ("stiction", 2, 87.0)).fitted
+    both.candidate.joints = (1, 2)  # type: ignore[misc]
+    said = decide(Ranking((both, one, other), ()), LINES)
+    assert [f.candidate.name for f in said.group] == ["gear_loss", "stiction"]
+    said = decide(Ranking((both, one), ()), LINES)
+    assert said.kind == "named"

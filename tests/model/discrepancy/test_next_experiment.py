@@ -21,6 +21,7 @@ from model.discrepancy.decision import decide
 from model.discrepancy.next_experiment import Experiment, best_experiment, most_information, rivals_of, settled
 from model.discrepancy.observation import observed
 from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.probing import Probed
 from model.discrepancy.ranking import Ranking, ranked
 from model.discrepancy.refitting import Refitted, judge
 from model.discrepancy.search import Point, point_at, searched, with_new_tangents
@@ -118,7 +119,8 @@ def speed_law(trace: Trace, point: Point, effect: str) -> Refitted:
     unknowns = tuple(replace(u, deviation=None) if u.name == SPEED_LAWS[effect] else u for u in point.unknowns)
     found = searched(observation, replace(point, unknowns=unknowns), 6)
     candidate = Candidate(effect, (2,), point.model, (), (), True, {})
-    return Refitted(candidate, judge(observation, with_new_tangents(observation, found)), 50.0, 50.0)
+    probe = Probed(candidate, 50.0, {}, np.zeros(len(unknowns)), np.zeros_like(found.weighted))
+    return Refitted(probe, judge(observation, with_new_tangents(observation, found)), 50.0)
 
 
 def test_what_no_experiment_tells_is_said() -> None:

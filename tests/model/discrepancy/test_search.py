@@ -7,7 +7,7 @@ import pytest
 
 from model.discrepancy.candidates import Candidate
 from model.discrepancy.observation import Observation, observed
-from model.discrepancy.probing import projection
+from model.discrepancy.probing import Probed, projection
 from model.discrepancy.refitting import Refitted, deeper, judge
 from model.discrepancy.search import Point, _corrected, point_at, settled
 from tests.model.fitting import imagined
@@ -40,7 +40,8 @@ def test_what_a_fit_without_the_candidate_reaches_too_is_not_the_candidates(case
     observation, given = case
     end = judge(observation, settled(observation, given, 4))
     candidate = Candidate("coulomb_friction", (2,), given.model, (), (), proportional=True)
-    found = Refitted(candidate, end, evidence=100.0, promised=20.0)
+    probe = Probed(candidate, 20.0, {}, np.zeros(len(given.values)), np.zeros_like(given.weighted))
+    found = Refitted(probe, end, evidence=100.0)
     stuck = judge(observation, given)
     better = deeper(observation, stuck, found)
     assert better is not None
