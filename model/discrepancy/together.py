@@ -85,9 +85,10 @@ def _begun(current: Judged, parts: Sequence[Refitted], further: Probed | None) -
     if candidate is None:
         return None
     names = [u.name for u in point.unknowns]
-    moved = sum(np.array([r.judged.point.value(name) for name in names]) - point.values for r in parts)
+    moves = [np.array([r.judged.point.value(name) for name in names]) - point.values for r in parts]
+    moves += [] if further is None else [further.moved]
     response = np.zeros_like(point.weighted)  # nothing was probed
-    return Probed(candidate, sum(r.evidence for r in parts), values, np.asarray(moved), response)
+    return Probed(candidate, sum(r.evidence for r in parts), values, np.sum(moves, axis=0), response)
 
 
 def _alike(singles: Sequence[Refitted], thresholds: Thresholds) -> list[list[Refitted]]:
