@@ -15,6 +15,12 @@ describe('the arm in words', () => {
     );
   });
 
+  it('has a true minus sign, and none before nothing', () => {
+    expect(armInWords(CHAIN, [Math.PI, -1e-9])).toBe(
+      'End of the arm at x −500, y 0, z 0 mm. Joints: 1 waist 180.0°, 2 slide 0.0 mm.',
+    );
+  });
+
   it('says that it is old, or unknown', () => {
     expect(armInWords(CHAIN, [0, 0], true)).toMatch(/^Not live: the last that is known\. End/);
     expect(armInWords(CHAIN, null)).toBe('The posture of the arm is not known.');

@@ -1,16 +1,15 @@
 /** The picture of the arm in words, for people who do not see it. */
 
+import { fixed } from '../format';
 import { tipOf, type Chain } from './chain';
 
 /** One line: where the end is (mm) and how every joint stands (°, mm on a prismatic one). */
 export function armInWords(chain: Chain, posture: readonly number[] | null, stale = false): string {
   if (posture === null) return 'The posture of the arm is not known.';
-  const [x, y, z] = tipOf(chain, posture).map((value) => Math.round(value * 1000));
+  const [x, y, z] = tipOf(chain, posture).map((value) => fixed(value * 1000, 0));
   const joints = chain.map((joint, index) => {
     const value = posture[index]!;
-    const text = joint.revolute
-      ? `${((value * 180) / Math.PI).toFixed(1)}°`
-      : `${(value * 1000).toFixed(1)} mm`;
+    const text = joint.revolute ? `${fixed((value * 180) / Math.PI, 1)}°` : `${fixed(value * 1000, 1)} mm`;
     return `${index + 1} ${joint.name} ${text}`;
   });
   const old = stale ? 'Not live: the last that is known. ' : '';

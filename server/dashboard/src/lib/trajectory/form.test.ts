@@ -126,7 +126,7 @@ describe('what is wrong with what is typed', () => {
       RULES,
     ).problems;
     expect(problems).toEqual({
-      'trajectory.amplitude': 'allowed: -360 to 360°',
+      'trajectory.amplitude': 'allowed: −360 to 360°',
       'trajectory.duration': 'allowed: more than 0, up to 3600 s',
       repeats: 'a whole number is needed',
       hold: 'a number is needed: 0 to 3600 s',
@@ -140,7 +140,7 @@ describe('what is wrong with what is typed', () => {
     const { spec, problems } = specOf(form, RULES);
     expect(spec).toBeNull();
     expect(Object.keys(problems)).toEqual(['trajectory.amplitude.2']);
-    expect(problems['trajectory.amplitude.2']).toBe('“x” is not a number: -360 to 360°');
+    expect(problems['trajectory.amplitude.2']).toBe('“x” is not a number: −360 to 360°');
   });
 
   it('allows the very bounds, typed in degrees', () => {

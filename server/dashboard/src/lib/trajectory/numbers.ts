@@ -37,7 +37,7 @@ export function typedNumber(text: string, rule: NumberRule): Typed {
 export function allowed({ bounds, unit, scale }: NumberRule): string {
   const { low, high, above } = bounds;
   const end = unit ? (unit === '°' ? '°' : ` ${unit}`) : '';
-  const of = (value: number): string => shownNumber(value * scale);
+  const of = (value: number): string => shownNumber(value * scale).replace('-', '−');
   if (low !== null && high !== null)
     return above ? `more than ${of(low)}, up to ${of(high)}${end}` : `${of(low)} to ${of(high)}${end}`;
   if (low !== null) return `${above ? 'more than' : 'at least'} ${of(low)}${end}`;

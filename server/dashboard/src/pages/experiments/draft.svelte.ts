@@ -79,20 +79,25 @@ export class Draft {
     if (this.text !== null) this.text = written(spec);
   }
 
-  /** Begins to edit the specification as text. */
-  toText(): void {
-    this.text = written(this.result.spec ?? {});
-  }
+  /** Why it cannot change between fields and text now; empty where it can. What cannot be read would be lost. */
+  keptFromChanging: string = $derived.by(() => {
+    if (this.text === null)
+      return this.result.spec === null ? 'first put right what is wrong in the fields' : '';
+    return this.result.spec !== null && this.isCurrent ? '' : 'only what the service accepts has fields';
+  });
 
-  /** Back to the fields. Whether that was possible: only a specification that the service accepts has fields. */
-  toFields(): boolean {
+  /** Edits the specification as text instead of its fields, or its fields again. */
+  change(): void {
     const spec = this.result.spec;
-    if (spec === null || !this.isCurrent) return false;
+    if (spec === null || this.keptFromChanging !== '') return;
+    if (this.text === null) {
+      this.text = written(spec);
+      return;
+    }
     const preset = this.preset;
     this.text = null;
     this.take(spec);
     this.preset = preset;
-    return true;
   }
 
   get spec(): ExperimentSpec | null {
