@@ -48,12 +48,15 @@ def decide(ranking: Ranking, thresholds: Thresholds, added: Sequence[Added] = ()
 
 
 def same_answer(one: Refitted, best: Refitted) -> bool:
-    """Whether a candidate says the same of the machine as the best one, or only some of it: on fewer of its joints, or
-    on more joints without being any better."""
-    if one.candidate.name != best.candidate.name:
-        return False
-    joints, of_best = set(one.candidate.joints), set(best.candidate.joints)
-    return joints <= of_best or joints > of_best
+    """Whether a candidate says the same of the machine as the best one."""
+    return alike(one.candidate.name, one.candidate.joints, best.candidate.name, best.candidate.joints)
+
+
+def alike(effect: str | None, joints: Sequence[int], of_best: str | None, joints_of_best: Sequence[int]) -> bool:
+    """Whether an effect says the same of the machine as the best one, or only some of it: on fewer of its joints, or on
+    more joints without being any better."""
+    own, others = set(joints), set(joints_of_best)
+    return effect == of_best and (own <= others or own > others)
 
 
 def _needed(found: Refitted, thresholds: Thresholds, added: Sequence[Added]) -> float:

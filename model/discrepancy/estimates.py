@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.discrepancy.answer import Candidate, FoundValue
+from model.discrepancy.decision import alike
 from model.discrepancy.observation import Observation
 from model.discrepancy.ranking import Ranking
 from model.discrepancy.refitting import Refitted
@@ -84,5 +85,7 @@ def only_probed(ranking: Ranking, samples: int) -> tuple[Candidate, ...]:
 
 
 def runner_up(candidates: Sequence[Candidate]) -> Candidate | None:
-    """The second of a ranking."""
-    return candidates[1] if len(candidates) > 1 else None
+    """The best of a ranking that would be another answer than the first."""
+    best = candidates[0]
+    others = (c for c in candidates[1:] if not alike(c.effect, c.joints, best.effect, best.joints))
+    return next(others, None)
