@@ -38,9 +38,9 @@ class Running:
     def __bool__(self) -> bool:
         return bool(self.threads or self.processes)
 
-    def wait(self, grace_s: float = GRACE_S) -> "Running":
-        """What of this still runs when all has ended, or `grace_s` seconds have passed."""
-        deadline = time.monotonic() + grace_s
+    def wait(self, grace_s: float | None = None) -> "Running":
+        """What of this still runs when all has ended, or `grace_s` (else GRACE_S) seconds have passed."""
+        deadline = time.monotonic() + (GRACE_S if grace_s is None else grace_s)
         for thread in self.threads:
             thread.join(max(0.0, deadline - time.monotonic()))
         for process in self.processes:

@@ -37,6 +37,9 @@ pytest.importorskip("a_module_that_does_not_exist")
 LEAVING = """
 import subprocess, sys, threading, time
 import pytest
+from tests import left_running
+
+left_running.GRACE_S = 0.5  # what is left here does not end by itself
 
 @pytest.fixture(scope="module")
 def shared_process():

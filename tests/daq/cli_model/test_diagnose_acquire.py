@@ -23,12 +23,20 @@ from tests.daq.cli.invoke import CommandLine
 PORT = "mock://?lock_step=1&seed=3"
 
 
+@pytest.fixture(scope="module")
+def made() -> dict[str, Path]:
+    """The trace once it has been made: no test changes it."""
+    return {}
+
+
 @pytest.fixture
-def ramp(daq: CommandLine, tmp_path: Path) -> Path:
-    """A trace of the source's ramp, made through the mock."""
-    said = daq("--port", PORT, "run", "preset", "ramp", "--folder", tmp_path, "--json")
-    assert said.code == 0, said.err
-    return Path(json.loads(said.out)["trace"])
+def ramp(made: dict[str, Path], daq: CommandLine, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A trace of the source's ramp, made through the mock, once."""
+    if "ramp" not in made:
+        said = daq("--port", PORT, "run", "preset", "ramp", "--folder", tmp_path_factory.mktemp("ramp"), "--json")
+        assert said.code == 0, said.err
+        made["ramp"] = Path(json.loads(said.out)["trace"])
+    return made["ramp"]
 
 
 def test_what_is_asked_for_is_run_within_the_budget_and_used(daq: CommandLine, ramp: Path, tmp_path: Path) -> None:

@@ -26,6 +26,17 @@ def trace(tmp_path: Path) -> Trace:
         return read_trace(writer.close("stopped"))
 
 
+@pytest.fixture
+def small(trace: Trace) -> Trace:
+    """The same of an experiment that moves one joint: a third of the panels to draw."""
+    return moving(trace, 2)
+
+
+def moving(trace: Trace, *joints: int) -> Trace:
+    """The trace as that of an experiment that moves these joints."""
+    return dataclasses.replace(trace, record=trace.record.model_copy(update={"spec": ExperimentSpec(joints=joints)}))
+
+
 def test_a_figure_shows_every_signal_with_its_unit_and_every_joint(trace: Trace) -> None:
     axes = figure_of(trace).axes
     assert [axis.get_ylabel() for axis in axes if axis.get_ylabel()] == ["position / °", "error / °", "drive / V"]
@@ -37,8 +48,7 @@ def test_a_figure_shows_every_signal_with_its_unit_and_every_joint(trace: Trace)
 
 
 def test_only_the_joints_that_the_experiment_moves_are_drawn_unless_others_are_asked_for(trace: Trace) -> None:
-    spec = ExperimentSpec(joints=(1, 3))
-    held = dataclasses.replace(trace, record=trace.record.model_copy(update={"spec": spec}))
+    held = moving(trace, 1, 3)
 
     def drawn(joints: tuple[int, ...] | None) -> list[str]:
         return [title for axis in figure_of(held, joints).axes if (title := axis.get_title("left"))]
@@ -49,15 +59,15 @@ def test_only_the_joints_that_the_experiment_moves_are_drawn_unless_others_are_a
         drawn((5,))
 
 
-def test_the_same_trace_gives_the_same_picture(trace: Trace, tmp_path: Path) -> None:
-    first, second = plot_trace(trace, tmp_path / "a.svg"), plot_trace(trace, tmp_path / "b.svg")
+def test_the_same_trace_gives_the_same_picture(small: Trace, tmp_path: Path) -> None:
+    first, second = plot_trace(small, tmp_path / "a.svg"), plot_trace(small, tmp_path / "b.svg")
     assert first.read_bytes() == second.read_bytes()
     assert ET.parse(first).getroot().tag.endswith("svg")
-    assert plot_trace(trace, tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert plot_trace(small, tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_page_needs_nothing_else_and_escapes_what_people_wrote(trace: Trace, tmp_path: Path) -> None:
-    page = plot_trace(trace, tmp_path / "a.html").read_text()
+def test_a_page_needs_nothing_else_and_escapes_what_people_wrote(small: Trace, tmp_path: Path) -> None:
+    page = plot_trace(small, tmp_path / "a.html").read_text()
     assert "<svg" in page
     assert "by the operator" in page
     assert "&lt;b&gt;bold&lt;/b&gt;" in page
@@ -66,10 +76,10 @@ def test_a_page_needs_nothing_else_and_escapes_what_people_wrote(trace: Trace, t
     assert "url(http" not in page
 
 
-def test_what_cannot_be_plotted_is_one_line(trace: Trace, tmp_path: Path) -> None:
+def test_what_cannot_be_plotted_is_one_line(small: Trace, tmp_path: Path) -> None:
     with pytest.raises(TraceError, match=r"a\.jpg: plots are made as \.png, \.svg, \.pdf, \.html"):
-        plot_trace(trace, tmp_path / "a.jpg")
+        plot_trace(small, tmp_path / "a.jpg")
     with pytest.raises(TraceError, match="cannot be written"):
-        plot_trace(trace, tmp_path / "absent" / "a.png")
+        plot_trace(small, tmp_path / "absent" / "a.png")
     with pytest.raises(TraceError, match="has no samples to plot"):
         plot_trace(Trace(record(), (1,), np.zeros(0), np.zeros((0, 1))), tmp_path / "a.png")

@@ -35,15 +35,20 @@ def general_arm(seed: int) -> Chain:
 
 
 @numba.njit
-def evaluate(q: FloatArray, v: FloatArray, torque: FloatArray, p: FloatArray):  # type: ignore[no-untyped-def]
+def torques(q: FloatArray, v: FloatArray, p: FloatArray):  # type: ignore[no-untyped-def]
     level = three_joint.mass_matrix_and_bias(q[1], q[2], v[0], v[1], v[2], p)
     inertia = three_joint.mass_matrix(q[1], q[2], p)
     velocity = three_joint.velocity_torques(q[1], q[2], v[0], v[1], v[2], p)
     gravity = three_joint.gravity_torques(q[0], q[1], q[2], p)
     tilted = three_joint.horizontal_gravity_torques(q[0], q[1], q[2], p)
+    return level, inertia, velocity, gravity, tilted
+
+
+@numba.njit
+def accelerations(q: FloatArray, v: FloatArray, torque: FloatArray, p: FloatArray):  # type: ignore[no-untyped-def]
+    tilted = three_joint.horizontal_gravity_torques(q[0], q[1], q[2], p)
     t1, t2, t3 = torque[0] - tilted[0], torque[1] - tilted[1], torque[2] - tilted[2]
-    motion = three_joint_motion.accelerations(q[1], q[2], v[0], v[1], v[2], t1, t2, t3, p)
-    return level, inertia, velocity, gravity, tilted, motion
+    return three_joint_motion.accelerations(q[1], q[2], v[0], v[1], v[2], t1, t2, t3, p)
 
 
 @pytest.mark.parametrize("chain", [TABLE_7_9.chain(), OFFSET_ARM.chain(), *map(general_arm, range(5))])
@@ -51,7 +56,7 @@ def test_closed_form_agrees_with_the_recursion(chain: Chain) -> None:
     arrays, p = chain.arrays(), effective_parameters(chain)
     for seed in range(10):
         q, v, torque = random_state(seed, 3)
-        level, inertia, velocity, gravity, tilted, motion = evaluate(q, v, torque, p)
+        level, inertia, velocity, gravity, tilted = torques(q, v, p)
         expected = recursive.mass_matrix(arrays, q)[UPPER]
         np.testing.assert_allclose(inertia, expected, atol=1e-13)
         np.testing.assert_allclose(level[:6], expected, atol=1e-13)
@@ -60,7 +65,7 @@ def test_closed_form_agrees_with_the_recursion(chain: Chain) -> None:
         whole = np.asarray(level[6:]) + tilted
         np.testing.assert_allclose(whole, np.asarray(velocity) + gravity, atol=1e-12)
         free = recursive.forward_dynamics(arrays, q, v, torque)
-        np.testing.assert_allclose(motion, free, rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(accelerations(q, v, torque, p), free, rtol=1e-10, atol=1e-10)
 
 
 @pytest.mark.parametrize("arm", [TABLE_7_9, OFFSET_ARM])
@@ -101,9 +106,9 @@ def test_sensitivities_to_physical_parameters_are_exact() -> None:
             continue
         stepped = rods.astype(complex)
         stepped[parameter] += 1j * DUAL_STEP
-        motion = evaluate(q.astype(complex), v.astype(complex), torque.astype(complex), effective_from_rods(stepped))[
-            -1
-        ]
+        motion = accelerations(
+            q.astype(complex), v.astype(complex), torque.astype(complex), effective_from_rods(stepped)
+        )
         exact = np.imag(motion) / DUAL_STEP
         wide = central_difference(rods, parameter, q, v, torque)
         np.testing.assert_allclose(exact, wide, rtol=1e-6, atol=1e-6)
@@ -117,7 +122,7 @@ def central_difference(
     for sign in (1, -1):
         moved = rods.copy()
         moved[parameter] += sign * step
-        sides.append(np.asarray(evaluate(q, v, torque, effective_from_rods(moved))[-1]))
+        sides.append(np.asarray(accelerations(q, v, torque, effective_from_rods(moved))))
     return (sides[0] - sides[1]) / (2 * step)
 
 
@@ -126,8 +131,8 @@ def test_real_part_of_a_dual_evaluation_is_the_real_evaluation() -> None:
     stepped = rods.astype(complex)
     stepped[LENGTH_2] += 1j * DUAL_STEP
     q, v, torque = random_state(4, 3)
-    real = evaluate(q, v, torque, effective_from_rods(rods))[-1]
-    twin = evaluate(q.astype(complex), v.astype(complex), torque.astype(complex), effective_from_rods(stepped))[-1]
+    real = accelerations(q, v, torque, effective_from_rods(rods))
+    twin = accelerations(q.astype(complex), v.astype(complex), torque.astype(complex), effective_from_rods(stepped))
     np.testing.assert_allclose(np.real(twin), real, rtol=1e-13)
 
 

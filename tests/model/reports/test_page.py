@@ -39,8 +39,13 @@ def a_comparison() -> Comparison:
     return Comparison((model,), signals)
 
 
-def test_a_page_loads_nothing_and_runs_nothing() -> None:
-    page = html(comparison_report(a_comparison()))
+@pytest.fixture(scope="module")
+def page() -> str:
+    """Its report. Drawing the figures takes most of the time of these tests."""
+    return html(comparison_report(a_comparison()))
+
+
+def test_a_page_loads_nothing_and_runs_nothing(page: str) -> None:
     assert "<script" not in page
     assert "@import" not in page
     assert not re.search(r"""(?:src|href)\s*=\s*["'](?!#)""", page)
@@ -48,24 +53,21 @@ def test_a_page_loads_nothing_and_runs_nothing() -> None:
     assert page.count("<svg") == 2
 
 
-def test_what_a_user_wrote_is_text_on_the_page() -> None:
-    page = html(comparison_report(a_comparison()))
+def test_what_a_user_wrote_is_text_on_the_page(page: str) -> None:
     assert "<arm>" not in page
     assert "&lt;arm&gt; &amp; model" in page
 
 
-def test_the_same_result_gives_the_same_page() -> None:
-    assert html(comparison_report(a_comparison())) == html(comparison_report(a_comparison()))
+def test_the_same_result_gives_the_same_page(page: str) -> None:
+    assert html(comparison_report(a_comparison())) == page
 
 
-def test_errors_are_shown_in_degrees_and_counts_beside_the_noise_floor() -> None:
-    page = html(comparison_report(a_comparison()))
+def test_errors_are_shown_in_degrees_and_counts_beside_the_noise_floor(page: str) -> None:
     for text in ("0.2292 °", "2.00", "0.0573 °", "0.50", "held out"):
         assert text in page
 
 
-def test_the_colours_of_a_figure_follow_the_page() -> None:
-    page = html(comparison_report(a_comparison()))
+def test_the_colours_of_a_figure_follow_the_page(page: str) -> None:
     figure = page[page.index("<svg") : page.index("</svg>")]
     assert "var(--ink)" in figure
     assert "#222222" not in figure
