@@ -8,8 +8,9 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 FOR_USE := .venv/installed-for-use
 FOR_DEVELOPMENT := .venv/installed-for-development
 
-# Each file of tests stays with one worker. One process: make test WORKERS=
-WORKERS ?= -n 2 --dist loadfile
+# Each file of tests stays with one worker, in the order of their names: files of few tests, some of which are the longest,
+# would else be the last, and one worker would wait for the other. One process: make test WORKERS=
+WORKERS ?= -n 2 --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
