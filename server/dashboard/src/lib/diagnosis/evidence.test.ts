@@ -56,7 +56,7 @@ describe('words', () => {
   it('write effects as the field does', () => {
     expect(effectName('back_emf_error')).toBe('back-EMF error');
     expect(effectName('load_dependent_friction')).toBe('load-dependent friction');
-    expect(candidateName({ effect: 'input_delay', joints: [1, 3] })).toBe('input delay, joint 1 + 3');
+    expect(candidateName({ effect: 'input_delay', joints: [1, 3] })).toBe('input delay, joints 1 and 3');
   });
 
   it('of headlines have their capitals', () => {

@@ -45,7 +45,8 @@ export function effectName(name: string): string {
 /** An effect and its joints: "Coulomb friction, joint 2". */
 export function candidateName(one: Pick<TriedEffect, 'effect' | 'joints'>): string {
   if (one.joints.length === 0) return effectName(one.effect);
-  return `${effectName(one.effect)}, joint ${one.joints.join(' + ')}`;
+  const several = one.joints.length > 1 ? 's' : '';
+  return `${effectName(one.effect)}, joint${several} ${listed(one.joints.map(String))}`;
 }
 
 /** Words of the service's headlines with the capitals that the field gives them. */
