@@ -189,7 +189,7 @@ def test_the_motion_is_shown_in_3d_and_turned_with_the_keyboard(
     with chromium(driver, *WITH_3D) as browser:
         form = watched(browser.new_context(viewport=WIDE), *served).open("experiments")
         picture = form.get_by_label("The motion in 3-D")
-        expect(picture).to_have_accessible_description(re.compile(r"End of the arm at x -?\d+.*1 waist 180\.0°"))
+        expect(picture).to_have_accessible_description(re.compile(r"End of the arm at x −?\d+.*1 waist 180\.0°"))
         expect(picture).to_be_visible()
         place = picture.bounding_box()
         assert place is not None
