@@ -46,12 +46,8 @@ class SampledLoop:
 
     def phase_margin(self, gain: float) -> float:
         frequencies = np.linspace(0.5, math.pi / self.period, 4000)
-        response = np.array(
-            [
-                gain * np.linalg.solve(np.exp(1j * w * self.period) * np.eye(3) - self.step, self.push)[0]
-                for w in frequencies
-            ]
-        )
+        resolvents = np.exp(1j * self.period * frequencies)[:, None, None] * np.eye(3) - self.step
+        response = gain * np.linalg.solve(resolvents, self.push[:, None])[:, 0, 0]
         crossing = int(np.argmax(abs(response) < 1))
         return 180 + math.degrees(np.angle(response[crossing]))
 

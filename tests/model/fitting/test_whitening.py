@@ -5,17 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from model.fitting.whitening import autocovariance, fitted_whitener, white
 
 
 def autoregressive(seed: int, count: int, weights: tuple[float, ...], deviation: float) -> NDArray[np.float64]:
     """Samples of x_k = Σ w_i x_{k−i} + e_k, started long before."""
-    rng = np.random.default_rng(seed)
-    x = np.zeros(count + 500)
-    for k in range(len(weights), len(x)):
-        x[k] = sum(w * x[k - i] for i, w in enumerate(weights, start=1)) + deviation * rng.normal()
-    return x[500:]
+    noise = deviation * np.random.default_rng(seed).normal(size=count + 500)
+    return np.asarray(lfilter([1.0], np.append(1.0, -np.array(weights)), noise))[500:]
 
 
 def test_finds_the_weights_of_a_known_process() -> None:
