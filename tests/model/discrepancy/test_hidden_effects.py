@@ -6,12 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from daq.contracts.machine import load_machine
-from daq.trajectories.presets import preset
-from model.discrepancy.answer import Diagnosis
-from model.discrepancy.workflow import diagnose
-from model.machine_model.model import base_model
-from tests.model.discrepancy.recording import recorded
+from tests.model.discrepancy.diagnosed import diagnosed
 
 HIDDEN = {
     "motor_inductance": ("motor_inductance:joint=2,inductance=0.06", 2),
@@ -21,14 +16,6 @@ HIDDEN = {
 }
 SLOW = ("motor_inductance", "backlash")
 """Of them, those that take minutes: left to the slow tests."""
-
-
-def diagnosed(folder: Path, modification: str | None) -> Diagnosis:
-    """What is said of the 55 s set and a held-out trace of an arm with that effect."""
-    machine = load_machine("ma2000")
-    specs = [preset("diagnostic").spec, preset("held-out").spec]
-    fitted, held = recorded(specs, machine, seed=7, folder=folder, modification=modification)
-    return diagnose(base_model(machine), [fitted], [held])
 
 
 @pytest.mark.parametrize(
@@ -45,18 +32,3 @@ def test_a_hidden_effect_is_named_at_its_joint_and_the_gap_shrinks(name: str, tm
     before, after = ((size / gap.floor) ** 2 - 1 for size in (gap.before, gap.after))
     assert after < max(0.35, 0.3 * before)
     assert name in {u.name for u in answer.model_after.effects}
-
-
-@pytest.mark.timeout(400)
-def test_an_effect_that_no_law_of_the_library_describes_is_not_given_a_name(tmp_path: Path) -> None:
-    answer = diagnosed(tmp_path, "drive_coupling:joint=1,onto=2,share=0.2")
-    assert answer.verdict == "unknown-effect", answer.summary
-    assert not [s for s in answer.steps if s.adopted]
-    assert answer.summary.startswith("joint 2")
-
-
-@pytest.mark.timeout(400)
-def test_a_sound_arm_is_called_sound(tmp_path: Path) -> None:
-    answer = diagnosed(tmp_path, None)
-    assert answer.verdict == "nothing-significant", answer.summary
-    assert not [s for s in answer.steps if s.adopted]

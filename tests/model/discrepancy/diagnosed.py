@@ -1,0 +1,20 @@
+"""The whole workflow, from the mock's wire to the answer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from daq.contracts.machine import load_machine
+from daq.trajectories.presets import preset
+from model.discrepancy.answer import Diagnosis
+from model.discrepancy.workflow import diagnose
+from model.machine_model.model import base_model
+from tests.model.discrepancy.recording import recorded
+
+
+def diagnosed(folder: Path, modification: str | None) -> Diagnosis:
+    """What is said of the 55 s set and a held-out trace of an arm with that effect."""
+    machine = load_machine("ma2000")
+    specs = [preset("diagnostic").spec, preset("held-out").spec]
+    fitted, held = recorded(specs, machine, seed=7, folder=folder, modification=modification)
+    return diagnose(base_model(machine), [fitted], [held])
