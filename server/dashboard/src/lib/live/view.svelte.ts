@@ -1,9 +1,9 @@
 /** What the user has chosen to see on the Live page; kept in this browser. */
 
 import type { AngleUnit } from './units';
+import { WINDOWS } from './window';
 
 const KEY = 'ma2000-live-view';
-export const WINDOWS = [10, 30, 60, 300] as const;
 
 interface Kept {
   hidden: number[];

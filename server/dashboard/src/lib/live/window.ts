@@ -2,6 +2,15 @@
 
 import type { Column, Recording, Signal } from './recording';
 
+/** s that a chart can show. */
+export const WINDOWS = [10, 30, 60, 300] as const;
+
+/** Moments at which the time is written, whole seconds before `now`: a window of 30 s every 5 s, one of 10 s every 2 s. */
+export function momentsBefore(now: number, seconds: number): number[] {
+  const parts = seconds % 6 === 0 ? 6 : 5;
+  return Array.from({ length: parts + 1 }, (_, index) => now - seconds + (index * seconds) / parts);
+}
+
 /** Rows above which columns are thinned. Half a minute is drawn as it came: drawing leaves out what shows nothing. */
 export const MOST_ROWS = 2000;
 
