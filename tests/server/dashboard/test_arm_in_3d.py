@@ -21,6 +21,7 @@ def test_the_arm_is_drawn_and_moves_when_it_is_turned(driver: Playwright, served
         page = tab.until_live()
         canvas = page.get_by_label("The arm now, in 3-D")
         expect(canvas).to_be_visible()
+        expect(canvas).to_have_css("opacity", "1")  # what is not live is paler
         before = Image.open(BytesIO(canvas.screenshot())).convert("RGB")
         colours = before.getcolors(1 << 20)
         assert colours is not None
