@@ -34,8 +34,7 @@ class _BetweenAttempts:
             self.desk.tell_arm()
             order = self.desk.inbox.take(max(0.0, min(1.0, until - time.monotonic())))
             if order is not None:
-                line = f"{self.desk.controller.link.url}: the link is lost; it is being tried again"
-                _refuse(self.desk, order, line, ReachError.exit_code)
+                _refuse(self.desk, order, _being_tried(self.desk), ReachError.exit_code)
             elif time.monotonic() >= until:
                 return _leaving(self.desk)
         return True
@@ -52,7 +51,7 @@ def serve(desk: Desk) -> None:
                 if order is not None:
                     _carry_out(desk, order)
                     last = None
-                elif desk.controller.link.state is LinkState.LOST:
+                elif _is_away(desk):
                     last = None
                     _come_back(desk)
                 else:
@@ -81,6 +80,8 @@ def _carry_out(desk: Desk, order: Long | Quick) -> None:
         desk.speaker.ended(answer)
         return
     try:
+        if _is_away(desk):
+            raise ReachError(_being_tried(desk))
         answer = _moved(desk, order)
     except DaqError as error:
         answer = Answer(number=order.number, problem=str(error), exit_code=error.exit_code)
@@ -109,11 +110,23 @@ def _link_lost(desk: Desk, why: str) -> None:
         desk.control.handle(Event.LINK_LOST, why)
 
 
+def _is_away(desk: Desk) -> bool:
+    """Whether the link has been lost, or the robot was silent for so long that it counted as lost."""
+    return desk.controller.link.state is LinkState.LOST or not desk.control.arm.connected
+
+
+def _being_tried(desk: Desk) -> str:
+    return f"{desk.controller.link.url}: the link is lost; it is being tried again"
+
+
 def _come_back(desk: Desk) -> None:
     """Tries until the link is there again. A stop that could not be delivered is delivered before anything else."""
     _link_lost(desk, "link lost")
     try:
-        desk.controller.link.reconnect(_BetweenAttempts(desk))
+        if desk.controller.link.state is LinkState.LOST:
+            desk.controller.link.reconnect(_BetweenAttempts(desk))
+        else:
+            desk.controller.hello()  # it was silent, and has to answer before it counts as there
     except LinkError:
         return
     desk.control.handle(Event.CONNECTED)

@@ -1,0 +1,76 @@
+"""The owner's loop when the robot is silent for a while although its line stays open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from threading import Event
+from types import SimpleNamespace
+from typing import Any, cast
+
+from daq.contracts.errors import ReachError
+from daq.link import LinkState, LinkTimeoutError
+from daq.runner import ArmControl
+from firmware_protocol.commands import StatusFlag
+from server.owner.messages import Answer, RunProgram
+from server.owner.owner import serve
+
+SILENT = LinkTimeoutError("mock://: no reply to Sample, asked 9 times: is the controller on?")
+
+
+class SilentForAWhile:
+    """A controller that gives samples, then says nothing to one sample and one greeting, then answers again."""
+
+    def __init__(self) -> None:
+        self.link = SimpleNamespace(state=LinkState.CONNECTED, lock_step=True, url="mock://")
+        self.period_s = 0.0
+        self.ticks = iter(range(1000))
+        self.silence: Iterator[bool] = iter([False, True])
+        self.greetings: Iterator[bool] = iter([True])
+
+    def next_snapshot(self, _after: int | None) -> SimpleNamespace:
+        if next(self.silence, False):
+            raise SILENT
+        return SimpleNamespace(tick=next(self.ticks), flags=StatusFlag(0))
+
+    def hello(self) -> None:
+        if next(self.greetings, False):
+            raise SILENT
+
+    def status(self) -> SimpleNamespace:
+        return SimpleNamespace(flags=StatusFlag(0))
+
+
+def served(orders: dict[int, Any], turns: int = 8) -> tuple[list[str], list[Answer]]:
+    """States of the arm, turn by turn, and answers; `orders` by the turn in which they come."""
+    controller, closing, states, answers = SilentForAWhile(), Event(), [], []
+    control = ArmControl(cast(Any, controller))
+    numbers = iter(range(turns))
+
+    def take(_timeout: float) -> Any:
+        return orders.get(next(numbers))
+
+    def tell_arm() -> None:
+        states.append(str(control.arm.state))
+        if len(states) >= turns:
+            closing.set()
+
+    desk = SimpleNamespace(
+        controller=controller, control=control, tell_arm=tell_arm, read_gains=dict, activity="none",
+        guardian=SimpleNamespace(cause=None), speaker=SimpleNamespace(ended=answers.append),
+        inbox=SimpleNamespace(take=take, closing=closing, done=lambda: None),
+    )  # fmt: skip
+    serve(cast(Any, desk))
+    return states, answers
+
+
+def test_a_robot_that_answers_again_is_connected_again() -> None:
+    states, _ = served({})
+    assert states[:5] == ["idle", "disconnected", "disconnected", "idle", "idle"]
+
+
+def test_what_would_move_a_robot_that_is_silent_is_refused() -> None:
+    order = RunProgram.model_construct(number=7)
+    states, answers = served({2: order})
+    assert [(a.number, a.exit_code) for a in answers] == [(7, ReachError.exit_code)]
+    assert "the link is lost; it is being tried again" in answers[0].problem
+    assert states[-1] == "idle"
