@@ -42,7 +42,9 @@ class SilentForAWhile:
 
 def served(orders: dict[int, Any], turns: int = 8) -> tuple[list[str], list[Answer]]:
     """States of the arm, turn by turn, and answers; `orders` by the turn in which they come."""
-    controller, closing, states, answers = SilentForAWhile(), Event(), [], []
+    controller, closing = SilentForAWhile(), Event()
+    states: list[str] = []
+    answers: list[Answer] = []
     control = ArmControl(cast(Any, controller))
     numbers = iter(range(turns))
 
@@ -69,7 +71,7 @@ def test_a_robot_that_answers_again_is_connected_again() -> None:
 
 
 def test_what_would_move_a_robot_that_is_silent_is_refused() -> None:
-    order = RunProgram.model_construct(number=7)
+    order = cast(Any, RunProgram).model_construct(number=7)
     states, answers = served({2: order})
     assert [(a.number, a.exit_code) for a in answers] == [(7, ReachError.exit_code)]
     assert "the link is lost; it is being tried again" in answers[0].problem
