@@ -81,7 +81,7 @@ class Multisine(_Part):
     """Sum of `tones` sines between two frequencies with seeded phases, scaled to the amplitude, faded in and out."""
 
     kind: Literal["multisine"] = "multisine"
-    amplitude: Amplitude = math.radians(10.8)
+    amplitude: Amplitude = math.radians(7.2)
     duration: Duration = 10.0
     lowest: Annotated[FiniteFloat, Field(gt=0, le=25)] = 0.1
     highest: Annotated[FiniteFloat, Field(gt=0, le=25)] = 2.0

@@ -1,12 +1,23 @@
 """Named experiments: they are allowed on the machine that ships, and take the time they say."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
-from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.experiment import (
+    Cubic,
+    ExperimentSpec,
+    Multisine,
+    Ramp,
+    Sine,
+    SlowRamp,
+    Staircase,
+    Step,
+    Trajectory,
+)
 from daq.safety import check_plan
 from daq.trajectories import PRESETS, Plan, plan, preset, start_angles
 from tests.daq.trajectories.machines import MA2000
@@ -20,6 +31,12 @@ def made(name: str) -> Plan:
 @pytest.mark.parametrize("name", PRESETS)
 def test_a_preset_is_allowed_on_the_ma2000(name: str) -> None:
     assert check_plan(made(name), MA2000, MA2000.limits) == []
+
+
+@pytest.mark.parametrize("kind", [Ramp, Step, Staircase, SlowRamp, Sine, Multisine, Cubic])
+def test_what_is_moved_when_nothing_is_said_of_it_is_allowed_on_the_ma2000(kind: Callable[[], Trajectory]) -> None:
+    spec = ExperimentSpec(trajectory=kind(), joints=(1, 2, 3))
+    assert check_plan(plan(spec, MA2000, start_angles(spec, MA2000)), MA2000, MA2000.limits) == []
 
 
 @pytest.mark.parametrize("name", [name for name in PRESETS if name != "ramp"])

@@ -3120,7 +3120,7 @@ export interface components {
             kind: "multisine";
             /**
              * Amplitude
-             * @default 0.1884955592153876
+             * @default 0.12566370614359174
              */
             amplitude?: number | {
                 [key: string]: number;
