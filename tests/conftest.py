@@ -25,8 +25,9 @@ AGAINST_THE_CLOCK = (
     "server",
 )
 """Folders of tests with processes in real time. A machine that gives them no processor for half a second makes them
-fail, rightly (a mock that is silent for so long is a controller that has gone), and says nothing of the product. A
-fault fails every time."""
+fail, rightly (a mock that is silent for so long is a controller that has gone), and says nothing of the product. They
+are tried again, and the summary names each that was: one that comes up again and again is a race, not a busy machine.
+What runs on a real arm is never repeated by itself."""
 ATTEMPTS = 3
 MAY_ALWAYS_SKIP = ("hardware", "lab_data")
 """Marks of tests that need what nobody can install: a real arm, and traces that are kept outside the repository."""
@@ -60,7 +61,9 @@ def lab_data(request: pytest.FixtureRequest) -> Path:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     folders = [ROOT / "tests" / folder for folder in AGAINST_THE_CLOCK]
     for item in items:
-        if any(item.path.is_relative_to(folder) for folder in folders):
+        if item.config.getoption("--port") or not any(item.path.is_relative_to(folder) for folder in folders):
+            continue
+        if not item.get_closest_marker("hardware"):
             item.add_marker("against_the_clock")
             item.add_marker(pytest.mark.flaky(reruns=ATTEMPTS - 1))
 

@@ -90,12 +90,14 @@ def tone(model: Model, name: str, joint: int, values: Mapping[str, float]) -> Ca
 
 
 def on_joints(model: Model, alike: Sequence[Candidate], values: Mapping[str, float]) -> Candidate | None:
-    """One law on all the joints of candidates for single ones, with one trial: `values` by full name."""
+    """One law on all the joints of candidates for single ones, with one trial: `values` by full name. None where the
+    model refuses it, or has the effect on some of the joints already."""
     first = alike[0]
     joints = tuple(sorted(j for c in alike for j in c.joints))
     bounds = {name: own for c in alike for name, own in c.bounds.items()}
     law = first.free[0].effect or first.name
-    return _candidate(model, first.name, law, joints, (dict(values),), proportional=False, bounds=bounds)
+    found = _candidate(model, first.name, law, joints, (dict(values),), proportional=False, bounds=bounds)
+    return found if found is not None and {j for p in found.free for j in p.joints} >= set(joints) else None
 
 
 def _variants(model: Model, name: str, joints: tuple[int, ...]) -> list[Candidate]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from model.discrepancy.ranking import Ranking
-from model.discrepancy.refitting import Refitted
+from model.discrepancy.refitting import Refitted, same_answer
 from model.discrepancy.thresholds import Thresholds
 
 Kind = Literal["nothing", "named", "group"]
@@ -45,18 +45,6 @@ def decide(ranking: Ranking, thresholds: Thresholds, added: Sequence[Added] = ()
     margin = best.evidence - max([0.0, *(r.evidence for r in rivals)])
     group = (best, *(r for r in rivals if best.evidence - r.evidence < thresholds.margin))
     return Decision("group" if len(group) > 1 else "named", best, margin, group if len(group) > 1 else ())
-
-
-def same_answer(one: Refitted, best: Refitted) -> bool:
-    """Whether a candidate says the same of the machine as the best one."""
-    return alike(one.candidate.name, one.candidate.joints, best.candidate.name, best.candidate.joints)
-
-
-def alike(effect: str | None, joints: Sequence[int], of_best: str | None, joints_of_best: Sequence[int]) -> bool:
-    """Whether an effect says the same of the machine as the best one, or only some of it: on fewer of its joints, or on
-    more joints without being any better."""
-    own, others = set(joints), set(joints_of_best)
-    return effect == of_best and (own <= others or own > others)
 
 
 def _needed(found: Refitted, thresholds: Thresholds, added: Sequence[Added]) -> float:

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.discrepancy.answer import Candidate, FoundValue
-from model.discrepancy.decision import alike
 from model.discrepancy.observation import Observation
 from model.discrepancy.ranking import Ranking
-from model.discrepancy.refitting import Refitted
+from model.discrepancy.refitting import Refitted, says_no_more
 from model.fitting.fit import INTERVAL
 from model.fitting.whitening import Whitener
 
@@ -85,7 +84,7 @@ def only_probed(ranking: Ranking, samples: int) -> tuple[Candidate, ...]:
 
 
 def runner_up(candidates: Sequence[Candidate]) -> Candidate | None:
-    """The best of a ranking that would be another answer than the first."""
+    """The best fitted candidate of a ranking that would be another answer than the first."""
     best = candidates[0]
-    others = (c for c in candidates[1:] if not alike(c.effect, c.joints, best.effect, best.joints))
-    return next(others, None)
+    fitted = (c for c in candidates[1:] if c.refitted)
+    return next((c for c in fitted if not says_no_more(c.effect, c.joints, best.effect, best.joints)), None)

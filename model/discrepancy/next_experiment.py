@@ -20,7 +20,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.trace import Trace
 from model.discrepancy import search
 from model.discrepancy.answer import NextExperiment, Verdict
-from model.discrepancy.decision import Decision, same_answer
+from model.discrepancy.decision import Decision
 from model.discrepancy.next_experiment_reason import most_informative, separating
 from model.discrepancy.next_experiment_signals import (
     Imagined,
@@ -35,7 +35,7 @@ from model.discrepancy.next_experiment_signals import (
 )
 from model.discrepancy.observation import Observation
 from model.discrepancy.ranking import Ranking, describe
-from model.discrepancy.refitting import Refitted, judge
+from model.discrepancy.refitting import Refitted, judge, same_answer
 from model.discrepancy.search import Point, with_new_tangents
 
 Floats = NDArray[np.float64]

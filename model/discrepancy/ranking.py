@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from daq.contracts.progress import Cancel, CancelledError, Progress
+from daq.contracts.progress import Cancel, Progress
 from model.discrepancy.candidates import FLEXIBLE, TONES, candidates
 from model.discrepancy.observation import Observation
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.probing import Probed, probed, still_promising
-from model.discrepancy.refitting import Judged, Refitted, begun_again, finished, polished, refitted
+from model.discrepancy.refitting import Judged, Refitted, begun_again, finished, polished, refitted, same_answer
 from model.discrepancy.thresholds import Thresholds
-from model.discrepancy.together import fitted_together
+from model.discrepancy.together import fitted_together, stop_if
 from model.discrepancy.tones import proposed_tones
 
 FLAGGED_SHARE = 0.1
@@ -52,7 +52,7 @@ def ranked(
     every = still_promising(point, every, earlier, REMEMBERED * thresholds.interesting)
     progress(0.0, "probing the known effects")
     probes = probed(observation, point, [c for c in every if c.name not in FLEXIBLE])
-    _stop_if(cancel)
+    stop_if(cancel)
     joints = options.joints or point.model.machine.modelled_joints
     if options.effects is None or set(TONES) & set(options.effects):
         tones = proposed_tones(observation, point, joints)
@@ -63,22 +63,34 @@ def ranked(
     chosen = [p for p in probes if p.gain >= thresholds.interesting][: options.fitted]
     fits: list[Refitted] = []
     for number, one in enumerate(chosen):
-        _stop_if(cancel)
+        stop_if(cancel)
         if number >= ALWAYS_FITTED and one.gain < HOPELESS * max((f.evidence for f in fits), default=0.0):
             break
         progress(0.4 + 0.5 * number / len(chosen), f"fitting {describe(one.candidate.name, one.candidate.joints)}")
         found = refitted(observation, current, one)
         if found is not None:
             fits.append(found)
-    _stop_if(cancel)
-    fits += fitted_together(observation, current, fits, probes, thresholds)
+    progress(0.9, "fitting effects of several joints")
+    fits += fitted_together(observation, current, fits, probes, thresholds, cancel)
     fits.sort(key=lambda r: -r.evidence)
-    _stop_if(cancel)
-    head = [polished(observation, current, r) for r in fits[: options.polished] if r.evidence > 0]
-    head = [begun_again(observation, current, r) for r in head]
+    answers = _different(fits)[: options.polished]
+    head = []
+    for best in answers:
+        stop_if(cancel)
+        better = polished(observation, current, best)
+        head.append(better if len(better.candidate.joints) > 1 else begun_again(observation, current, better))
     head = _told_apart(observation, current, head, thresholds)
-    fits = sorted([*head, *fits[len(head) :]], key=lambda r: -r.evidence)
-    return Ranking(_one_a_name(fits), tuple(probes))
+    rest = [r for r in fits if not any(r is a for a in answers)]
+    return Ranking(_one_a_name(sorted([*head, *rest], key=lambda r: -r.evidence)), tuple(probes))
+
+
+def _different(fits: Sequence[Refitted]) -> list[Refitted]:
+    """The best fit of every answer that has something for it; `fits` are sorted."""
+    found: list[Refitted] = []
+    for fit in fits:
+        if fit.evidence > 0 and not any(same_answer(fit, better) for better in found):
+            found.append(fit)
+    return found
 
 
 def _told_apart(
@@ -115,8 +127,3 @@ def _flagged(probes: Sequence[Probed], joints: Sequence[int], thresholds: Thresh
     best = {j: max((p.gain for p in probes if j in p.candidate.joints), default=0.0) for j in joints}
     most = max(best.values(), default=0.0)
     return {j for j, gain in best.items() if gain >= thresholds.interesting and gain >= FLAGGED_SHARE * most}
-
-
-def _stop_if(cancel: Cancel) -> None:
-    if cancel.is_set():
-        raise CancelledError("the diagnosis was cancelled")

@@ -67,6 +67,20 @@ class Refitted:
         return self.judged.point.misfit
 
 
+def same_answer(one: Refitted, better: Refitted) -> bool:
+    """Whether a candidate says the same of the machine as one that is ranked above it."""
+    return says_no_more(one.candidate.name, one.candidate.joints, better.candidate.name, better.candidate.joints)
+
+
+def says_no_more(
+    effect: str | None, joints: Sequence[int], of_better: str | None, joints_of_better: Sequence[int]
+) -> bool:
+    """Whether an effect says the same of the machine as one ranked above it, or only some of it: it is the same effect
+    on fewer joints, or on more, which then brought nothing."""
+    own, others = set(joints), set(joints_of_better)
+    return effect == of_better and (own <= others or own > others)
+
+
 def judge(observation: Observation, point: Point) -> Judged:
     """A point with the noise model of its own residual."""
     return Judged(point, noise_model(observation.by_joint(point.weighted)))
@@ -130,7 +144,8 @@ def polished(observation: Observation, before: Judged, found: Refitted) -> Refit
 
 
 def begun_again(observation: Observation, before: Judged, found: Refitted) -> Refitted:
-    """The same, or, where it leaves the record unexplained, a better fit from the expected numbers."""
+    """The same, or, where it leaves the record unexplained, a better fit from the expected numbers: a descent from
+    where a strong effect has driven the tolerance parameters may end in another valley."""
     if found.misfit < STRANGE:
         return found
     try:

@@ -46,7 +46,7 @@ class Thresholds:
         """Evidence from which a further effect counts as found; so much was collected on its joints, and on others.
 
         Args:
-            kin: whether the effect has been found on another joint.
+            kin: whether the same effect has been found before.
         """
         line = self.significant + self.echo * here + self.distant_echo * elsewhere
         return line * self.kin if kin else line

@@ -12,6 +12,7 @@ from itertools import groupby
 
 import numpy as np
 
+from daq.contracts.progress import Cancel, CancelledError
 from model.discrepancy.candidates import TONES, Candidate, on_joints
 from model.discrepancy.observation import Observation
 from model.discrepancy.probing import Probed
@@ -24,75 +25,87 @@ WORTH_A_FIT = 0.7
 
 def fitted_together(
     observation: Observation, current: Judged, singles: Sequence[Refitted], probes: Sequence[Probed],
-    thresholds: Thresholds,
+    thresholds: Thresholds, cancel: Cancel,
 ) -> list[Refitted]:  # fmt: skip
-    """The effects that are significant on two joints or more, each on all of these at once and fitted; parameters are
-    each joint's own. The best are tried on further joints, where the effect alone had not been significant. Left out is
-    what brings no more than fewer joints do.
+    """The effects that are significant on two joints or more, each fitted on its best two joints at once; parameters
+    are each joint's own. The best such pairs are tried on further joints, one by one. Left out is what brings no more
+    than the effect on one joint fewer does.
 
     Args:
-        probes: of this turn, which say where a fit on further joints begins.
+        probes: of this turn, which say where a fit begins on a joint where there is none alone.
+
+    Raises CancelledError.
     """
-    found: list[Refitted] = []
+    found: list[tuple[Refitted, list[Refitted]]] = []
     best = max((r.evidence for r in singles), default=0.0)
     for alike in _alike(singles, thresholds):
         if sum(r.evidence for r in alike) >= WORTH_A_FIT * best:
-            fit = _better(observation, current, alike, thresholds)
+            stop_if(cancel)
+            fit = _better(observation, current, alike[:2], thresholds)
             if fit is not None:
-                found.append(fit)
+                found.append((fit, alike[2:]))
                 best = max(best, fit.evidence)
-    close = [r for r in found if r.evidence > best - thresholds.close]
-    return found + [w for r in close for w in _on_further_joints(observation, current, r, probes, thresholds)]
+    every = [pair for pair, _ in found]
+    for pair, others in found:
+        if pair.evidence <= best - thresholds.close:
+            continue
+        widest = pair
+        further: list[Refitted | Probed] = [*others, *_only_probed(pair, others, probes)]
+        for place in further:
+            stop_if(cancel)
+            wider = _better(observation, current, [widest], thresholds, place)
+            if wider is not None:
+                widest = wider
+                every.append(wider)
+    return every
+
+
+def stop_if(cancel: Cancel) -> None:
+    """Raises CancelledError when the diagnosis is to end."""
+    if cancel.is_set():
+        raise CancelledError("the diagnosis was cancelled")
+
+
+def _only_probed(found: Refitted, fitted: Sequence[Refitted], probes: Sequence[Probed]) -> list[Probed]:
+    """Probes of the same law on joints where there is no fit of it."""
+    known = {j for r in (found, *fitted) for j in r.candidate.joints}
+    return [p for p in probes if _law(p.candidate) == _law(found.candidate) and not set(p.candidate.joints) & known]
 
 
 def _better(
     observation: Observation, current: Judged, parts: Sequence[Refitted], thresholds: Thresholds,
-    further: Probed | None = None,
+    further: Refitted | Probed | None = None,
 ) -> Refitted | None:  # fmt: skip
     """The parts fitted together, and on one further joint, where that brings what a further joint must bring."""
+    most = max(r.evidence for r in parts)
     begun = _begun(current, parts, further)
     fit = None if begun is None else refitted(observation, current, begun)
     fit = None if fit is None else begun_again(observation, current, fit)
-    most = max(r.evidence for r in parts)
     return fit if fit is not None and fit.evidence - most > thresholds.needed(elsewhere=most, kin=True) else None
 
 
-def _on_further_joints(
-    observation: Observation, current: Judged, found: Refitted, probes: Sequence[Probed], thresholds: Thresholds
-) -> list[Refitted]:
-    """What the effect on one joint more brings, as often as that brings something."""
-    better: list[Refitted] = []
-    for probe in probes:
-        own = probe.candidate
-        if _law(own) == _law(found.candidate) and not set(own.joints) & set(found.candidate.joints):
-            fit = _better(observation, current, [found], thresholds, probe)
-            if fit is not None:
-                better.append(fit)
-                found = fit
-    return better
-
-
-def _begun(current: Judged, parts: Sequence[Refitted], further: Probed | None) -> Probed | None:
+def _begun(current: Judged, parts: Sequence[Refitted], further: Refitted | Probed | None) -> Probed | None:
     """Where a fit of all of them begins: each where its own fit has ended, other unknowns moved by what they moved
-    there, one on top of the other. None where the model refuses them."""
+    there, one on top of the other. None where the model refuses them. Nothing is simulated for it: its gain is what
+    the parts add up to, and it has no response."""
     point = current.point
-    values = {p.name: r.judged.point.value(p.name) for r in parts for p in r.candidate.free}
-    alike = [r.candidate for r in parts]
-    if further is not None:
+    fits = [*parts, further] if isinstance(further, Refitted) else list(parts)
+    values = {p.name: r.judged.point.value(p.name) for r in fits for p in r.candidate.free}
+    moves = [np.array([r.judged.point.value(u.name) for u in point.unknowns]) - point.values for r in fits]
+    alike = [r.candidate for r in fits]
+    if isinstance(further, Probed):
         values |= further.start
+        moves.append(further.moved)
         alike.append(further.candidate)
     candidate = on_joints(point.model, alike, values)
     if candidate is None:
         return None
-    names = [u.name for u in point.unknowns]
-    moves = [np.array([r.judged.point.value(name) for name in names]) - point.values for r in parts]
-    moves += [] if further is None else [further.moved]
-    response = np.zeros_like(point.weighted)  # nothing was probed
-    return Probed(candidate, sum(r.evidence for r in parts), values, np.sum(moves, axis=0), response)
+    gain = sum(r.evidence for r in fits)
+    return Probed(candidate, gain, values, np.sum(moves, axis=0), np.zeros_like(point.weighted))
 
 
 def _alike(singles: Sequence[Refitted], thresholds: Thresholds) -> list[list[Refitted]]:
-    """Significant fits of one law on different joints, the sets that add up to most first."""
+    """Significant fits of one law on different joints, the best first; the sets that add up to most first."""
     suited = [
         r
         for r in singles
@@ -102,7 +115,7 @@ def _alike(singles: Sequence[Refitted], thresholds: Thresholds) -> list[list[Ref
     for _, group in groupby(sorted(suited, key=lambda r: _law(r.candidate)), key=lambda r: _law(r.candidate)):
         best = {r.candidate.joints: r for r in sorted(group, key=lambda r: r.evidence)}
         if len(best) > 1:
-            sets.append(sorted(best.values(), key=lambda r: r.candidate.joints))
+            sets.append(sorted(best.values(), key=lambda r: -r.evidence))
     return sorted(sets, key=lambda s: -sum(r.evidence for r in s))
 
 

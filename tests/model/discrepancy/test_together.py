@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 
+from daq.contracts.progress import Never
 from model.discrepancy.candidates import candidates
 from model.discrepancy.observation import observed
 from model.discrepancy.probing import probed
@@ -27,7 +28,7 @@ def fits(joints: tuple[int, ...]) -> tuple[tuple[Refitted, ...], tuple[Refitted,
     before = judge(observation, settled(observation, given, 4))
     probes = probed(observation, before.point, candidates(before.point.model, ("gear_loss",), (1, 2, 3)))
     singles = [r for r in (refitted(observation, before, p) for p in probes) if r is not None]
-    return tuple(singles), tuple(fitted_together(observation, before, singles, probes, THRESHOLDS))
+    return tuple(singles), tuple(fitted_together(observation, before, singles, probes, THRESHOLDS, Never()))
 
 
 def test_what_several_joints_have_is_found_on_all_of_them() -> None:
@@ -44,3 +45,8 @@ def test_what_one_joint_has_is_found_on_no_other() -> None:
     singles, several = fits((2,))
     assert max(singles, key=lambda r: r.evidence).candidate.joints == (2,)
     assert several == ()
+
+
+def test_what_two_joints_have_is_not_found_on_the_third() -> None:
+    _, several = fits((1, 3))
+    assert max(several, key=lambda r: r.evidence).candidate.joints == (1, 3)
