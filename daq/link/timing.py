@@ -50,7 +50,7 @@ class LinkTiming:
         return line + REPLY_MARGIN_S + waiting
 
     def retries_of(self, request: Request) -> int:
-        """How often `request` is repeated before it counts as failed."""
+        """How often `request` is repeated before it counts as failed; greeting and stop have numbers of their own."""
         if isinstance(request, Stop):
             return STOP_RETRIES
         return max(HELLO_RETRIES, self.retries) if isinstance(request, Hello) else self.retries

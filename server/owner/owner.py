@@ -91,7 +91,7 @@ def _carry_out(desk: Desk, order: Long | Quick) -> None:
     desk.inbox.done()
     desk.tell_arm()
     desk.speaker.ended(answer)
-    if desk.controller.link.state is not LinkState.LOST:
+    if not _is_away(desk):
         desk.read_gains()
 
 
@@ -126,13 +126,20 @@ def _come_back(desk: Desk) -> None:
         if desk.controller.link.state is LinkState.LOST:
             desk.controller.link.reconnect(_BetweenAttempts(desk))
         else:
-            desk.controller.hello()  # it was silent, and has to answer before it counts as there
-    except LinkError:
+            _answers_again(desk)
+    except (LinkError, NoSampleError):
         return
     desk.control.handle(Event.CONNECTED)
     desk.controller.hello()
     desk.read_gains()
     _notice_a_stop_before_us(desk)
+
+
+def _answers_again(desk: Desk) -> None:
+    """One that was silent has to give a sample before it counts as there. Raises LinkError, NoSampleError."""
+    if (cause := desk.control.halted) is not None:
+        desk.control.stop(cause)
+    desk.controller.next_snapshot()
 
 
 def _notice_a_stop_before_us(desk: Desk) -> None:

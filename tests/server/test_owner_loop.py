@@ -8,33 +8,32 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from daq.contracts.errors import ReachError
-from daq.link import LinkState, LinkTimeoutError
+from daq.driver import NoSampleError
+from daq.link import LinkState
 from daq.runner import ArmControl
 from firmware_protocol.commands import StatusFlag
 from server.owner.messages import Answer, RunProgram
 from server.owner.owner import serve
 
-SILENT = LinkTimeoutError("mock://: no reply to Sample, asked 9 times: is the controller on?")
+SILENT = NoSampleError("mock://: no whole sample")
 
 
 class SilentForAWhile:
-    """A controller that gives samples, then says nothing to one sample and one greeting, then answers again."""
+    """A controller that gives a sample, then none twice while its line stays open, then samples again."""
 
     def __init__(self) -> None:
         self.link = SimpleNamespace(state=LinkState.CONNECTED, lock_step=True, url="mock://")
         self.period_s = 0.0
         self.ticks = iter(range(1000))
-        self.silence: Iterator[bool] = iter([False, True])
-        self.greetings: Iterator[bool] = iter([True])
+        self.silence: Iterator[bool] = iter([False, True, True])
 
-    def next_snapshot(self, _after: int | None) -> SimpleNamespace:
+    def next_snapshot(self, _after: int | None = None) -> SimpleNamespace:
         if next(self.silence, False):
             raise SILENT
         return SimpleNamespace(tick=next(self.ticks), flags=StatusFlag(0))
 
     def hello(self) -> None:
-        if next(self.greetings, False):
-            raise SILENT
+        """The greeting."""
 
     def status(self) -> SimpleNamespace:
         return SimpleNamespace(flags=StatusFlag(0))

@@ -7,9 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq.link import Link, LinkLostError, LinkState, LinkTimeoutError, RequestRefusedError
-from daq.link.timing import CLEAN_TRANSACTIONS, RETRIES
+from daq.link.timing import CLEAN_TRANSACTIONS, HELLO_RETRIES, RETRIES
 from firmware_protocol.commands import (
     Block,
+    Hello,
+    HelloReply,
     ReadBlock,
     ReadStatus,
     Refusal,
@@ -68,6 +70,15 @@ def test_the_budget_of_one_transaction_ends_in_one_clear_line() -> None:
     assert len(channel.asked) == RETRIES + 1
     assert len({sequence for sequence, _ in channel.asked}) == 1
     assert link.state is LinkState.LOST
+
+
+def test_a_greeting_is_asked_for_long_enough_for_a_bridge_that_starts_anew() -> None:
+    link, channel = scripted_link(lambda _sequence, _request: [])
+    begun = channel.now()
+    with pytest.raises(LinkTimeoutError, match="no reply to Hello"):
+        link.request(Hello(), HelloReply)
+    assert len(channel.asked) == HELLO_RETRIES + 1
+    assert channel.now() - begun > 1.0
 
 
 def test_requests_written_together_cost_one_write_and_only_the_lost_one_is_repeated() -> None:

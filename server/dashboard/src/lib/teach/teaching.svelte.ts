@@ -59,6 +59,11 @@ export class Teaching {
     this.led = (await this.tried(() => this.requests.lead(joints))) === null ? [] : joints;
   }
 
+  /** What the arm does is known to be another thing: whoever leads next may lead other joints. */
+  isNotLed(): void {
+    this.led = [];
+  }
+
   /** Ends leading, and keeps its path as an instruction. */
   async finish(): Promise<void> {
     const status = await this.tried(() => this.requests.finish());

@@ -56,6 +56,13 @@ describe('teaching', () => {
     expect([taught.led, taught.problem?.status]).toEqual([[], 409]);
   });
 
+  it('knows no led joints once leading has ended without it', async () => {
+    const taught = teaching({});
+    await taught.lead();
+    taught.isNotLed();
+    expect(taught.led).toEqual([]);
+  });
+
   it('runs the instructions in the order in which they stand', async () => {
     const ran: unknown[] = [];
     const taught = teaching({ run: (program) => (ran.push(program), Promise.resolve(status)) });
