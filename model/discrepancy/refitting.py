@@ -88,7 +88,8 @@ def judge(observation: Observation, point: Point) -> Judged:
 
 def refitted(observation: Observation, before: Judged, probed: Probed) -> Refitted | None:
     """A candidate fitted from where its probe points to, and, where that leads nowhere, from the numbers that are
-    expected: a strong effect may have driven the tolerance parameters far off. None where no simulation stays finite."""
+    expected: a strong effect may have driven the tolerance parameters far off. None where no simulation stays
+    finite."""
     found: list[Point] = []
     for fit in (_nearby, _from_expected):
         try:
