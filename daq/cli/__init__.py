@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 
@@ -11,6 +12,8 @@ def main() -> None:
         from daq.cli import early_stop
 
         early_stop.ask()
+    # Matrices here are thin: a second thread in each product costs a fifth of a diagnosis. Simulations share the cores.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from daq.cli.command import main as run
 
     run()

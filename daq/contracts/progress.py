@@ -21,6 +21,12 @@ class CancelledError(Exception):
     """The computation ended early because it was asked to."""
 
 
+def stop_if(cancel: Cancel) -> None:
+    """Raises CancelledError when the computation is to end."""
+    if cancel.is_set():
+        raise CancelledError("it was cancelled")
+
+
 class Never:
     """A cancel that never comes."""
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
+from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.fitting.records import Record, Signal, noise_floor, records_of, resolution
@@ -75,8 +75,7 @@ def compare(
     for number, record in enumerate(records):
         row = []
         for place, (label, model) in enumerate(models):
-            if cancel.is_set():
-                raise CancelledError("the comparison was cancelled")
+            stop_if(cancel)
             progress((number + place / len(models)) / len(records), f"{label}: {record.name}")
             found = simulate(model, record.inputs, options)
             row.append(found.at_samples(found.velocity if signal == "velocity" else found.reading))

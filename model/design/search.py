@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
+from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from model.design.candidates import drawn_experiment
 from model.design.information import (
     InformationGain,
@@ -73,8 +73,7 @@ def design(
     unknowns: tuple[Unknown, ...] = ()
     last_refusal = ""
     for number in range(options.candidates):
-        if cancel.is_set():
-            raise CancelledError("the design was cancelled")
+        stop_if(cancel)
         progress(
             0.95 * number / options.candidates, f"candidate {number + 1} of {options.candidates}, {refused} refused"
         )

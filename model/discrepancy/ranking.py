@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from daq.contracts.progress import Cancel, Progress
+from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.candidates import FLEXIBLE, TONES, candidates
 from model.discrepancy.observation import Observation
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.probing import Probed, probed, still_promising
 from model.discrepancy.refitting import Judged, Refitted, begun_again, finished, polished, refitted, same_answer
 from model.discrepancy.thresholds import Thresholds
-from model.discrepancy.together import fitted_together, stop_if
+from model.discrepancy.together import fitted_together
 from model.discrepancy.tones import proposed_tones
 
 FLAGGED_SHARE = 0.1

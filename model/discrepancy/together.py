@@ -12,7 +12,7 @@ from itertools import groupby
 
 import numpy as np
 
-from daq.contracts.progress import Cancel, CancelledError
+from daq.contracts.progress import Cancel, stop_if
 from model.discrepancy.candidates import TONES, Candidate, on_joints
 from model.discrepancy.observation import Observation
 from model.discrepancy.probing import Probed
@@ -58,12 +58,6 @@ def fitted_together(
                 widest = wider
                 every.append(wider)
     return every
-
-
-def stop_if(cancel: Cancel) -> None:
-    """Raises CancelledError when the diagnosis is to end."""
-    if cancel.is_set():
-        raise CancelledError("the diagnosis was cancelled")
 
 
 def _only_probed(found: Refitted, fitted: Sequence[Refitted], probes: Sequence[Probed]) -> list[Probed]:

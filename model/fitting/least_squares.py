@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from daq.contracts.progress import Cancel, CancelledError
+from daq.contracts.progress import Cancel, stop_if
 from model.fitting.problem import Problem, whitened
 from model.fitting.robust import huber
 from model.fitting.unknowns import prior_precision, scales
@@ -82,8 +82,7 @@ class _Objective:
         return self._both(x, derivatives=True)[1]
 
     def _both(self, x: Floats, derivatives: bool) -> tuple[Floats, Floats]:
-        if self.cancel.is_set():
-            raise CancelledError("the fit was cancelled")
+        stop_if(self.cancel)
         values = self.values(x)
         prior = (self.precision * (values - self.expected))[self.claimed]
         try:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from daq.contracts.errors import SpecError
-from daq.contracts.progress import Cancel, CancelledError
+from daq.contracts.progress import Cancel, stop_if
 from model.fitting.least_squares import Solution
 from model.fitting.problem import Problem
 from model.fitting.unknowns import scales
@@ -34,8 +34,7 @@ def climb(
 
     def error(x: Floats) -> float:
         nonlocal count, best
-        if cancel.is_set():
-            raise CancelledError("the fit was cancelled")
+        stop_if(cancel)
         count += 1
         values = begin + scale * x
         try:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
+from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from model.control.arm import DrivenArm
 from model.control.closed_loop import ClassicalPid, ControlledMotion, Partitioned, Sinusoid, control
 from model.thesis.check import Check, Choice
@@ -91,8 +91,7 @@ def control_chapter(progress: Progress = silent, cancel: Cancel | None = None) -
     runs = _runs(plant)
     cases = []
     for k, run in enumerate(runs):
-        if cancel.is_set():
-            raise CancelledError
+        stop_if(cancel)
         progress(k / len(runs), f"chapter 8: {run.name}")
         cases.append(_case(run, control(plant, run.law, wanted, run.start, DURATION, every=100), wanted))
     progress(1.0, "chapter 8: done")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
+from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 
 Floats = NDArray[np.float64]
 
@@ -131,8 +131,7 @@ def doubling_changes(
         open_ = [s for s in searches if not s.done]
         if not open_:
             break
-        if cancel.is_set():
-            raise CancelledError
+        stop_if(cancel)
         progress(1 - len(open_) / len(searches), f"doubling the error: round {round_ + 1}, {len(open_)} searches open")
         points = np.tile(best, (len(open_), 1))
         for row, search in zip(points, open_, strict=True):

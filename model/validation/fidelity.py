@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
+from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
@@ -120,8 +120,7 @@ def _curves(
     best = np.array([p.value for p in parameters])
     curves = []
     for k, (parameter, distortion) in enumerate(zip(parameters, distortions, strict=True)):
-        if cancel.is_set():
-            raise CancelledError
+        stop_if(cancel)
         progress(0.8 + 0.2 * k / len(parameters), f"error curve of {parameter.name}")
         down, up = distortion.change_down, distortion.change_up
         fallback = up or down or 5 * distortion.expected

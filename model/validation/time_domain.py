@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
+from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
 from model.validation.acceleration_model import expected_accelerations
@@ -53,8 +53,7 @@ def vary_in_time(
     observation = observe(model, trace, smoothing)
     progress(0.3, "exact Jacobians along the motion")
     expected, jacobian = expected_accelerations(model, observation.motion, names)
-    if cancel.is_set():
-        raise CancelledError
+    stop_if(cancel)
     progress(0.7, "solving for the variations")
     residual = np.where(observation.usable, observation.acceleration - expected, 0.0)
     jacobian = np.moveaxis(jacobian, 0, 2) * observation.usable[:, :, None]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import TraceError
-from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
+from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.discrepancy.answer import Candidate, Diagnosis, Step, Verdict
 from model.discrepancy.options import DiagnosisOptions
@@ -101,8 +101,7 @@ class _Workflow:
             self._prune(done)
 
     def _tell(self, fraction: float, text: str) -> None:
-        if self.cancel.is_set():
-            raise CancelledError("the diagnosis was cancelled")
+        stop_if(self.cancel)
         whole = self.options.most_steps
         self.progress(min(0.99, (len(self.steps) + fraction) / (whole + 1)), f"step {len(self.steps) + 1}: {text}")
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.contracts.progress import Cancel, CancelledError, Progress
+from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.torque_space.balance import TorqueBalance
 from model.discrepancy.torque_space.candidates import Start, Trial, trials
 from model.discrepancy.torque_space.fitting import Data, Slopes, TorqueFit, fit, slopes_of
@@ -76,15 +76,13 @@ def look(model: Model, now: TorqueFit, data: Data, options: TorqueOptions, progr
     fitted_model = model.with_values(now.values)
     probes: list[Probe] = []
     for trial in trials(fitted_model, now.balance.records, now.residual, options):
-        if cancel.is_set():
-            raise CancelledError("the diagnosis was cancelled")
+        stop_if(cancel)
         progress(0.3, f"trying {trial.effect.replace('_', ' ')}{_on(trial.joints)}")
         probes.append(probing.probe(trial))
     probes.sort(key=lambda p: -p.gain)
     found = []
     for probe_set in _shortlist(probes):
-        if cancel.is_set():
-            raise CancelledError("the diagnosis was cancelled")
+        stop_if(cancel)
         progress(0.6, f"fitting {probe_set[0].trial.effect.replace('_', ' ')}{_on(_joints(probe_set))}")
         found.append(_fitted(fitted_model, now, slopes, data, probe_set))
     weighed, memory = _weighed(found, now, data, sum(len(p.trial.starts) for p in probes))
