@@ -51,6 +51,8 @@ def _headline(found: Diagnosis) -> str:
     if found.verdict == "ambiguous" and found.steps and found.steps[-1].group:
         return "one of " + ", ".join(_name(c.effect, c.joints) for c in found.steps[-1].group)
     if found.verdict == "nothing-significant":
+        if any(s.effect is not None for s in found.steps):
+            return "nothing that the held-out traces confirm"
         return "the model explains these traces within their noise and its tolerances"
     return "none of the known effects explains what is left"
 

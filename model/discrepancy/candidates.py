@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from daq.contracts.errors import SpecError
 from model.effects.library import effect, library
@@ -137,7 +137,7 @@ def _sized(
                 value = p.value - step * size
             if p.low <= value <= p.high:
                 trials += [{p.name: value, **_full(plain.free, shape)} for shape in shapes]
-    return _candidate(model, name, law, joints, tuple(trials), plain.proportional, bounds)
+    return replace(plain, trials=tuple(trials))
 
 
 def _candidate(

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from model.discrepancy.answer import Candidate, FoundValue, RemainingShape, Where
+from model.discrepancy.answer import Candidate, FoundValue, RemainingShape, Step, Where
 from model.discrepancy.reasons_observations import Observation, Spoken
 from model.discrepancy.reasons_samples import Left, Motions, Samples, motions
 from model.discrepancy.reasons_table import telling
@@ -85,17 +85,21 @@ def without_effect(
         return result
 
 
-def nothing(where: Where, best: Candidate | None = None) -> str:
-    """Why nothing is named."""
-    tried = "" if best is None else f"; the best candidate, {_named(best)}, has evidence {best.evidence:.0f} only"
-    return f"{where.summary}{tried}"
+def nothing(rejected: Step | None = None) -> str:
+    """Why no effect is named. `rejected`: a step that held-out traces have spoken against."""
+    if rejected is None or rejected.effect is None:
+        return "nothing significant: the model explains the traces within noise and stated tolerances"
+    return (
+        f"nothing that held-out traces confirm: {_named(rejected.effect, rejected.joints)} explains more of the fitted "
+        f"ones, with {rejected.evidence:.0f} of evidence, but {rejected.rejected_because}"
+    )
 
 
 def undecided(group: Sequence[Candidate], where: Where) -> str:
     """Why several are named: they explain the same, within what their evidence can tell."""
     if len(group) < 2:
         raise SpecError(f"{len(group)} candidates cannot be undecided between; at least 2 are needed")
-    told = ", ".join(f"{_named(c)} ({c.evidence:.0f})" for c in group)
+    told = ", ".join(f"{_named(c.effect, c.joints)} ({c.evidence:.0f})" for c in group)
     apart = max(c.evidence for c in group) - min(c.evidence for c in group)
     return f"{where.summary}; these explain it, and {apart:.0f} of evidence is all that lies between them: {told}"
 
@@ -104,7 +108,8 @@ def unexplained(where: Where, remaining: Sequence[RemainingShape], best: Candida
     """Why none of the known effects is named, and what a torque that would explain it goes with."""
     tried = "no known effect takes it off"
     if best is not None and best.misfit is not None:
-        tried = f"the best known one, {_named(best)}, leaves {best.misfit:.2f} times what noise would"
+        name = _named(best.effect, best.joints)
+        tried = f"the best known one, {name}, leaves {best.misfit:.2f} times what noise would"
     if not remaining:
         return f"{where.summary}; {tried}, and what is left goes with none of time, position, speed, direction or drive"
     first = remaining[0]
@@ -138,7 +143,7 @@ def _beaten(rival: Candidate, evidence: float, margin: float) -> str:
     """How far the next best is behind."""
     if margin >= ALL * evidence:
         return "no other candidate explains a twentieth of it"
-    return f"{_named(rival)} would explain {margin:.0f} less of {evidence:.0f}"
+    return f"{_named(rival.effect, rival.joints)} would explain {margin:.0f} less of {evidence:.0f}"
 
 
 def _spoken(model: Model, index: int) -> Spoken:
@@ -180,9 +185,9 @@ def _size(effect: str, parameters: Mapping[str, FoundValue], joint: int) -> str:
     return f", {value.value * factor:.3g}{unit}{interval}"
 
 
-def _named(candidate: Candidate) -> str:
-    on = f" on joint{'s' if len(candidate.joints) > 1 else ''} {_listed(candidate.joints)}" if candidate.joints else ""
-    return f"{telling(candidate.effect).called}{on}"
+def _named(effect: str, joints: Sequence[int]) -> str:
+    on = f" on joint{'s' if len(joints) > 1 else ''} {_listed(joints)}" if joints else ""
+    return f"{telling(effect).called}{on}"
 
 
 def _listed(joints: Sequence[int]) -> str:

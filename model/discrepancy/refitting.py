@@ -104,6 +104,17 @@ def refitted(observation: Observation, before: Judged, probed: Probed) -> Refitt
     return None if best is None else _with_evidence(observation, before, probed, best)
 
 
+def nearest(observation: Observation, before: Point, begun: Sequence[Probed]) -> Probed:
+    """Of several places where a fit of the same effect may begin, the one that explains most. Raises SpecError."""
+
+    def cost(probed: Probed) -> float:
+        start = _started(before, probed)
+        point = point_at(observation, start.model, start.unknowns, start.values, start.noise, start.tangents)
+        return point.cost if np.isfinite(point.weighted).all() else math.inf
+
+    return begun[0] if len(begun) == 1 else min(begun, key=cost)
+
+
 def _nearby(observation: Observation, before: Point, probed: Probed) -> Point | None:
     """A fit from where the probe points to."""
     start = _started(before, probed)

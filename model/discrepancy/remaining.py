@@ -15,7 +15,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
-from scipy.signal import lfilter
 
 from daq.contracts.machine import NoController
 from model.analysis.bodies import chain_of
@@ -149,7 +148,7 @@ def _deconvolved(residual: Floats, answer: Floats, deviation: float) -> Floats:
     for _ in range(TRIALS):
         middle = 0.5 * (low + high)
         torque = _smoothed(residual, answer, float(np.exp(middle)))
-        left = residual - lfilter(answer, [1.0], torque)
+        left = residual - np.convolve(torque, answer)[: len(residual)]
         if np.mean(left**2) > deviation**2:
             high = middle
         else:
@@ -165,5 +164,5 @@ def _smoothed(residual: Floats, answer: Floats, weight: float) -> Floats:
         bands[lag, : count - lag] = answer[lag:reach] @ answer[: reach - lag]
     bands[0] += weight * np.concatenate([[1.0], np.full(count - 2, 2.0), [1.0]]) + 1e-9 * bands[0, 0]
     bands[1, : count - 1] -= weight
-    right = lfilter(answer, [1.0], residual[::-1])[::-1]
+    right = np.convolve(residual[::-1], answer)[:count][::-1]
     return np.asarray(solveh_banded(bands, right, lower=True))

@@ -16,7 +16,7 @@ from daq.contracts.progress import Cancel, stop_if
 from model.discrepancy.candidates import TONES, Candidate, on_joints
 from model.discrepancy.observation import Observation
 from model.discrepancy.probing import Probed
-from model.discrepancy.refitting import Judged, Refitted, begun_again, refitted
+from model.discrepancy.refitting import Judged, Refitted, begun_again, nearest, refitted
 from model.discrepancy.thresholds import Thresholds
 
 WORTH_A_FIT = 0.7
@@ -73,29 +73,35 @@ def _better(
     """The parts fitted together, and on one further joint, where that brings what a further joint must bring."""
     most = max(r.evidence for r in parts)
     begun = _begun(current, parts, further)
-    fit = None if begun is None else refitted(observation, current, begun)
+    fit = refitted(observation, current, nearest(observation, current.point, begun)) if begun else None
     fit = None if fit is None else begun_again(observation, current, fit)
     return fit if fit is not None and fit.evidence - most > thresholds.needed(elsewhere=most, kin=True) else None
 
 
-def _begun(current: Judged, parts: Sequence[Refitted], further: Refitted | Probed | None) -> Probed | None:
-    """Where a fit of all of them begins: each where its own fit has ended, other unknowns moved by what they moved
-    there, one on top of the other. None where the model refuses them. Nothing is simulated for it: its gain is what
-    the parts add up to, and it has no response."""
+def _begun(current: Judged, parts: Sequence[Refitted], further: Refitted | Probed | None) -> list[Probed]:
+    """Where a fit of all of them may begin: each where its own fit has ended, other unknowns moved by what they moved
+    there, one on top of the other; or where the best of them alone has ended, the others still absent, which is nearer
+    where all of them explain the same. Empty where the model refuses them. Nothing is simulated for it: its gain is
+    what the parts add up to, and it has no response."""
     point = current.point
     fits = [*parts, further] if isinstance(further, Refitted) else list(parts)
     values = {p.name: r.judged.point.value(p.name) for r in fits for p in r.candidate.free}
-    moves = [np.array([r.judged.point.value(u.name) for u in point.unknowns]) - point.values for r in fits]
-    alike = [r.candidate for r in fits]
+    moves = {id(r): np.array([r.judged.point.value(u.name) for u in point.unknowns]) - point.values for r in fits}
+    alike, every = [r.candidate for r in fits], list(moves.values())
     if isinstance(further, Probed):
         values |= further.start
-        moves.append(further.moved)
+        every.append(further.moved)
         alike.append(further.candidate)
-    candidate = on_joints(point.model, alike, values)
-    if candidate is None:
-        return None
-    gain = sum(r.evidence for r in fits)
-    return Probed(candidate, gain, values, np.sum(moves, axis=0), np.zeros_like(point.weighted))
+    best = max(parts, key=lambda r: r.evidence)
+    own = {p.name for p in best.candidate.free}
+    absent = {p.name: p.null for c in alike for p in c.main if p.null is not None and p.name not in own}
+    found = []
+    for start, moved in ((values, np.sum(every, axis=0)), ({**values, **absent}, moves[id(best)])):
+        candidate = on_joints(point.model, alike, start)
+        if candidate is not None:
+            gain = sum(r.evidence for r in fits)
+            found.append(Probed(candidate, gain, start, moved, np.zeros_like(point.weighted)))
+    return found
 
 
 def _alike(singles: Sequence[Refitted], thresholds: Thresholds) -> list[list[Refitted]]:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import oaconvolve
+from scipy.fft import fft, ifft, next_fast_len
 
 from model.discrepancy.candidates import TONES, tone
 from model.discrepancy.observation import DIFFERENCE, Observation
@@ -113,7 +113,9 @@ def _passed(
     source = observation.records[record]
     waves = np.exp(1j * _phase(observation, point, name, column, values, record))
     if name == "torque_ripple":
-        waves = oaconvolve(waves, response[None], axes=1)[:, : waves.shape[1]]
+        samples = waves.shape[1]
+        room = next_fast_len(samples + RESPONSE_SAMPLES - 1)
+        waves = ifft(fft(waves, room, axis=1) * fft(response, room), axis=1)[:, :samples]
     else:  # a frequency passes a linear response as it is, but for its size and phase
         lags = np.arange(RESPONSE_SAMPLES) * source.inputs.period
         waves *= np.exp(-2j * np.pi * values[:, None] * lags) @ response[:, None]

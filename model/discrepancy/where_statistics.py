@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import ndtri
 
 from model.fitting.whitening import fitted_whitener
 
@@ -92,7 +92,7 @@ def significance_of_chi_square(mean_square: float, freedom: float) -> float:
 
 def chance_significance(trials: int, chance: float = 0.01) -> float:
     """Standard deviations that the most significant of so many independent trials reaches by chance this often."""
-    return float(stats.norm.isf(chance / max(trials, 1)))
+    return -float(ndtri(chance / max(trials, 1)))
 
 
 def _saddle_point(w: Floats, u: Floats) -> Floats:

@@ -42,7 +42,6 @@ from model.discrepancy.refitting import Judged, Refitted, deeper, judge
 from model.discrepancy.remaining import shapes
 from model.discrepancy.search import Point, point_at, searched, settled
 from model.discrepancy.thresholds import THRESHOLDS, Thresholds
-from model.discrepancy.torque_space.diagnose import diagnose_torques
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn
 from model.discrepancy.where import located
 from model.fitting.unknowns import Unknown
@@ -86,6 +85,8 @@ def diagnose(
     options, cancel, begun = options or DiagnosisOptions(), cancel or Never(), time.perf_counter()
     _refuse_shared(traces, holdout)
     if isinstance(model.machine.controller, NoController) or any(t.set_point is None for t in traces):
+        from model.discrepancy.torque_space.diagnose import diagnose_torques  # here: rigs with a controller need none
+
         return diagnose_torques(model, traces, holdout, options, progress, cancel)
     progress(0.0, "checking the controller's own numbers")
     findings = check_controller(traces, model.machine)
@@ -368,7 +369,7 @@ def _summary(
     case: _Case, current: Judged, answered: Verdict, steps: Sequence[Step], remaining: Sequence[RemainingShape]
 ) -> str:
     if answered == "nothing-significant":
-        return "nothing significant: the model explains the traces within noise and stated tolerances"
+        return reasons.nothing(next((s for s in steps if not s.adopted and s.effect is not None), None))
     if answered == "named":
         return "; ".join(s.reason for s in steps if s.adopted)
     if answered == "ambiguous":

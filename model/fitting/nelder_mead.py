@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, stop_if
@@ -27,6 +26,8 @@ def climb(
 
     Raises CancelledError.
     """
+    from scipy.optimize import minimize  # here: no other fit needs it, and it takes a while to import
+
     scale = scales(problem.unknowns)
     bounds = [((u.low - b) / s, (u.high - b) / s) for u, b, s in zip(problem.unknowns, begin, scale, strict=True)]
     count = 0

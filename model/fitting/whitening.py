@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.linalg import solve_banded
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +51,8 @@ class Whitener:
     def coloured(self, signal: Floats) -> Floats:
         """Filters (n, …) along its first axis the other way: independent noise of unit size becomes noise like that
         which the predictors were fitted to, begun at rest."""
-        return np.asarray(lfilter([self.deviations[-1]], np.append(1.0, -self.predictors[-1]), signal, axis=0))
+        bands = np.tile(np.append(1.0, -self.predictors[-1])[:, None], len(signal))
+        return np.asarray(solve_banded((self.order, 0), bands, self.deviations[-1] * signal))
 
 
 def white(deviation: float) -> Whitener:

@@ -194,7 +194,7 @@ class Model(_Part):
             if not matching:
                 raise SpecError(f"effect {name} has no parameter {key!r}; it has {', '.join(own)}")
             chosen.update(dict.fromkeys(matching, value))
-        return wider.with_values(chosen)
+        return wider.with_values(chosen) if chosen else wider
 
     def without_effect(self, name: str, joints: tuple[int, ...] | None = None) -> Model:
         """The model without an effect, on the given joints or anywhere. Raises SpecError when it is not there."""
