@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
 
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.candidates import FLEXIBLE, TONES, candidates
@@ -15,10 +19,15 @@ from model.discrepancy.thresholds import Thresholds
 from model.discrepancy.together import fitted_together
 from model.discrepancy.tones import proposed_tones
 
+T = TypeVar("T")
+R = TypeVar("R")
+
 FLAGGED_SHARE = 0.1
 """A joint is flagged where the best probe promises this share of the best of all."""
 
-ALWAYS_FITTED, HOPELESS = 3, 0.2
+AT_ONCE = 2
+"""Fits that run side by side: simulations hold no lock of Python's."""
+ALWAYS_FITTED, HOPELESS = 4, 0.2
 """After so many, no candidate is fitted whose probe promises less than this share of the best evidence so far."""
 REMEMBERED = 0.3
 """A candidate is probed again where its old response promises this share of what is interesting."""
@@ -61,27 +70,33 @@ def ranked(
     probes += probed(observation, point, [c for c in every if c.name in FLEXIBLE and c.joints[0] in flagged])
     probes.sort(key=lambda p: -p.gain)
     chosen = [p for p in probes if p.gain >= thresholds.interesting][: options.fitted]
-    fits: list[Refitted] = []
-    for number, one in enumerate(chosen):
-        stop_if(cancel)
-        if number >= ALWAYS_FITTED and one.gain < HOPELESS * max((f.evidence for f in fits), default=0.0):
-            break
-        progress(0.4 + 0.5 * number / len(chosen), f"fitting {describe(one.candidate.name, one.candidate.joints)}")
-        found = refitted(observation, current, one)
-        if found is not None:
-            fits.append(found)
+    fits = _fitted(observation, current, chosen, progress, cancel)
     progress(0.9, "fitting effects of several joints")
     fits += fitted_together(observation, current, fits, probes, thresholds, cancel)
     fits.sort(key=lambda r: -r.evidence)
     answers = _different(fits)[: options.polished]
-    head = []
-    for best in answers:
-        stop_if(cancel)
-        better = polished(observation, current, best)
-        head.append(better if len(better.candidate.joints) > 1 else begun_again(observation, current, better))
+    stop_if(cancel)
+    head = _side_by_side(partial(_improved, observation, current), answers)
     head = _told_apart(observation, current, head, thresholds)
     rest = [r for r in fits if not any(r is a for a in answers)]
     return Ranking(_one_a_name(sorted([*head, *rest], key=lambda r: -r.evidence)), tuple(probes))
+
+
+def _fitted(
+    observation: Observation, current: Judged, chosen: Sequence[Probed], progress: Progress, cancel: Cancel
+) -> list[Refitted]:  # fmt: skip
+    """Fits of the probed candidates, the most promising first, until there is no hope left."""
+    fits: list[Refitted] = []
+    for begin in range(0, len(chosen), AT_ONCE):
+        stop_if(cancel)
+        least = HOPELESS * max((f.evidence for f in fits), default=0.0) if begin >= ALWAYS_FITTED else -math.inf
+        now = [one for one in chosen[begin : begin + AT_ONCE] if one.gain >= least]
+        if not now:
+            break
+        names = " and ".join(describe(one.candidate.name, one.candidate.joints) for one in now)
+        progress(0.4 + 0.5 * begin / len(chosen), f"fitting {names}")
+        fits += [fit for fit in _side_by_side(partial(refitted, observation, current), now) if fit is not None]
+    return fits
 
 
 def _different(fits: Sequence[Refitted]) -> list[Refitted]:
@@ -101,7 +116,21 @@ def _told_apart(
     close = [r for r in head if r.evidence > best - thresholds.close]
     if best < thresholds.significant or len(close) < 2:
         return list(head)
-    return [finished(observation, current, r) if any(r is c for c in close) else r for r in head]
+    ends = _side_by_side(partial(finished, observation, current), close)
+    return [next((end for c, end in zip(close, ends, strict=True) if c is r), r) for r in head]
+
+
+def _improved(observation: Observation, current: Judged, found: Refitted) -> Refitted:
+    """A fit polished, and begun again where it has not explained the record; of several joints that has been done."""
+    better = polished(observation, current, found)
+    return better if len(better.candidate.joints) > 1 else begun_again(observation, current, better)
+
+
+def _side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    """What `work` makes of every item, in their order. The number of threads is the same on every machine, and no
+    result depends on it."""
+    with ThreadPoolExecutor(AT_ONCE) as threads:
+        return list(threads.map(work, items))
 
 
 def describe(name: str, joints: Sequence[int]) -> str:
