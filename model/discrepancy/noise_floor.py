@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from model.discrepancy.observation import Observation, Signals
 from model.discrepancy.search import Point, point_at
+from model.discrepancy.side_by_side import side_by_side
 
 Floats = NDArray[np.float64]
 
@@ -29,10 +30,10 @@ def noise_floor(observation: Observation, point: Point, left: Callable[[Observat
     """
     left = left or (lambda made: _put_back(made, point))
     rng = np.random.default_rng(SEED)
+    made = [_made(observation, point, rng) for _ in range(REPLICAS)]
     squares = []
-    for _ in range(REPLICAS):
-        made = _made(observation, point, rng)
-        squares.append([np.mean(np.concatenate(runs) ** 2) for runs in made.by_joint(made.weighted(left(made)))])
+    for one, residuals in zip(made, side_by_side(left, made), strict=True):
+        squares.append([np.mean(np.concatenate(runs) ** 2) for runs in one.by_joint(one.weighted(residuals))])
     return np.asarray(observation.deviations * np.sqrt(np.mean(squares, axis=0)))
 
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
 
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.candidates import FLEXIBLE, TONES, candidates
@@ -15,18 +13,14 @@ from model.discrepancy.observation import Observation
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.probing import Probed, probed, still_promising
 from model.discrepancy.refitting import Judged, Refitted, begun_again, finished, polished, refitted, same_answer
+from model.discrepancy.side_by_side import AT_ONCE, side_by_side
 from model.discrepancy.thresholds import Thresholds
 from model.discrepancy.together import fitted_together
 from model.discrepancy.tones import proposed_tones
 
-T = TypeVar("T")
-R = TypeVar("R")
-
 FLAGGED_SHARE = 0.1
 """A joint is flagged where the best probe promises this share of the best of all."""
 
-AT_ONCE = 2
-"""Fits that run side by side: simulations hold no lock of Python's."""
 ALWAYS_FITTED, HOPELESS = 4, 0.2
 """After so many, no candidate is fitted whose probe promises less than this share of the best evidence so far."""
 REMEMBERED = 0.3
@@ -76,7 +70,7 @@ def ranked(
     fits.sort(key=lambda r: -r.evidence)
     answers = _different(fits)[: options.polished]
     stop_if(cancel)
-    head = _side_by_side(partial(_improved, observation, current), answers)
+    head = side_by_side(partial(_improved, observation, current), answers)
     head = _told_apart(observation, current, head, thresholds)
     rest = [r for r in fits if not any(r is a for a in answers)]
     return Ranking(_one_a_name(sorted([*head, *rest], key=lambda r: -r.evidence)), tuple(probes))
@@ -95,7 +89,7 @@ def _fitted(
             break
         names = " and ".join(describe(one.candidate.name, one.candidate.joints) for one in now)
         progress(0.4 + 0.5 * begin / len(chosen), f"fitting {names}")
-        fits += [fit for fit in _side_by_side(partial(refitted, observation, current), now) if fit is not None]
+        fits += [fit for fit in side_by_side(partial(refitted, observation, current), now) if fit is not None]
     return fits
 
 
@@ -116,7 +110,7 @@ def _told_apart(
     close = [r for r in head if r.evidence > best - thresholds.close]
     if best < thresholds.significant or len(close) < 2:
         return list(head)
-    ends = _side_by_side(partial(finished, observation, current), close)
+    ends = side_by_side(partial(finished, observation, current), close)
     return [next((end for c, end in zip(close, ends, strict=True) if c is r), r) for r in head]
 
 
@@ -124,13 +118,6 @@ def _improved(observation: Observation, current: Judged, found: Refitted) -> Ref
     """A fit polished, and begun again where it has not explained the record; of several joints that has been done."""
     better = polished(observation, current, found)
     return better if len(better.candidate.joints) > 1 else begun_again(observation, current, better)
-
-
-def _side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    """What `work` makes of every item, in their order. The number of threads is the same on every machine, and no
-    result depends on it."""
-    with ThreadPoolExecutor(AT_ONCE) as threads:
-        return list(threads.map(work, items))
 
 
 def describe(name: str, joints: Sequence[int]) -> str:
