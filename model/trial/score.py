@@ -85,7 +85,7 @@ def score(truth: Truth, seen: Detectability, answer: Diagnosis, machine: Machine
     common = {
         **_case(truth, seen),
         "verdict": answer.verdict,
-        "place": _place(answer, named, group),
+        "place": _place(answer, named),
         "answered": tuple(dict.fromkeys((*named, *group))),
         "seconds": answer.seconds,
         "robot_seconds": answer.robot_seconds,
@@ -161,8 +161,13 @@ def _one_name(step: Step) -> bool:
 
 
 def group_of(answer: Diagnosis) -> tuple[str, ...]:
-    """Effects of the groups that were given instead of a name."""
-    groups = (step.group for step in answer.steps if not _one_name(step))
+    """Effects of the group that was given instead of a name: of an answer that is a group, in a step that was taken.
+
+    Groups that were withdrawn, or refused by held-out traces, are no answer.
+    """
+    if answer.verdict != "ambiguous":
+        return ()
+    groups = (step.group for step in answer.steps if step.adopted and not _one_name(step))
     return tuple(dict.fromkeys(candidate.effect for group in groups for candidate in group))
 
 
@@ -183,10 +188,10 @@ def excess_removed_whole(answer: Diagnosis) -> float | None:
     return share_removed(answer.rmse_holdout)
 
 
-def _place(answer: Diagnosis, named: tuple[str, ...], group: tuple[str, ...]) -> Place:
+def _place(answer: Diagnosis, named: tuple[str, ...]) -> Place:
     if named:
         return "named"
-    if group:
+    if answer.verdict == "ambiguous":
         return "group"
     return "nothing-significant" if answer.verdict == "nothing-significant" else "unknown-effect"
 
@@ -215,18 +220,23 @@ def _in_first(names: tuple[str, ...], answer: Diagnosis) -> bool:
 
 def _joint_right(effect: HiddenEffect, answer: Diagnosis) -> bool | None:
     """Whether the joints are those that the effect acts on; of answers that say there is something."""
-    if not effect.joints or answer.verdict == "nothing-significant" or not answer.steps:
+    if not effect.joints or answer.verdict == "nothing-significant":
         return None
-    return _answered_joints(effect, answer.steps) == set(effect.joints)
+    return _answered_joints(effect, answer) == set(effect.joints)
 
 
-def _answered_joints(effect: HiddenEffect, steps: tuple[Step, ...]) -> set[int]:
-    """Joints of the steps that name the effect; else of the first step, which may say where without saying what."""
-    same = [step for step in steps if step.effect == effect.known_as and (step.adopted or step.group)]
+def _answered_joints(effect: HiddenEffect, answer: Diagnosis) -> set[int]:
+    """Joints of the steps taken that name the effect; else of the first step, which may say where without saying what.
+
+    Without any step, the joint whose remaining torque the answer tells first; none where it tells of no joint.
+    """
+    same = [step for step in answer.steps if step.adopted and step.effect == effect.known_as]
     if same:
         alike = [c.joints for step in same for c in step.group if c.effect == effect.known_as]
         return {joint for joints in (*(step.joints for step in same), *alike) for joint in joints}
-    first = steps[0]
+    if not answer.steps:
+        return {shape.joint for shape in answer.remaining[:1]}
+    first = answer.steps[0]
     if first.joints or first.effect is not None:
         return set(first.joints)
     return set() if first.where.joint is None else {first.where.joint}

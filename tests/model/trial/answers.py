@@ -6,7 +6,16 @@ from collections.abc import Sequence
 from typing import Any
 
 from daq.contracts.machine import load_machine
-from model.discrepancy.answer import Candidate, Diagnosis, FoundValue, SignalError, Step, Verdict, Where
+from model.discrepancy.answer import (
+    Candidate,
+    Diagnosis,
+    FoundValue,
+    RemainingShape,
+    SignalError,
+    Step,
+    Verdict,
+    Where,
+)
 from model.machine_model.model import base_model
 from model.trial.truth import Detectability, HiddenEffect, Kind, SeenEffect, Truth
 
@@ -41,6 +50,14 @@ def answer(verdict: Verdict, *steps: Step, seconds: float = 5.0) -> Diagnosis:
     return Diagnosis(
         verdict=verdict, summary="", steps=steps, model_before=MODEL, model_after=MODEL, traces=("a",),
         seconds=seconds, robot_seconds=56.0,
+    )  # fmt: skip
+
+
+def remaining(joint: int, explained: float) -> RemainingShape:
+    """A torque that is left at a joint and goes with its speed."""
+    return RemainingShape(
+        joint=joint, against="speed", unit="rad/s", torque_unit="N·m", centres=(-1.0, 1.0), torque=(-2.0, 2.0),
+        deviation=(0.1, 0.1), explained=explained,
     )  # fmt: skip
 
 

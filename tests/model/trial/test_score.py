@@ -7,7 +7,7 @@ import pytest
 from model.discrepancy.answer import Diagnosis
 from model.trial.score import Score, score, score_of_failure
 from model.trial.truth import Truth
-from tests.model.trial.answers import MACHINE, answer, candidate, found, seen, step, truth
+from tests.model.trial.answers import MACHINE, answer, candidate, found, remaining, seen, step, truth
 
 BACKLASH = truth("single", ("backlash", (2,)), parameters={"play": 0.01, "stiffness": 1.0, "damping": 1.0})
 STICTION = truth("single", ("stiction", (1,)))
@@ -49,6 +49,22 @@ def test_a_group_is_no_name_but_the_effect_may_be_in_it() -> None:
     assert result.in_answer
     assert result.place == "group"
     assert result.joint_right
+
+
+def test_a_group_that_is_not_the_final_answer_gives_nothing() -> None:
+    taken = step("input_delay", 2, ranked=("input_delay",), group=("input_delay", "backlash"))
+    withdrawn = taken.model_copy(update={"adopted": False, "rejected_because": "it only resembles what is missing"})
+    for given in (
+        answer("unknown-effect", withdrawn),
+        answer("unknown-effect", taken),
+        answer("ambiguous", withdrawn),
+        answer("nothing-significant", withdrawn),
+    ):
+        result = judged(BACKLASH, given)
+        assert result.answered == ()
+        assert (result.in_answer, result.merged_right, result.named_right) == (False, False, False)
+    assert judged(BACKLASH, answer("unknown-effect", withdrawn)).place == "unknown-effect"
+    assert judged(BACKLASH, answer("ambiguous", withdrawn)).place == "group"
 
 
 def test_another_kind_of_friction_is_right_once_they_are_merged() -> None:
@@ -94,6 +110,15 @@ def test_unknown_effect_may_still_say_at_which_joint() -> None:
     at_two = answer("unknown-effect", step(None, seen_at=2, adopted=False))
     assert judged(BACKLASH, at_two).joint_right
     assert judged(STICTION, at_two).joint_right is False
+
+
+def test_unknown_effect_without_a_step_is_right_where_what_remains_is() -> None:
+    silent = answer("unknown-effect")
+    assert judged(BACKLASH, silent).joint_right is False
+    shapes = tuple(remaining(joint, explained) for joint, explained in ((2, 0.8), (1, 0.2)))
+    telling = silent.model_copy(update={"remaining": shapes})
+    assert judged(BACKLASH, telling).joint_right
+    assert judged(STICTION, telling).joint_right is False
 
 
 def test_joints_are_no_question_where_nothing_was_found_or_none_is_right() -> None:
