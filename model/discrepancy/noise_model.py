@@ -21,7 +21,8 @@ Floats = NDArray[np.float64]
 LONGEST_MEMORY = 6
 """Samples that the noise model looks back: 0.12 s at 20 ms."""
 LEAST_DEVIATION = 0.8
-"""Of a prediction error, in deviations of a reading: rounding is not always as random as its variance says."""
+"""Of a prediction error, in deviations of a reading: rounding is not always as random as its variance says. No likelihood
+counts a prediction error as smaller, or a joint at rest would make evidence of shaving a rounding offset."""
 CLIP = 5.0
 """Prediction errors beyond so many deviations count as that: one bad reading proves no effect."""
 
@@ -50,6 +51,6 @@ def noise_model(runs_by_joint: Sequence[Sequence[Floats]]) -> NoiseModel:
         whitener = fitted_whitener(runs, LONGEST_MEMORY, LEAST_DEVIATION)
         errors = np.concatenate([whitener.whitened(run) for run in runs])
         spread = float(np.sqrt(np.mean(np.clip(errors, -CLIP, CLIP) ** 2))) * float(whitener.deviations[-1])
-        parts.append(2 * len(errors) * float(np.log(max(spread, 1e-9))))
+        parts.append(2 * len(errors) * float(np.log(max(spread, LEAST_DEVIATION))))
         whiteners.append(whitener)
     return NoiseModel(tuple(whiteners), tuple(parts))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.discrepancy.noise_model import noise_model
+from model.discrepancy.noise_model import LEAST_DEVIATION, noise_model
 
 
 def coloured(count: int, pole: float, seed: int) -> np.ndarray:
@@ -35,3 +35,17 @@ def test_runs_are_not_joined() -> None:
     white = coloured(4000, 0.0, 4)
     halves = [white[:2000] + 0.0, white[2000:] + 0.0]
     assert np.isclose(noise_model([halves]).description, noise_model([[white]]).description, atol=15)
+
+
+def test_less_than_rounding_leaves_is_no_likelier() -> None:
+    white = coloured(2750, 0.0, 5)
+    floor = 2 * 2750 * np.log(LEAST_DEVIATION)
+    for scale in (0.7, 0.4, 0.05, 0.0):
+        assert noise_model([[scale * white]]).description == floor
+    assert noise_model([[0.9 * white]]).description > floor
+
+
+def test_a_rounding_offset_at_rest_is_no_evidence() -> None:
+    """A joint at rest whose readings have no noise: half a count to one side, or none."""
+    still = np.zeros(2750)
+    assert noise_model([[still + 0.5]]).description == noise_model([[still]]).description
