@@ -34,14 +34,14 @@ class Added:
 
 
 def decide(ranking: Ranking, thresholds: Thresholds, added: Sequence[Added] = ()) -> Decision:
-    """Nothing significant, one name, or a group."""
+    """Nothing significant, one name, or a group: of the first that brings what it has to bring, and what comes after.
+    What is ranked above it is the echo of an effect that has been added, and says nothing of another joint's."""
     fits = ranking.fitted
-    if not fits:
-        return Decision("nothing", None, 0.0, ())
-    if fits[0].evidence < _needed(fits[0], thresholds, added):
-        return Decision("nothing", fits[0], 0.0, ())
-    best = fits[0]
-    rivals = [f for f in fits[1:] if not same_answer(f, best)]
+    place = next((k for k, f in enumerate(fits) if f.evidence >= _needed(f, thresholds, added)), None)
+    if place is None:
+        return Decision("nothing", fits[0] if fits else None, 0.0, ())
+    best = fits[place]
+    rivals = [f for f in fits[place + 1 :] if not same_answer(f, best)]
     margin = best.evidence - max([0.0, *(r.evidence for r in rivals)])
     group = (best, *(r for r in rivals if best.evidence - r.evidence < thresholds.margin))
     return Decision("group" if len(group) > 1 else "named", best, margin, group if len(group) > 1 else ())

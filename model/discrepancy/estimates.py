@@ -83,8 +83,7 @@ def only_probed(ranking: Ranking, samples: int) -> tuple[Candidate, ...]:
     return tuple(left)
 
 
-def runner_up(candidates: Sequence[Candidate]) -> Candidate | None:
-    """The best fitted candidate of a ranking that would be another answer than the first."""
-    best = candidates[0]
-    fitted = (c for c in candidates[1:] if c.refitted)
-    return next((c for c in fitted if not says_no_more(c.effect, c.joints, best.effect, best.joints)), None)
+def runner_up(best: Candidate, candidates: Sequence[Candidate]) -> Candidate | None:
+    """The best fitted candidate after one of a ranking that would be another answer."""
+    after = (c for c in candidates[candidates.index(best) + 1 :] if c.refitted)
+    return next((c for c in after if not says_no_more(c.effect, c.joints, best.effect, best.joints)), None)

@@ -101,7 +101,7 @@ def refitted(observation: Observation, before: Judged, probed: Probed) -> Refitt
             if point.cost < before.point.cost:
                 break
     best = min(found, key=lambda p: p.cost, default=None)
-    return None if best is None else _with_evidence(observation, before, probed, best)
+    return None if best is None else with_evidence(observation, before, probed, best)
 
 
 def nearest(observation: Observation, before: Point, begun: Sequence[Probed]) -> Probed:
@@ -150,7 +150,7 @@ def polished(observation: Observation, before: Judged, found: Refitted) -> Refit
         point = searched(observation, replace(point, tangents=tangents), POLISHING, free)
     except SpecError:
         return found
-    better = _with_evidence(observation, before, found.probed, point)
+    better = with_evidence(observation, before, found.probed, point)
     return better if better.judged.point.cost < found.judged.point.cost else found
 
 
@@ -165,7 +165,7 @@ def begun_again(observation: Observation, before: Judged, found: Refitted) -> Re
         return found
     if point is None or not point.cost < found.judged.point.cost - DEEPER:
         return found
-    return _with_evidence(observation, before, found.probed, point)
+    return with_evidence(observation, before, found.probed, point)
 
 
 def finished(observation: Observation, before: Judged, found: Refitted) -> Refitted:
@@ -174,7 +174,7 @@ def finished(observation: Observation, before: Judged, found: Refitted) -> Refit
         point = settled(observation, found.judged.point, POLISHING)
     except SpecError:
         return found
-    better = _with_evidence(observation, before, found.probed, point)
+    better = with_evidence(observation, before, found.probed, point)
     return better if better.judged.point.cost < found.judged.point.cost else found
 
 
@@ -215,7 +215,8 @@ def _started(point: Point, probed: Probed) -> Point:
     )  # fmt: skip
 
 
-def _with_evidence(observation: Observation, before: Judged, probed: Probed, point: Point) -> Refitted:
+def with_evidence(observation: Observation, before: Judged, probed: Probed, point: Point) -> Refitted:
+    """What the point that a fit of the candidate has led to is worth."""
     after = judge(observation, point)
     price = len(probed.candidate.free) * math.log(observation.samples)
     if probed.candidate.name in TONES:

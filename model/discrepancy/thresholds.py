@@ -22,9 +22,9 @@ class Thresholds:
         worse: rise of the held-out sum of squares, in its own standard deviations, at which a step is rejected, unless
             it is less than the share `lost` of the evidence that as many samples have brought in the fit: the tolerance
             parameters, none of them known for sure, have moved too. It is also rejected where the rise takes the
-            evidence below what is significant.
+            evidence below what is significant. grown: growth of what is beyond the noise floor of the held-out traces,
+            on the effect's own joints, at which it is rejected as well; stuck joints let go by chance, so not at once.
         close: evidence within which rivals are fitted to their ends before they are compared.
-        quiet_joint: misfit of a joint up to which, once an effect has been added, nothing more is looked for there.
         interesting: gain of a probe from which a candidate is worth a fit.
     """
 
@@ -38,8 +38,8 @@ class Thresholds:
     least_share: float = 0.8
     worse: float = 2.0
     lost: float = 0.5
+    grown: float = 0.1
     close: float = 40.0
-    quiet_joint: float = 1.08
     interesting: float = 12.0
 
     def needed(self, here: float = 0.0, elsewhere: float = 0.0, *, kin: bool = False) -> float:

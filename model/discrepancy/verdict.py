@@ -33,23 +33,19 @@ def unexplained(
     return tuple(dict.fromkeys(found))
 
 
-def verdict(steps: Sequence[Step], last: Step | None, left: Sequence[int]) -> Verdict:
-    """The answer, from the steps, the last of them if the last turn made one, and the joints that stay unexplained."""
+def verdict(steps: Sequence[Step], left: Sequence[int]) -> Verdict:
+    """The answer, from the steps and the joints that stay unexplained. A group that held-out traces have refused is
+    none."""
     if left:
         return "unknown-effect"
-    if last is not None and last.group:
+    if any(s.adopted and s.group for s in steps):
         return "ambiguous"
     return "named" if any(s.adopted for s in steps) else "nothing-significant"
 
 
-def first_to_withdraw(steps: Sequence[Step], left: Sequence[int], proved: int) -> int | None:
-    """Index of the first step on a joint that stays unexplained: with it the search took a wrong way.
-
-    Args:
-        proved: steps at the beginning that the controller's own numbers prove; they stay.
-    """
-    for k in range(proved, len(steps)):
-        step = steps[k]
+def first_to_withdraw(steps: Sequence[Step], left: Sequence[int]) -> int | None:
+    """Index of the first step on a joint that stays unexplained: with it the search took a wrong way."""
+    for k, step in enumerate(steps):
         if step.adopted and (not step.joints or set(step.joints) & set(left)):
             return k
     return None

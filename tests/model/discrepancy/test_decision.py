@@ -58,6 +58,15 @@ def test_other_joints_echo_less() -> None:
     assert decide(small, LINES, [Added("backlash", (2,), 3000.0)]).kind == "nothing"
 
 
+def test_an_echo_hides_no_effect_of_another_joint() -> None:
+    said = decide(
+        ranking(("dead_zone", 2, 100.0), ("backlash", 1, 60.0), ("stiction", 1, 20.0)), LINES,
+        [Added("coulomb_friction", (2,), 2000.0)],
+    )  # fmt: skip
+    assert said.best is not None
+    assert (said.kind, said.best.candidate.name, said.margin) == ("named", "backlash", pytest.approx(40.0))
+
+
 def test_what_one_joint_has_another_is_likelier_to_have() -> None:
     small = ranking(("dead_zone", 3, 8.0))
     assert decide(small, LINES, [Added("backlash", (2,), 40.0)]).kind == "nothing"

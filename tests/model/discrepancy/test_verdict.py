@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from model.discrepancy.answer import SignalError, Step, Where
+from model.discrepancy.answer import Candidate, SignalError, Step, Where
 from model.discrepancy.thresholds import Thresholds
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn
 
@@ -43,16 +43,25 @@ def test_held_out_traces_tell_too() -> None:
 
 def test_verdicts() -> None:
     taken = step("backlash", (2,))
-    assert verdict([taken], taken, (2,)) == "unknown-effect"
-    assert verdict([taken], None, ()) == "named"
-    assert verdict([], None, ()) == "nothing-significant"
-    assert verdict([withdrawn(taken, (2,))], None, ()) == "nothing-significant"
+    assert verdict([taken], (2,)) == "unknown-effect"
+    assert verdict([taken], ()) == "named"
+    assert verdict([], ()) == "nothing-significant"
+    assert verdict([withdrawn(taken, (2,))], ()) == "nothing-significant"
+
+
+def test_a_group_that_held_out_traces_refuse_is_no_answer() -> None:
+    group = (Candidate(effect="backlash", joints=(2,), evidence=50.0),)
+    close = step("backlash", (2,)).model_copy(update={"group": group})
+    refused = close.model_copy(update={"adopted": False, "rejected_because": "the held-out error rises"})
+    assert verdict([close], ()) == "ambiguous"
+    assert verdict([refused], ()) == "nothing-significant"
+    assert verdict([step("stiction", (3,)), refused], ()) == "named"
 
 
 def test_steps_on_a_joint_that_stays_unexplained_are_taken_back() -> None:
-    steps = [step("wrong_gain", (3,)), step("backlash", (2,)), step("supply_limit", (3,))]
-    assert first_to_withdraw(steps, (3,), proved=1) == 2
-    assert first_to_withdraw(steps, (1,), proved=1) is None
-    taken_back = withdrawn(steps[2], (3,))
+    steps = [step("backlash", (2,)), step("supply_limit", (3,))]
+    assert first_to_withdraw(steps, (3,)) == 1
+    assert first_to_withdraw(steps, (1,)) is None
+    taken_back = withdrawn(steps[1], (3,))
     assert not taken_back.adopted
     assert "joint 3 still disagrees" in str(taken_back.rejected_because)

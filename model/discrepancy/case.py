@@ -1,0 +1,109 @@
+"""What stays the same during a diagnosis, and what is asked of it at every point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.trace import Trace
+from model.discrepancy.answer import RemainingShape, SignalError, Where
+from model.discrepancy.excess import excess_removed
+from model.discrepancy.holdout import HeldOut, errors
+from model.discrepancy.noise_floor import noise_floor
+from model.discrepancy.observation import Observation, Signals
+from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.refitting import Refitted
+from model.discrepancy.remaining import shapes
+from model.discrepancy.search import Point
+from model.discrepancy.thresholds import Thresholds
+from model.discrepancy.where import located
+from model.machine_model.model import Model
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Case:
+    """The traces of a diagnosis, and what holds for all of its turns.
+
+    floor, floor_held: (n,) rad, what noise alone leaves on the fitted and on the held-out traces; the second is empty
+    without any. excluded: effects that need not be tried.
+    """
+
+    observation: Observation
+    floor: Floats
+    held: HeldOut | None
+    floor_held: Floats
+    traces: tuple[Trace, ...]
+    options: DiagnosisOptions
+    thresholds: Thresholds
+    excluded: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Identities of the fitted traces."""
+        return tuple(t.record.trace_id for t in self.traces)
+
+    def with_floors_of(self, point: Point) -> Case:
+        """The same with floors that are no less than a point's: with play, noise decides where a joint comes to rest,
+        so what has been added may raise the floor."""
+        floor = np.maximum(self.floor, noise_floor(self.observation, point))
+        held = self.floor_held if self.held is None else np.maximum(self.floor_held, self.held.floor(point))
+        return replace(self, floor=floor, floor_held=held)
+
+    def fitted_errors(self, before: Point, after: Point) -> tuple[SignalError, ...]:
+        """Of every joint, on the traces fitted to."""
+        return errors(self.observation, after.model, before.residuals, after.residuals, self.floor)
+
+    def held_residuals(self, before: Point, after: Point) -> tuple[Signals, Signals]:
+        """Residuals of the held-out traces; empty where there are no such traces."""
+        return ((), ()) if self.held is None else (self.held.residuals(before), self.held.residuals(after))
+
+    def held_errors(self, model: Model, before: Signals, after: Signals) -> tuple[SignalError, ...]:
+        """Of every joint, on the held-out traces; empty where there are none."""
+        return () if self.held is None else errors(self.held.observation, model, before, after, self.floor_held)
+
+    def refused(
+        self, found: Refitted, before: Signals, after: Signals, own: Sequence[SignalError]
+    ) -> str | None:  # fmt: skip
+        """Why an effect is not taken, if held-out traces speak against it.
+
+        Args:
+            before, after: residuals of these traces without and with it. own: their errors on its joints; on others,
+                something else may be missing, which the tolerance parameters bend to make up for.
+        """
+        if self.held is None:
+            return None
+        removed, lines = excess_removed(own), self.thresholds
+        if removed is not None and removed < -lines.grown:
+            return f"the error on the held-out traces grows, by {-removed:.0%} of what is beyond noise there"
+        rise, deviation = self.held.rise(before, after)
+        share = self.held.observation.samples / self.observation.samples
+        by_chance = max(lines.worse * deviation, lines.lost * found.evidence * share)
+        if rise > min(by_chance, found.evidence - lines.significant):
+            return (
+                f"the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} variances "
+                "of a reading"
+            )
+        return None
+
+    def where(self, point: Point) -> Where:
+        """Where the point disagrees with the fitted traces."""
+        driven = tuple(t for t in self.traces if t.drive is not None)
+        return located(
+            with_point(point), self.observation.records, point.residuals, self.observation.deviations, traces=driven
+        )
+
+    def remaining(self, point: Point) -> tuple[RemainingShape, ...]:
+        """What the point leaves of the fitted traces, as torques."""
+        return shapes(with_point(point), self.observation.records, point.residuals, self.observation.deviations)
+
+
+def with_point(point: Point) -> Model:
+    """A point's model with its values, where they are parameters of it."""
+    model = point.model
+    named = {u.name: float(v) for u, v in zip(point.unknowns, point.values, strict=True) if u.name in model.by_name}
+    return model.with_values(named)
