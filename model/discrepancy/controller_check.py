@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from daq.contracts.machine import BoardPid, Machine
 from daq.contracts.trace import Trace
 from model.drives.controller import POWER_MAX
+from model.machine_model import layout as at
+from model.machine_model.model import Model
 
 COUNTS_OF_ROUNDING = 1.5
 """An error may differ by this many counts: set points are rounded to posture units, those to counts."""
@@ -43,17 +45,56 @@ class ControllerFinding:
     of: int
 
 
-def check_controller(traces: Sequence[Trace], machine: Machine) -> tuple[ControllerFinding, ...]:
-    """Violations of the recorded controller on the modelled joints; none where the traces do not hold its numbers."""
-    found: list[ControllerFinding] = []
+def check_controller(
+    traces: Sequence[Trace], machine: Machine, model: Model | None = None
+) -> tuple[ControllerFinding, ...]:
+    """Violations of the recorded controller on the modelled joints; none where the traces do not hold its numbers.
+
+    Args:
+        model: whose gain errors the power is compared with; None: the gains are what they are said to be. What is
+            found is the whole error of a gain, not what it is beyond that.
+    """
     if not isinstance(machine.controller, BoardPid):
         return ()
+    found: list[ControllerFinding | None] = []
     for joint in machine.modelled_joints:
-        for check in (_lost_set_points, _wrong_gain):
-            finding = check(traces, machine, joint)
-            if finding is not None:
-                found.append(finding)
-    return tuple(found)
+        stated = 0.0 if model is None else float(model.vector[at.slot(joint, at.GAIN_ERROR)])
+        found += [_lost_set_points(traces, machine, joint), _wrong_gain(traces, machine, joint, stated)]
+    return tuple(finding for finding in found if finding is not None)
+
+
+def judged_by_records(traces: Sequence[Trace], machine: Machine) -> tuple[str, ...]:
+    """Effects of the controller that its own numbers prove or exclude, so that nothing need be fitted to tell.
+
+    An effect counts only where it could be checked on every modelled joint and every trace holds what that needs. A
+    gain is one number for all traces, so its samples may come from any of them.
+    """
+    if not traces or not isinstance(machine.controller, BoardPid):
+        return ()
+    joints = machine.modelled_joints
+    checks = {
+        "wrong_gain": all(_usable(traces, machine, joint) is not None for joint in joints),
+        "lost_set_points": all(_tells_of_losses(_losses(traces, machine, joint)) for joint in joints),
+    }
+    return tuple(name for name, judged in checks.items() if judged)
+
+
+def with_findings(model: Model, findings: Sequence[ControllerFinding]) -> Model:
+    """The model with the gains that the records prove: in place of the gain error that it states for a joint, or as an
+    effect more. An error that several joints share is set for all of them.
+
+    Raises SpecError for a gain error beyond the bounds of the effect.
+    """
+    for finding in findings:
+        if finding.effect == "wrong_gain":
+            place = at.slot(finding.joint, at.GAIN_ERROR)
+            stated = [p.name for p in model.parameters if place in p.slots]
+            model = (
+                model.with_values({stated[0]: finding.value})
+                if stated
+                else model.with_effect("wrong_gain", (finding.joint,), {"relative": finding.value})
+            )
+    return model
 
 
 def with_used_set_points(trace: Trace) -> Trace:
@@ -63,12 +104,29 @@ def with_used_set_points(trace: Trace) -> Trace:
     return replace(trace, set_point=trace.position + trace.error)
 
 
-def _lost_set_points(traces: Sequence[Trace], machine: Machine, joint: int) -> ControllerFinding | None:
+@dataclass(frozen=True)
+class _Losses:
+    """Samples of a joint: those in which the set point moved, those of them in which it was lost, those in which the
+    error is not set point − position, and all."""
+
+    moved: int
+    lost: int
+    wrong: int
+    samples: int
+
+    @property
+    def violated(self) -> bool:
+        """Whether the recorded error is another one too often for an accident."""
+        return self.wrong >= max(2.0, LEAST_SHARE * self.samples)
+
+
+def _losses(traces: Sequence[Trace], machine: Machine, joint: int) -> _Losses | None:
+    """None where a trace does not hold set points and errors."""
     sensor = machine.joint(joint).sensor
     if sensor is None:
         return None
     tolerance = COUNTS_OF_ROUNDING * sensor.range.value / 2**sensor.bits
-    lost = moved = total = 0
+    moved = lost = total = 0
     for trace in traces:
         if trace.error is None or trace.set_point is None:
             return None
@@ -76,32 +134,50 @@ def _lost_set_points(traces: Sequence[Trace], machine: Machine, joint: int) -> C
         used = trace.position[:, column] + trace.error[:, column]
         changed = np.abs(np.diff(trace.set_point[:, column], prepend=trace.set_point[0, column])) > 2 * tolerance
         wrong = np.abs(trace.set_point[:, column] - used) > tolerance
-        lost, moved, total = lost + int((wrong & changed).sum()), moved + int(changed.sum()), total + int(wrong.sum())
-    if total < max(2.0, LEAST_SHARE * sum(len(t) for t in traces)) or not moved:
-        return None
-    low, high = _share_interval(lost, moved)
-    return ControllerFinding("lost_set_points", joint, lost / moved, low, high, total, moved)
+        moved, lost, total = moved + int(changed.sum()), lost + int((wrong & changed).sum()), total + int(wrong.sum())
+    return _Losses(moved, lost, total, sum(len(t) for t in traces))
 
 
-def _wrong_gain(traces: Sequence[Trace], machine: Machine, joint: int) -> ControllerFinding | None:
-    """Power over P times the error, where only P acts and the power is not at its limit."""
-    pairs = [_error_and_power(trace, machine, joint) for trace in traces]
-    if any(pair is None for pair in pairs):
+def _tells_of_losses(losses: _Losses | None) -> bool:
+    """Whether set points are known to have been lost, or not to: errors that are wrong although no set point moved are
+    something else, and hide what was lost."""
+    return losses is not None and (losses.moved > 0 or not losses.violated)
+
+
+def _lost_set_points(traces: Sequence[Trace], machine: Machine, joint: int) -> ControllerFinding | None:
+    losses = _losses(traces, machine, joint)
+    if losses is None or not losses.violated or not losses.moved:
         return None
-    wanted = np.concatenate([pair[0] for pair in pairs if pair is not None])
-    power = np.concatenate([pair[1] for pair in pairs if pair is not None])
-    if len(wanted) < LEAST_SAMPLES:
+    share, (low, high) = losses.lost / losses.moved, _share_interval(losses.lost, losses.moved)
+    return ControllerFinding("lost_set_points", joint, share, low, high, losses.wrong, losses.moved)
+
+
+def _wrong_gain(traces: Sequence[Trace], machine: Machine, joint: int, stated: float) -> ControllerFinding | None:
+    """Power over P times the error, where only P acts and the power is not at its limit, and what that differs by from
+    the gain error that is stated."""
+    usable = _usable(traces, machine, joint)
+    if usable is None:
         return None
+    wanted, power = usable
     squares = float(wanted @ wanted)
     relative = float(power @ wanted) / squares - 1.0
     spread = float(np.mean((power - (1 + relative) * wanted) ** 2))
     # Equal errors are rounded alike: only different ones are independent.
     values, counts = np.unique(wanted, return_counts=True)
     deviation = float(np.sqrt(max(spread, 1 / 12) * np.sum((counts * values) ** 2)) / squares)
-    if abs(relative) < max(LEAST_GAIN_DEVIATION, 5 * deviation):
+    if abs(relative - stated) < max(LEAST_GAIN_DEVIATION * (1 + stated), 5 * deviation):
         return None
     half, used = 2 * deviation, len(wanted)
     return ControllerFinding("wrong_gain", joint, relative, relative - half, relative + half, used, used)
+
+
+def _usable(traces: Sequence[Trace], machine: Machine, joint: int) -> tuple[Floats, Floats] | None:
+    """`_error_and_power` of all traces; None where one of them does not hold them, or all together hold too few."""
+    pairs = [_error_and_power(trace, machine, joint) for trace in traces]
+    known = [pair for pair in pairs if pair is not None]
+    if len(known) < len(pairs) or sum(len(wanted) for wanted, _ in known) < LEAST_SAMPLES:
+        return None
+    return np.concatenate([wanted for wanted, _ in known]), np.concatenate([power for _, power in known])
 
 
 def _error_and_power(trace: Trace, machine: Machine, joint: int) -> tuple[Floats, Floats] | None:
