@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from daq.contracts.errors import SpecError
 from model.effects.library import effect, library
+from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
@@ -68,7 +68,8 @@ class Candidate:
 def candidates(
     model: Model, effects: Sequence[str] | None = None, joints: Sequence[int] | None = None
 ) -> tuple[Candidate, ...]:
-    """Every effect that the model could get, except those found by a spectrum. Raises SpecError for unknown names.
+    """Every effect that the model could get, except those found by a spectrum. Raises SpecError for unknown names, and
+    for joints that are not modelled.
 
     Args:
         effects: names; None for the whole library. joints: only on these; None for all.
@@ -91,7 +92,7 @@ def tone(model: Model, name: str, joint: int, values: Mapping[str, float]) -> Ca
 
 def on_joints(model: Model, alike: Sequence[Candidate], values: Mapping[str, float]) -> Candidate | None:
     """One law on all the joints of candidates for single ones, with one trial: `values` by full name. None where the
-    model refuses it, or has the effect on some of the joints already."""
+    model has the effect on some of the joints already."""
     first = alike[0]
     joints = tuple(sorted(j for c in alike for j in c.joints))
     bounds = {name: own for c in alike for name, own in c.bounds.items()}
@@ -153,13 +154,21 @@ def _candidate(
         free = tuple(p for p in model.parameters if p.effect == law and (not joints or set(joints) & set(p.joints)))
         free = tuple(p for p in free if p.null is not None)
     else:
-        try:
-            wider = model.with_effect(law, joints)
-        except SpecError:
-            return None  # the model refuses the pair, such as backlash beside compliance
+        if not _has_place(model, law, joints):
+            return None
+        wider = model.with_effect(law, joints)
         free = tuple(p for p in wider.parameters if p.name not in model.by_name)
     full = tuple(_full(free, trial) for trial in trials)
     return Candidate(name, joints, wider, free, full, proportional, _full_bounds(free, bounds or {}))
+
+
+def _has_place(model: Model, law: str, joints: tuple[int, ...]) -> bool:
+    """Whether the model can have the effect there: one of the user's own acts on the joints of its file alone, and a
+    model has only so much room for those."""
+    kind = effect(law)
+    own = {use.name for use in model.effects if use.file is not None} | ({law} if kind.file is not None else set())
+    taken = sum(len(effect(name).parameters) for name in own)
+    return taken <= at.USER_COLUMNS and (not kind.joints or set(joints) <= set(kind.joints))
 
 
 def _full(free: Sequence[Parameter], values: Mapping[str, float]) -> dict[str, float]:

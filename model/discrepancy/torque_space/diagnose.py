@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.contracts.errors import TraceError
+from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.discrepancy.answer import Candidate, Diagnosis, Step, Verdict
-from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.torque_space import judging
 from model.discrepancy.torque_space.balance import TorqueBalance
 from model.discrepancy.torque_space.candidates import NOT_IN_TORQUE_SPACE
@@ -55,6 +55,8 @@ def diagnose_torques(
     if not traces:
         raise TraceError("no traces: a diagnosis needs at least one")
     chosen = torque_options(options)
+    check_options(chosen, model)
+    _refuse_unseen(chosen)
     cutoff = chosen.cutoff or chosen_cutoff(traces, model.machine)
     progress(0.0, f"low-passing the records at {cutoff:g} Hz")
     work = _Workflow(
@@ -65,6 +67,13 @@ def diagnose_torques(
     robot = sum(float(t.time[-1] - t.time[0]) for t in (*traces, *holdout))
     names = [t.record.trace_id for t in traces]
     return work.answer(model, names, [t.record.trace_id for t in holdout], time.perf_counter() - begun, robot, cutoff)
+
+
+def _refuse_unseen(options: TorqueOptions) -> None:
+    """Raises SpecError for a named effect that torques do not show: that it is not found would be no answer."""
+    for name in options.effects or ():
+        if name in NOT_IN_TORQUE_SPACE:
+            raise SpecError(f"effect {name}: cannot be found in torques: {NOT_IN_TORQUE_SPACE[name]}; leave it out")
 
 
 @dataclass

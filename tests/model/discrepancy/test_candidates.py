@@ -6,7 +6,9 @@ import pytest
 
 from daq.contracts.errors import SpecError
 from model.discrepancy.candidates import STICTION_SPEED, TONES, candidates, tone
-from model.effects.library import library
+from model.effects.library import add_own, library, remove_own
+from model.machine_model import layout as at
+from tests.model.discrepancy.own_effects import own_effect
 from tests.model.fitting import imagined
 
 
@@ -48,3 +50,23 @@ def test_stiction_and_stribeck_friction_are_told_apart_by_speed() -> None:
 def test_an_unknown_effect_is_refused() -> None:
     with pytest.raises(SpecError, match="not in the library"):
         candidates(imagined.arm(), ["gremlins"])
+
+
+def test_a_joint_that_is_not_modelled_is_refused() -> None:
+    with pytest.raises(SpecError, match="on joint 5: modelled are joints"):
+        candidates(imagined.arm(), ["coulomb_friction", "dead_zone"], [5])
+
+
+def test_effects_of_the_users_own_are_tried_where_they_can_be() -> None:
+    """On the joints of their file alone, and as long as a model has room for one more."""
+    large = own_effect("large", parameters=at.USER_COLUMNS)
+    add_own(own_effect("grease", joints=(2,)))
+    add_own(large)
+    try:
+        assert {c.joints for c in candidates(imagined.arm(), ["grease"])} == {(2,)}
+        assert {c.joints for c in candidates(imagined.arm(), ["large"])} == {(1,), (2,), (3,)}
+        full = imagined.arm().with_effect("grease", (2,))
+        assert candidates(full, ["large"]) == ()
+    finally:
+        remove_own("grease")
+        remove_own("large")

@@ -15,6 +15,7 @@ from daq.contracts.progress import CancelledError
 from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from model.discrepancy.answer import Diagnosis
+from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.torque_space.diagnose import diagnose_torques
 from model.discrepancy.torque_space.judging import relative_torque_error
 from model.discrepancy.torque_space.options import TorqueOptions
@@ -163,6 +164,10 @@ def test_wrong_input_is_refused_in_one_line() -> None:
         diagnose_torques(model, [without_drive(trace)])
     with pytest.raises(SpecError, match="not in the library"):
         diagnose_torques(model, [trace], options=TorqueOptions(effects=("magic",)))
+    with pytest.raises(SpecError, match=r"joints to look on: 2 is not modelled; allowed are 1"):
+        diagnose_torques(model, [trace], options=DiagnosisOptions(joints=(2,)))
+    with pytest.raises(SpecError, match="stiction: cannot be found in torques"):
+        diagnose_torques(model, [trace], options=DiagnosisOptions(effects=("stiction",)))
     with pytest.raises(SpecError, match="cutoff"):
         diagnose_torques(model, [trace], options=TorqueOptions(cutoff=400.0))
 
