@@ -63,9 +63,9 @@ def diagnose(
 ) -> None:
     """Find where a model and traces disagree, name the effect that is missing, add it, and show the gap shrink."""
     from daq.cli.diagnose_acquire import acquired
-    from daq.cli.diagnose_asking import asker
     from daq.cli.model_progress import shown_progress
     from model.discrepancy.workflow import diagnose as run_diagnosis
+    from server.jobs.asking import asker
 
     call = invocation(context)
     require_no_programs(effect_file, call)

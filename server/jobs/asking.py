@@ -1,4 +1,7 @@
-"""What a diagnosis of the service may ask for: the same library of experiments as that of `daq diagnose`."""
+"""What a diagnosis may ask for: the library of experiments, as far as the machine's limits allow them.
+
+Of the service, of `daq diagnose`, and of the process that diagnoses in a blind trial.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +12,22 @@ from daq.trajectories.asked import asked_experiments
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
-    from model.discrepancy.next_experiment import Asker
-
-
-def asker(machine: Machine) -> Asker:
-    """The library of experiments, planned and checked for a machine. Running one is for the queue."""
     from model.discrepancy.next_experiment import Asker, Experiment
 
-    library = tuple(Experiment(one.name, one.description, one.spec, one.general) for one in asked_experiments())
-    return Asker(library, lambda spec: planned(spec, machine))
+
+def asker(machine: Machine, budget: float | None = None) -> Asker:
+    """The library of experiments, planned and checked for a machine. Running one is for who asked.
+
+    Args:
+        budget: s of robot time that are left; None for no limit.
+    """
+    from model.discrepancy.next_experiment import Asker
+
+    return Asker(library(), lambda spec: planned(spec, machine), budget)
+
+
+def library() -> tuple[Experiment, ...]:
+    """The experiments that may be asked for."""
+    from model.discrepancy.next_experiment import Experiment
+
+    return tuple(Experiment(one.name, one.description, one.spec, one.general) for one in asked_experiments())

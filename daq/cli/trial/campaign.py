@@ -11,13 +11,15 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
+from daq.cli.diagnose_asking import as_run, next_to_run, time_left
 from daq.cli.trial.experiments import machine_with_load, trial_experiment, write_set_points
 from daq.cli.trial.folder import STAGES, Stage, TrialFolder
 from daq.cli.trial.mock_side import TrialStageError, detect, reveal
 from daq.cli.trial.recording import Recorded, record
-from daq.cli.trial.sealed import DIAGNOSER, SealedAnswer, diagnose_sealed
+from daq.cli.trial.sealed import DIAGNOSER, DiagnosisFailedError, SealedAnswer, diagnose_sealed
 from daq.contracts.machine import Machine
-from model.discrepancy.answer import Diagnosis
+from daq.traces.reader import read_trace
+from model.discrepancy.answer import Acquired, NextExperiment
 from model.machine_model.model import base_model
 from model.trial.score import Score, score, score_of_failure
 from model.trial.table import TrialTable, trial_table
@@ -128,41 +130,43 @@ class Campaign:
         return record(seed, name, trial_experiment(name), self._machine(seed), self.folder.path / "traces")
 
     def _diagnose(self, seed: int) -> dict[str, Any]:
-        """The sealed answer: its file and hash are written before anybody looks at the truth."""
+        """The sealed answer, the last one where more was asked for: its file and hash are written before anybody looks
+        at the truth."""
         recorded, case = self._row("record", seed), self.folder.name_of(seed)
         traces = [self.folder.path / "traces" / recorded["trace"]]
         row: dict[str, Any] = {"seed": seed, "case": case}
-        spent, seconds = 0.0, 0.0
+        budget, runs, answers = ROBOT_TIME if self.folder.asked.acquire else 0.0, list[Acquired](), list[SealedAnswer]()
         try:
-            while True:
-                given = self._answer(seed, traces, recorded["held_out"])
-                seconds += given.seconds
-                more = self._further(seed, given.read(), len(traces), spent)
-                if more is None:
-                    break
-                traces.append(more.file)
-                spent += more.duration
-        except TrialStageError as error:
-            return {**row, "failure": str(error), "seconds": seconds}
+            answers.append(self._answer(seed, traces, recorded["held_out"], runs))
+            while (asked := next_to_run(answers[-1].read(), runs, budget)) is not None:
+                runs.append(self._further(seed, asked, len(runs) + 1))
+                if runs[-1].outcome == "complete":
+                    traces.append(Path(runs[-1].file))
+                    answers.append(self._answer(seed, traces, recorded["held_out"], runs))
+        except DiagnosisFailedError as error:
+            return {**row, "failure": str(error), "seconds": sum(given.seconds for given in answers)}
         file = self.folder.path / "answers" / f"{case}.json"
-        file.write_bytes(given.text)
+        file.write_bytes(answers[-1].text)
         return {
-            **row, "answer": file.name, "sha256": given.digest, "seconds": seconds,
-            "robot_seconds": recorded["robot_seconds"] + spent, "traces": [trace.name for trace in traces],
+            **row, "answer": file.name, "sha256": answers[-1].digest,
+            "seconds": sum(given.seconds for given in answers),
+            "robot_seconds": recorded["robot_seconds"] + budget - time_left(runs, budget),
+            "traces": [trace.name for trace in traces],
+            "further": [
+                {"experiment": r.experiment, "trace": Path(r.file).name, "outcome": r.outcome, "duration": r.duration}
+                for r in runs
+            ],
         }  # fmt: skip
 
-    def _answer(self, seed: int, traces: list[Path], held_out: str) -> SealedAnswer:
+    def _answer(self, seed: int, traces: list[Path], held_out: str, runs: Sequence[Acquired]) -> SealedAnswer:
+        left = time_left(runs, ROBOT_TIME) if self.folder.asked.acquire else None
         model = base_model(self._machine(seed))
-        return diagnose_sealed(traces, self.folder.path / "traces" / held_out, model, self.diagnoser)
+        return diagnose_sealed(traces, self.folder.path / "traces" / held_out, model, self.diagnoser, left)
 
-    def _further(self, seed: int, answer: Diagnosis, count: int, spent: float) -> Recorded | None:
-        """The experiment that the answer asks for, run, where that is allowed and there is robot time left."""
-        if not self.folder.asked.acquire:
-            return None
-        asked = answer.next_experiment
-        if answer.verdict == "named" or asked is None or spent + asked.duration > ROBOT_TIME:
-            return None
-        return record(seed, f"further {count}", asked.spec, self._machine(seed), self.folder.path / "traces")
+    def _further(self, seed: int, asked: NextExperiment, number: int) -> Acquired:
+        """The experiment that an answer asks for, run on the same arm."""
+        made = record(seed, f"further {number}", asked.spec, self._machine(seed), self.folder.path / "traces")
+        return as_run(asked, read_trace(made.file), made.file, made.outcome)
 
     def _score(self, seed: int) -> dict[str, Any]:
         """Reveals the truth and scores the answer, which must be the one that was sealed."""

@@ -1,7 +1,8 @@
-"""Diagnosis as a process that is given trace files and a model, and nothing else."""
+"""Diagnosis as a process that is given trace files, a model, what it may ask for, and nothing else."""
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -21,11 +22,17 @@ from model.machine_model.model import Model
 from model.machine_model.model_file import save_model
 
 MODEL, ANSWER, HELD_OUT = "model.json", "answer.json", "held-out.mcap"
+ASKING = "asking.json"
+"""There where more may be asked for: `budget`, the s of robot time that are left for it."""
 TIME_LIMIT = 1800.0
 """s after which a diagnosis counts as failed: generous, for a machine that has much else to do."""
 _KEPT_VARIABLES = ("PATH", "HOME", "LANG", "LC_ALL", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE", "VIRTUAL_ENV")
 _KEPT_BEGINNINGS = ("NUMBA_", "OMP_", "OPENBLAS_", "MKL_")
 DIAGNOSER = (sys.executable, "-m", "daq.cli.trial.diagnoser")
+
+
+class DiagnosisFailedError(TrialStageError):
+    """A diagnosis that gave no answer, which is a wrong one."""
 
 
 @dataclass(frozen=True)
@@ -41,21 +48,23 @@ class SealedAnswer:
         return sha256(self.text).hexdigest()
 
     def read(self) -> Diagnosis:
-        """The answer. Raises TrialStageError for what is none."""
+        """The answer. Raises DiagnosisFailedError for what is none."""
         try:
             return Diagnosis.model_validate_json(self.text)
         except ValidationError as error:
             first = error.errors()[0]
             where = ".".join(str(part) for part in first["loc"])
-            raise TrialStageError(f"what the diagnosis gave is no answer: {where}: {first['msg']}") from error
+            raise DiagnosisFailedError(f"what the diagnosis gave is no answer: {where}: {first['msg']}") from error
 
 
 def diagnose_sealed(
-    traces: Sequence[Path], holdout: Path | None, model: Model, diagnoser: Sequence[str] = DIAGNOSER
-) -> SealedAnswer:
+    traces: Sequence[Path], holdout: Path | None, model: Model, diagnoser: Sequence[str] = DIAGNOSER,
+    budget: float | None = None,
+) -> SealedAnswer:  # fmt: skip
     """Starts `diagnoser` in a new folder with copies of the traces and the model; its answer.
 
-    Arguments are those of `diagnoser` alone; the environment is what any program needs to run. Raises TrialStageError.
+    Arguments are those of `diagnoser` alone; the environment is what any program needs to run. `budget`: s of robot
+    time for what it may ask for; None: it may not ask. Raises DiagnosisFailedError.
     """
     with tempfile.TemporaryDirectory(prefix="diagnosis-") as name:
         place = Path(name)
@@ -64,6 +73,8 @@ def diagnose_sealed(
         if holdout is not None:
             shutil.copyfile(holdout, place / HELD_OUT)
         save_model(model, place / MODEL)
+        if budget is not None:
+            (place / ASKING).write_text(json.dumps({"budget": budget}) + "\n", "utf-8")
         begun = time.monotonic()
         try:
             done = subprocess.run(
@@ -71,12 +82,12 @@ def diagnose_sealed(
                 check=False, timeout=TIME_LIMIT, start_new_session=True,
             )  # fmt: skip
         except subprocess.TimeoutExpired:
-            raise TrialStageError(f"no answer within {TIME_LIMIT:g} s") from None
+            raise DiagnosisFailedError(f"no answer within {TIME_LIMIT:g} s") from None
         seconds = time.monotonic() - begun
         answer = place / ANSWER
         if done.returncode or not answer.exists():
             words = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
-            raise TrialStageError(f"the diagnosis ended with code {done.returncode}: {words}")
+            raise DiagnosisFailedError(f"the diagnosis ended with code {done.returncode}: {words}")
         return SealedAnswer(answer.read_bytes(), seconds)
 
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from daq.cli.diagnose_asking import library
 from daq.cli.trial.experiments import trial_experiment
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Ramp
@@ -27,6 +26,7 @@ from model.discrepancy.refitting import Refitted, judge
 from model.discrepancy.search import Point, point_at, searched, with_new_tangents
 from model.discrepancy.thresholds import THRESHOLDS
 from model.machine_model.model import Model
+from server.jobs.asking import library
 from tests.model.fitting import imagined
 
 EXPERIMENTS = {e.name: e for e in library()}
