@@ -22,7 +22,7 @@ app = typer.Typer(add_completion=False)
 def blind(
     folder: Annotated[Path, typer.Option(help="Where everything is kept; a trial that was broken off goes on there.")],
     seeds: Annotated[str | None, typer.Option(help="Numbers of arms: FIRST:LAST, or with commas.")] = None,
-    cases: Annotated[int | None, typer.Option(min=1, help="No more than so many of them.")] = None,
+    cases: Annotated[int | None, typer.Option(min=1, help="No more than so many of them, kinds mixed.")] = None,
     kinds: Annotated[
         str, typer.Option(help="Of clean, single, open-set, pair, shared, wrong-priors.")
     ] = "clean,single,open-set",
@@ -52,24 +52,25 @@ def blind(
     """Hide effects in the mock, diagnose blindly, reveal, and score."""
     from daq.cli.trial.campaign import Campaign
     from daq.cli.trial.folder import TrialFolder
-    from daq.cli.trial.registered import tree_hashes
+    from daq.cli.trial.registered import to_register
 
     if hashes:
-        for path, digest in tree_hashes().items():
-            print(f'"{path}" = "{digest}"')
+        print(to_register())
         return
     index, count = _shard(shard)
     if registration is not None:
         if seeds is not None:
             raise SpecError("--seeds and --registration: name one of them; a registered trial draws its own")
+        if cases is not None:
+            raise SpecError("--cases and --registration: a registered run has the cases that it registers, all of them")
         chosen, experiment, acquire, drawn = _registered(registration, run)
     else:
         if seeds is None:
             raise SpecError("--seeds or --registration: one of them is needed")
-        chosen, drawn = _chosen(seeds, kinds, loads), None
+        chosen, drawn = _chosen(seeds, kinds, loads, cases), None
     suffix = "" if count == 1 else f"-{index}of{count}"
     kept = TrialFolder.open(folder, experiment, acquire, drawn, suffix)
-    mine = kept.in_order(chosen[:cases])[index - 1 :: count]
+    mine = kept.in_order(chosen)[index - 1 :: count]
     campaign = Campaign(kept, load_machine("ma2000"), until=until)
     left = campaign.run(mine, processes, lambda number, said: console().print(f"{number}/{len(mine)}  {said}"))
     _show(campaign, folder, as_json=json)
@@ -78,10 +79,11 @@ def blind(
         raise typer.Exit(5)
 
 
-def _chosen(seeds: str, kinds: str, loads: str) -> list[int]:
-    from model.trial.arms import KINDS, LOADS, arms, parse_choice, parse_numbers
+def _chosen(seeds: str, kinds: str, loads: str, cases: int | None) -> list[int]:
+    from model.trial.arms import KINDS, LOADS, arms, parse_choice, parse_numbers, some_of
 
-    return arms(parse_numbers(seeds), parse_choice(kinds, KINDS, "kind"), parse_choice(loads, LOADS, "load"))
+    found = arms(parse_numbers(seeds), parse_choice(kinds, KINDS, "kind"), parse_choice(loads, LOADS, "load"))
+    return found if cases is None else some_of(found, cases)
 
 
 def _registered(path: Path, run: str) -> tuple[list[int], Literal["diagnostic", "ramp"], bool, dict[str, str]]:

@@ -51,6 +51,11 @@ def arms(numbers: Sequence[int], kinds: Sequence[str], loads: Sequence[str] = LO
     return [compose(number, kind, loads[number % len(loads)]) for number in numbers for kind in kinds]
 
 
+def some_of(seeds: Sequence[int], count: int) -> list[int]:
+    """`count` of the seeds at most, kinds and loads mixed: those whose SHA-256 comes first. More of them keep these."""
+    return sorted(dict.fromkeys(seeds), key=lambda seed: sha256(str(seed).encode()).digest())[:count]
+
+
 def drawn_arms(commit: str, cases: dict[str, int], loads: Sequence[str] = LOAD_CYCLE) -> list[int]:
     """Seeds drawn from the hash of a commit: the n-th of a kind from SHA-256 of `commit kind n`, its load in turn."""
     found = []

@@ -35,7 +35,11 @@ class Run(_Part):
 
 
 class Registration(_Part):
-    """A registration file. `hashes`: SHA-256 of files and folders of the source tree, by path."""
+    """A registration file.
+
+    `hashes`: SHA-256 of files and folders of the source tree, by path. `versions`: of libraries; there are none in
+    files from before they were registered.
+    """
 
     version: Literal[1]
     title: str
@@ -43,6 +47,7 @@ class Registration(_Part):
     loads: tuple[str, ...] = LOAD_CYCLE
     runs: dict[str, Run]
     hashes: dict[str, str]
+    versions: dict[str, str] = {}
 
     @field_validator("detectable")
     @classmethod
@@ -69,9 +74,21 @@ class Registration(_Part):
         """Seeds of a run, drawn from the commit that registered it."""
         return drawn_arms(commit, self.run(name).cases, self.loads)
 
-    def check_hashes(self, found: dict[str, str]) -> None:
-        """Raises SpecError when the code is not what was registered."""
-        changed = [path for path, registered in self.hashes.items() if found.get(path) != registered]
+    def check_code(self, hashes: dict[str, str], versions: dict[str, str], origin: str) -> None:
+        """Raises SpecError when something of the code at hand is not registered, or not as it was registered.
+
+        Args:
+            hashes, versions: of all that decides the outcome, as they are found. origin: the file, for the message.
+        """
+        found, registered = {**hashes, **versions}, {**self.hashes, **self.versions}
+        missing = [name for name in found if name not in registered]
+        if missing:
+            more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
+            raise SpecError(
+                f"registration {origin}: lacks {', '.join(missing[:3])}{more}, which decide the outcome; "
+                "`daq blind --folder trial --hashes` prints all that it has to hold"
+            )
+        changed = [name for name, value in registered.items() if found.get(name) != value]
         if changed:
             raise SpecError(
                 f"{', '.join(changed)}: not as registered; a trial of other code needs a registration of its own"

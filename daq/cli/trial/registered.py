@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Iterable
 from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path
 
 import daq
@@ -24,6 +25,8 @@ REGISTERED = (
     "model/control",
     "model/design",
     "model/validation",
+    "model/analysis",
+    "model/identifiability",
     "model/trial",
     "mock_controller",
     "firmware_protocol",
@@ -31,9 +34,19 @@ REGISTERED = (
     "daq/driver",
     "daq/trajectories",
     "daq/runner",
+    "daq/traces",
+    "daq/acquisition",
+    "daq/link",
+    "daq/transport",
+    "daq/safety",
     "daq/cli/trial",
+    "daq/cli/blind.py",
+    "daq/cli/diagnose_asking.py",
+    "server/jobs/asking.py",
 )
-"""Parts of the source tree that decide the outcome."""
+"""Parts of the source tree that decide the outcome. A test follows the imports of every stage and misses none."""
+LIBRARIES = ("numpy", "scipy", "numba", "mujoco")
+"""Libraries whose numbers the outcome is made of."""
 _SUFFIXES = (".py", ".toml", ".json", ".csv")
 
 
@@ -46,6 +59,18 @@ def tree_hashes(paths: Iterable[str] = REGISTERED) -> dict[str, str]:
     """SHA-256 of files, and of all source files in folders with their names, by path. Raises SpecError."""
     root = source_tree()
     return {path: _hash(root, root / path) for path in paths}
+
+
+def library_versions() -> dict[str, str]:
+    """Versions of the libraries, by name, as they are installed."""
+    return {name: version(name) for name in LIBRARIES}
+
+
+def to_register() -> str:
+    """What a registration has to hold of the code at hand, as the last tables of its file."""
+    hashes = [f'"{path}" = "{digest}"' for path, digest in tree_hashes().items()]
+    versions = [f'{name} = "{found}"' for name, found in library_versions().items()]
+    return "\n".join(["[hashes]", *hashes, "", "[versions]", *versions])
 
 
 def _hash(root: Path, path: Path) -> str:
@@ -68,8 +93,8 @@ def published_table(path: Path, run: str) -> Path:
 def read_registration(path: Path, run: str) -> tuple[Registration, str]:
     """The registration and the commit that last changed it.
 
-    Raises SpecError unless it is committed as it stands, the code is what it registers, and no table of this run is
-    kept beside it yet.
+    Raises SpecError unless it is committed as it stands, it registers all code and libraries that decide the outcome
+    as they are, and no table of this run is kept beside it yet.
     """
     try:
         text = path.read_text("utf-8")
@@ -79,7 +104,8 @@ def read_registration(path: Path, run: str) -> tuple[Registration, str]:
     table = published_table(path, run)
     if table.exists():
         raise SpecError(f"{table}: this run has been made; another one needs a registration of its own, with new seeds")
-    registration.check_hashes(tree_hashes(registration.hashes))
+    paths = dict.fromkeys((*REGISTERED, *registration.hashes))
+    registration.check_code(tree_hashes(paths), library_versions(), str(path))
     return registration, _commit(path)
 
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import tomllib
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import grimp
+import numpy as np
 import pytest
 from mcap.stream_reader import StreamReader
 
@@ -17,7 +20,8 @@ from daq.cli.trial.campaign import Campaign
 from daq.cli.trial.experiments import machine_with_load, trial_experiment, write_set_points
 from daq.cli.trial.folder import TrialFolder
 from daq.cli.trial.mock_side import TrialStageError
-from daq.cli.trial.registered import source_tree, tree_hashes
+from daq.cli.trial.recording import Recorded
+from daq.cli.trial.registered import REGISTERED, library_versions, source_tree, to_register, tree_hashes
 from daq.cli.trial.sealed import diagnose_sealed
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Ramp
@@ -89,7 +93,7 @@ def test_every_stage_leaves_a_line_a_case(done: Campaign) -> None:
 
 def test_the_diagnosis_is_given_traces_and_the_model_and_nothing_else(done: Campaign) -> None:
     told = given(done, SECRETS[0])
-    assert told["files"] == ["held-out.mcap", "model.json", "trace-1.mcap", "trace-2.mcap"]
+    assert told["files"] == ["asking.json", "held-out.mcap", "model.json", "trace-1.mcap", "trace-2.mcap"]
     assert told["arguments"] == []
     assert "DAQ_RUNTIME_FOLDER" not in told["environment"]
     everything = json.dumps(told)
@@ -131,6 +135,53 @@ def test_what_an_answer_asked_for_was_run_once_on_the_same_arm(done: Campaign) -
     row = rows(done, "diagnose")[SECRETS[0]]
     assert len(row["traces"]) == 2
     assert row["robot_seconds"] == pytest.approx(rows(done, "record")[SECRETS[0]]["robot_seconds"] + 0.5, abs=0.1)
+    (further,) = row["further"]
+    assert (further["experiment"], further["trace"], further["outcome"]) == ("a pause", row["traces"][1], "complete")
+    assert given(done, SECRETS[1])["budget"] == 60.0
+    assert given(done, SECRETS[0])["budget"] == pytest.approx(60.0 - further["duration"])
+
+
+def resumed(path: Path, done: Campaign, acquire: bool) -> Campaign:
+    """Another trial of the arm that carries much, recorded already."""
+    copy = trial(path, acquire=acquire)
+    for stage in ("detect", "record"):
+        copy.folder.add(stage, rows(done, stage)[SECRETS[0]])
+    for file in (done.folder.path / "traces").iterdir():
+        (path / "traces" / file.name).write_bytes(file.read_bytes())
+    return copy
+
+
+def test_a_further_run_that_is_not_complete_is_kept_not_used_and_the_last(
+    done: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copy = resumed(tmp_path, done, acquire=True)
+    first = rows(done, "record")[SECRETS[0]]
+    broken = Recorded(tmp_path / "traces" / first["trace"], "stopped", "by hand", 8.0)
+    monkeypatch.setattr(campaign_module, "record", lambda *_: broken)
+    row = copy._diagnose(SECRETS[0])
+    assert [run["outcome"] for run in row["further"]] == ["stopped"]
+    assert row["traces"] == [first["trace"]]
+    assert row["robot_seconds"] == pytest.approx(first["robot_seconds"] + row["further"][0]["duration"])
+    assert row["further"][0]["duration"] > 0.1
+
+
+def test_a_further_experiment_that_cannot_be_recorded_is_no_wrong_answer(
+    done: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def nothing(*_: object) -> Recorded:
+        raise TrialStageError("nothing was recorded: no port")
+
+    monkeypatch.setattr(campaign_module, "record", nothing)
+    with pytest.raises(TrialStageError, match="nothing was recorded"):
+        resumed(tmp_path, done, acquire=True)._diagnose(SECRETS[0])
+
+
+def test_without_acquiring_nothing_may_be_asked(done: Campaign, tmp_path: Path) -> None:
+    copy = resumed(tmp_path, done, acquire=False)
+    copy.folder.add("diagnose", copy._diagnose(SECRETS[0]))
+    told = given(copy, SECRETS[0])
+    assert told["budget"] is None
+    assert told["files"] == ["held-out.mcap", "model.json", "trace-1.mcap"]
 
 
 def test_a_trial_that_goes_on_does_nothing_twice(done: Campaign) -> None:
@@ -189,13 +240,8 @@ def test_a_diagnosis_that_gives_no_answer_says_why(tmp_path: Path, done: Campaig
         diagnose_sealed(
             [], None, model, (sys.executable, "-c", "import sys; print('no idea', file=sys.stderr); sys.exit(3)")
         )
-    silent = trial(tmp_path)
+    silent = resumed(tmp_path, done, acquire=False)
     silent.diagnoser = (sys.executable, "-c", "raise SystemExit(1)")
-    for stage in ("detect", "record"):
-        silent.folder.add(stage, rows(done, stage)[SECRETS[0]])
-    for part in ("traces",):
-        for file in (done.folder.path / part).iterdir():
-            (tmp_path / part / file.name).write_bytes(file.read_bytes())
     row = silent._diagnose(SECRETS[0])
     assert row["failure"] == "the diagnosis ended with code 1: it said nothing"
     silent.folder.add("diagnose", row)
@@ -224,12 +270,31 @@ def test_wrong_options_are_refused_in_one_line(daq: CommandLine, words: tuple[st
 
 
 def test_the_hashes_that_a_registration_holds(daq: CommandLine) -> None:
-    printed = daq("blind", "--folder", "trial", "--hashes").out.splitlines()
+    printed = tomllib.loads(daq("blind", "--folder", "trial", "--hashes").out)
     expected = tree_hashes()
-    assert printed == [f'"{path}" = "{digest}"' for path, digest in expected.items()]
+    assert printed == {"hashes": expected, "versions": library_versions()}
+    assert set(library_versions()) == {"numpy", "scipy", "numba", "mujoco"}
+    assert library_versions()["numpy"] == np.__version__
     assert {"model/discrepancy", "mock_controller", "daq/cli/trial"} <= set(expected)
     thresholds = "model/discrepancy/thresholds.py"
     assert expected[thresholds] == sha256((source_tree() / thresholds).read_bytes()).hexdigest()
+
+
+STAGE_MODULES = ("daq.cli.trial", "daq.cli.blind", "daq.acquisition", "server.jobs.asking", "mock_controller")
+AROUND = ("daq.cli", "daq.client", "daq.config")
+"""What only the command line around a trial uses, which decides nothing."""
+
+
+def test_nothing_that_a_stage_imports_is_left_out_of_a_registration() -> None:
+    every = ("daq", "model", "server", "mock_controller", "firmware_protocol")
+    graph = grimp.build_graph(*every, exclude_type_checking_imports=True, cache_dir=None)
+    begun = {name for name in graph.modules if any(f"{name}.".startswith(f"{stage}.") for stage in STAGE_MODULES)}
+    used = begun.union(*(graph.find_upstream_modules(name) for name in begun))
+    assert {"model.discrepancy.workflow", "daq.link.link", "model.identifiability.directions"} <= used
+    registered = [path.removesuffix(".py").replace("/", ".") for path in REGISTERED]
+    packages = {"daq", "model", "server", "server.jobs"}  # of which only the registered parts are used
+    left = [name for name in used - packages if not any(f"{name}.".startswith(f"{p}.") for p in (*registered, *AROUND))]
+    assert left == []
 
 
 def git(folder: Path, *words: str) -> str:
@@ -242,10 +307,10 @@ def git(folder: Path, *words: str) -> str:
 def test_a_registered_trial_runs_only_committed_and_with_the_code_that_was_registered(
     daq: CommandLine, nobodys_desk: Path
 ) -> None:
-    path, digest = "model/trial/truth.py", tree_hashes(["model/trial/truth.py"])["model/trial/truth.py"]
-    text = (
-        f'version = 1\ntitle = "t"\ndetectable = 5.0\nruns.diagnostic.cases.clean = 1\nhashes."{path}" = "{digest}"\n'
-    )
+    path = "model/trial"
+    digest = tree_hashes([path])[path]
+    begun = 'version = 1\ntitle = "t"\ndetectable = 5.0\nruns.diagnostic.cases.clean = 1\n'
+    text = begun + to_register() + "\n"
     file = nobodys_desk / "registration.toml"
     file.write_text(text, "utf-8")
     git(nobodys_desk, "init", "-q")
@@ -254,6 +319,7 @@ def test_a_registered_trial_runs_only_committed_and_with_the_code_that_was_regis
     git(nobodys_desk, "add", file.name)
     git(nobodys_desk, "commit", "-q", "-m", "registered")
     daq(*words, "--seeds", "1:2").complains(2, "--seeds and --registration")
+    daq(*words, "--cases", "1").complains(2, "--cases and --registration")
     daq(*words, "--run", "ramp").complains(2, "run 'ramp': the registration has diagnostic")
     kept = nobodys_desk / "registration-diagnostic.md"
     kept.write_text("a table", "utf-8")
@@ -261,3 +327,5 @@ def test_a_registered_trial_runs_only_committed_and_with_the_code_that_was_regis
     kept.unlink()
     file.write_text(text.replace(digest, "0" * 64), "utf-8")
     daq(*words).complains(2, f"{path}: not as registered")
+    file.write_text(begun + f'hashes."{path}" = "{digest}"\n', "utf-8")
+    daq(*words).complains(2, "lacks model/discrepancy/thresholds.py, model/discrepancy, model/effects and")

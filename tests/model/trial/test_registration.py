@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from daq.contracts.errors import SpecError
 from mock_controller.hidden.arm import Kind, Load, compose_seed, draw_arm
-from model.trial.arms import KINDS, LOADS, arms, compose, drawn_arms, parse_choice, parse_numbers
+from model.trial.arms import KINDS, LOADS, arms, compose, drawn_arms, parse_choice, parse_numbers, some_of
 from model.trial.registration import parse_registration
 
 TEXT = """
@@ -23,7 +25,11 @@ cases = { single = 2 }
 
 [hashes]
 "model" = "abc"
+
+[versions]
+numpy = "2.1"
 """
+KEPT = Path(__file__).parents[3] / "docs" / "trial"
 
 
 def test_seeds_are_the_mock_s() -> None:
@@ -47,6 +53,16 @@ def test_numbers() -> None:
 def test_loads_go_in_turn() -> None:
     assert arms([1, 3, 4], ["single"]) == [120, 321, 422]
     assert arms([1], ["single", "clean"], ["heavy"]) == [122, 112]
+
+
+def test_some_of_the_seeds_are_of_all_kinds_and_the_same_each_time() -> None:
+    seeds = [compose(number, kind, "nominal") for kind in KINDS for number in range(20)]
+    some = some_of(seeds, 30)
+    assert len(some) == 30
+    assert some == some_of(seeds[::-1], 30)
+    assert some[:10] == some_of(seeds, 10)
+    assert {seed // 10 % 10 for seed in some} == set(KINDS.values())
+    assert some_of(seeds[:2], 5) == some_of(seeds[:2], 2)
 
 
 def test_seeds_drawn_from_a_commit_are_new_with_each_commit_and_far_from_those_for_tuning() -> None:
@@ -73,11 +89,30 @@ def test_a_registration_draws_each_run() -> None:
         registration.run("x")
 
 
-def test_other_code_needs_another_registration() -> None:
+def test_other_code_or_another_library_needs_another_registration() -> None:
     registration = parse_registration(TEXT, "here")
-    registration.check_hashes({"model": "abc"})
-    with pytest.raises(SpecError, match=r"model: not as registered"):
-        registration.check_hashes({"model": "abd"})
+    registration.check_code({"model": "abc"}, {"numpy": "2.1"}, "here")
+    with pytest.raises(SpecError, match=r"^model: not as registered"):
+        registration.check_code({"model": "abd"}, {"numpy": "2.1"}, "here")
+    with pytest.raises(SpecError, match=r"^numpy: not as registered"):
+        registration.check_code({"model": "abc"}, {"numpy": "2.2"}, "here")
+
+
+def test_what_decides_the_outcome_has_to_be_registered_all_of_it() -> None:
+    registration = parse_registration(TEXT, "here")
+    with pytest.raises(SpecError, match=r"registration here: lacks scipy, which decide the outcome; .*--hashes"):
+        registration.check_code({"model": "abc"}, {"numpy": "2.1", "scipy": "1.1"}, "here")
+    every = {"model": "abc", **dict.fromkeys(("a", "b", "c", "d"), "")}
+    with pytest.raises(SpecError, match=r"lacks a, b, c and 1 more, which") as error:
+        registration.check_code(every, {"numpy": "2.1"}, "here")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("file", sorted(KEPT.glob("*.toml")), ids=lambda file: file.stem)
+def test_registrations_that_were_made_stay_readable(file: Path) -> None:
+    registration = parse_registration(file.read_text("utf-8"), str(file))
+    assert len(registration.hashes) >= 20
+    assert registration.arms("diagnostic", "c0ffee")
 
 
 @pytest.mark.parametrize(
