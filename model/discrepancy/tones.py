@@ -7,59 +7,108 @@ needed: the fit that follows uses the model itself.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import fft, ifft, next_fast_len
 
-from model.discrepancy.candidates import TONES, tone
+from daq.contracts.machine import Machine
+from model.discrepancy.candidates import TONES, Candidate, tone
 from model.discrepancy.observation import DIFFERENCE, Observation
 from model.discrepancy.probing import Probed, Projection, projection
 from model.discrepancy.search import Point
+from model.fitting.records import resolution
+from model.machine_model.effect_parameters import effect_parameters
+from model.machine_model.model import Model
 
 Floats = NDArray[np.float64]
 
 RESPONSE_SAMPLES = 30
 """Length of the impulse response: 0.6 s at 20 ms."""
-TRIAL_FREQUENCIES = (0.7, 2.1, 4.3)
-"""Hz"""
-TRIAL_CYCLES = (23.0, 47.0)
-"""Per unit of the joint's travel, times 2π."""
+SHAPES = {"torque_ripple": "cycles", "periodic_disturbance": "frequency"}
+"""The parameter of each that a spectrum finds."""
+TRIAL_RATES = {"torque_ripple": (23.0, 47.0), "periodic_disturbance": (0.7, 2.1, 4.3)}
+"""At which the response is taken: rad of the tone per unit of the joint's travel; Hz."""
 MOST_TONES = 500
+"""Tones tried of one effect on one joint, unless the record is so long that they would miss some between them."""
 HIGHEST = 8.0
 """Hz; the arm follows no faster."""
-SHORTEST_WAVES = 12.0
-"""Counts of the sensor that a wave must be long to be seen."""
+SHORTEST_WAVE = 4096 / 75
+"""Counts of the sensor that a wave must be long: an assumption. On 12 bits over 270° that is a hundredth of a joint
+turn, which the fastest ramp of the presets, 20 counts a period, still reads more than twice."""
+BLOCK = 4_000_000
+"""Samples of tones that are held at a time: 64 MB."""
 
 
 def proposed_tones(observation: Observation, point: Point, joints: Sequence[int]) -> list[Probed]:
-    """The best ripple and the best disturbance of every joint, the most promising first."""
+    """The best ripple and the best disturbance of every joint, the most promising first; of a joint that has one of
+    them already, the other."""
     clear, found = projection(point), []
-    places = point.model.machine.modelled_joints
     for joint in joints:
-        column = places.index(joint)
+        absent = _absent(point.model, joint)
+        if not absent:
+            continue
         response = torque_response(observation, point, joint)
-        for name in TONES:
-            best = _best_tone(observation, point, clear, name, joint, column, response)
+        for name in absent:
+            best = _best_tone(observation, point, clear, name, joint, response)
             if best is not None:
                 found.append(best)
     return sorted(found, key=lambda p: -p.gain)
 
 
+def tones_tried(observation: Observation, candidate: Candidate) -> int:
+    """How many tones the one of a candidate was chosen from, at least MOST_TONES: what it costs in evidence."""
+    rates = rates_tried(observation, candidate.model.machine, candidate.name, candidate.joints[0])
+    return max(MOST_TONES, len(rates))
+
+
+def rates_tried(observation: Observation, machine: Machine, name: str, joint: int) -> Floats:
+    """(k,) Hz of a disturbance, or rad of a ripple per unit of the joint's travel (waves a turn), in equal steps. None
+    where a joint does not move by a wave.
+
+    Two tones closer than one over the record's length (its travel) look alike to it. Steps are a half (an eighth) of
+    that, wider where they would be more than MOST_TONES, and never wider than that.
+    """
+    column = machine.modelled_joints.index(joint)
+    named = f".{SHAPES[name]}"
+    high = next(p.high for p in effect_parameters(machine, name, (joint,), shared=False) if p.name.endswith(named))
+    if name == "torque_ripple":
+        travel = max(float(np.ptp(r.measured[:, column])) for r in observation.records)
+        sensor = machine.joint(joint).sensor
+        if sensor is not None and sensor.measures == "position":
+            high = min(high, 2 * np.pi / (SHORTEST_WAVE * resolution(sensor)))
+        alike = 2 * np.pi / travel if travel > 0 else math.inf
+        low, step = alike / 2, alike / 8
+    else:
+        alike = 1 / max(len(r.inputs) * r.inputs.period for r in observation.records)
+        high = min(high, HIGHEST, 0.4 / observation.records[0].inputs.period)
+        low, step = 2 * alike, alike / 2
+    if not low < high:
+        return np.zeros(0)
+    span = high - low
+    return np.linspace(low, high, int(max(2.0, min(span / step, max(MOST_TONES, math.ceil(span / alike) + 1)))))
+
+
 def torque_response(observation: Observation, point: Point, joint: int) -> Floats:
-    """Impulse response (RESPONSE_SAMPLES,) of a joint's reading to a torque on it, rad/(N·m)."""
-    places = point.model.machine.modelled_joints
-    column, model = places.index(joint), point.model
-    for name in TONES:
-        if not any(u.name == name and joint in u.joints for u in model.effects):
-            model = model.with_effect(name, (joint,))
+    """Impulse response (RESPONSE_SAMPLES,) of a joint's reading to a torque on it, rad/(N·m).
+
+    It is taken with tones that the joint has not yet: to move those it has would show what their own size does. Raises
+    ValueError where it has both.
+    """
+    column, model = point.model.machine.modelled_joints.index(joint), point.model
+    absent = _absent(model, joint)
+    if not absent:
+        raise ValueError(f"joint {joint} has every kind of tone already")
+    for name in absent:
+        model = model.with_effect(name, (joint,))
     vector, initials = observation.state(model, point.unknowns, point.values)
     vectors, sizes, waves = [vector], [], []
-    for name, shape, values in zip(TONES, ("cycles", "frequency"), (TRIAL_CYCLES, TRIAL_FREQUENCIES), strict=True):
-        for value in values:
+    for name in absent:
+        for value in TRIAL_RATES[name]:
             row = vector.copy()
-            row[list(model.parameter(f"joint{joint}.{name}.{shape}").slots)] = value
+            row[list(model.parameter(f"joint{joint}.{name}.{SHAPES[name]}").slots)] = value
             sine = model.parameter(f"joint{joint}.{name}.sine")
             size = DIFFERENCE * (sine.deviation or 1.0)
             row[list(sine.slots)] += size
@@ -77,6 +126,11 @@ def torque_response(observation: Observation, point: Point, joint: int) -> Float
     return np.asarray(np.linalg.solve(gram, regressor.T @ target))
 
 
+def _absent(model: Model, joint: int) -> list[str]:
+    """The kinds of tones that a joint has not."""
+    return [name for name in TONES if not any(u.name == name and joint in u.joints for u in model.effects)]
+
+
 def _lagged(wave: Floats) -> Floats:
     padded = np.concatenate([np.zeros(RESPONSE_SAMPLES - 1), wave])
     return np.ascontiguousarray(np.lib.stride_tricks.sliding_window_view(padded, RESPONSE_SAMPLES)[:, ::-1])
@@ -90,20 +144,6 @@ def _phase(observation: Observation, point: Point, name: str, column: int, value
         return values[:, None] * angle[None]
     time = (source.inputs.rows + 0.0) * source.inputs.period
     return 2 * np.pi * values[:, None] * time[None]
-
-
-def _grid(observation: Observation, point: Point, name: str, column: int) -> Floats:
-    if name == "torque_ripple":
-        travel = max(float(np.ptp(r.measured[:, column])) for r in observation.records)
-        shortest = SHORTEST_WAVES * observation.unit[column]
-        low, high, step = np.pi / travel, 2 * np.pi / shortest, np.pi / (4 * travel)
-        high = min(high, 100.0) if point.model.machine.modelled_joints and travel > shortest else high
-    else:
-        longest = max(len(r.inputs) * r.inputs.period for r in observation.records)
-        low, high, step = 2.0 / longest, min(HIGHEST, 0.4 / observation.records[0].inputs.period), 0.5 / longest
-    if not low < high:
-        return np.zeros(0)
-    return np.linspace(low, high, int(min(MOST_TONES, max(2.0, (high - low) / step))))
 
 
 def _passed(
@@ -123,28 +163,37 @@ def _passed(
 
 
 def _best_tone(
-    observation: Observation, point: Point, clear: Projection, name: str, joint: int, column: int, response: Floats
+    observation: Observation, point: Point, clear: Projection, name: str, joint: int, response: Floats
 ) -> Probed | None:
-    values = _grid(observation, point, name, column)
-    if not len(values):
-        return None
+    """The tone that explains most of what is left, the tolerance parameters having moved too."""
+    column = point.model.machine.modelled_joints.index(joint)
+    rates = rates_tried(observation, point.model.machine, name, joint)
     columns = np.arange(column, len(point.weighted), len(observation.deviations))
-    waves = [_passed(observation, point, name, column, values, response, t) for t in range(len(observation.records))]
-    both = np.concatenate(waves, axis=1) / observation.deviations[column]
-    sine, cosine = np.ascontiguousarray(both.imag), np.ascontiguousarray(both.real)
+    best, shown = None, np.zeros_like(point.weighted)
+    for own in np.array_split(rates, math.ceil(len(rates) * len(columns) / BLOCK)) if len(rates) else ():
+        waves = [_passed(observation, point, name, column, own, response, t) for t in range(len(observation.records))]
+        both = np.concatenate(waves, axis=1) / observation.deviations[column]
+        sine, cosine = np.ascontiguousarray(both.imag), np.ascontiguousarray(both.real)
+        gains, first, second = _explained(clear, sine, cosine, columns)
+        k = int(np.argmax(gains))
+        if best is None or gains[k] > best[0]:
+            best = float(gains[k]), float(first[k]), float(second[k]), float(own[k])
+            shown[columns] = first[k] * sine[k] + second[k] * cosine[k]
+    if best is None:
+        return None
+    gain, in_sine, in_cosine, rate = best
+    candidate = tone(point.model, name, joint, {"sine": in_sine, "cosine": in_cosine, SHAPES[name]: rate})
+    return None if candidate is None else Probed(candidate, gain, candidate.trials[0], clear.moves(shown), shown)
+
+
+def _explained(
+    clear: Projection, sine: Floats, cosine: Floats, columns: NDArray[np.int64]
+) -> tuple[Floats, Floats, Floats]:
+    """How much pairs of signals (k, m) take off, and how much of either does, (k,) each."""
     by_sine, sines = clear.gains(sine, columns)
     by_cosine, cosines = clear.gains(cosine, columns)
     mixed = clear.cross(sine, cosine, columns)
     determinant = np.maximum(sines * cosines - mixed**2, 1e-9 * sines * cosines + 1e-30)
     first = (cosines * by_sine - mixed * by_cosine) / determinant
     second = (sines * by_cosine - mixed * by_sine) / determinant
-    gains = first * by_sine + second * by_cosine
-    best = int(np.argmax(gains))
-    shape = "cycles" if name == "torque_ripple" else "frequency"
-    trial = {"sine": float(first[best]), "cosine": float(second[best]), shape: float(values[best])}
-    candidate = tone(point.model, name, joint, trial)
-    if candidate is None:
-        return None
-    response = np.zeros_like(point.weighted)
-    response[columns] = first[best] * sine[best] + second[best] * cosine[best]
-    return Probed(candidate, float(gains[best]), candidate.trials[0], clear.moves(response), response)
+    return first * by_sine + second * by_cosine, first, second
