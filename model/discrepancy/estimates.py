@@ -11,22 +11,21 @@ from numpy.typing import NDArray
 from model.discrepancy.answer import Candidate, FoundValue
 from model.discrepancy.observation import Observation
 from model.discrepancy.ranking import Ranking
-from model.discrepancy.refitting import Refitted, says_no_more
+from model.discrepancy.refitting import Judged, Refitted, says_no_more
 from model.fitting.fit import INTERVAL
 from model.fitting.whitening import Whitener
+from model.machine_model.parameter import Parameter
 
 Floats = NDArray[np.float64]
 
 
-def found_values(observation: Observation, found: Refitted) -> dict[str, FoundValue]:
-    """Estimates and 95 % intervals of a candidate's parameters: from the curvature at the solution, and the size and
-    colour of the residual that is left."""
-    point = found.judged.point
-    deviations = standard_deviations(
-        point.precision, found.judged.noise.whiteners, observation.by_joint(point.tangents)
-    )
+def found_values(observation: Observation, found: Judged, parameters: Sequence[Parameter]) -> dict[str, FoundValue]:
+    """Estimates and 95 % intervals of parameters that a fit has found: from the curvature at the solution, and the size
+    and colour of the residual that is left."""
+    point = found.point
+    deviations = standard_deviations(point.precision, found.noise.whiteners, observation.by_joint(point.tangents))
     values = {}
-    for p in found.candidate.free:
+    for p in parameters:
         k = [u.name for u in point.unknowns].index(p.name)
         value, deviation = float(point.values[k]), float(deviations[k])
         unknown = point.unknowns[k]

@@ -21,8 +21,8 @@ Floats = NDArray[np.float64]
 LONGEST_MEMORY = 6
 """Samples that the noise model looks back: 0.12 s at 20 ms."""
 LEAST_DEVIATION = 0.8
-"""Of a prediction error, in deviations of a reading: rounding is not always as random as its variance says. No likelihood
-counts a prediction error as smaller, or a joint at rest would make evidence of shaving a rounding offset."""
+"""Of a prediction error, in deviations of a reading: rounding is not always as random as its variance says. No
+likelihood counts an error as smaller, or a joint at rest would make evidence of shaving a rounding offset."""
 CLIP = 5.0
 """Prediction errors beyond so many deviations count as that: one bad reading proves no effect."""
 

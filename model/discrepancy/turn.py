@@ -33,7 +33,7 @@ def step_of(case: Case, current: Judged, ranking: Ranking, decision: Decision) -
     held = case.held_residuals(before, after)
     held_errors = case.held_errors(after.model, *held)
     refused = case.refused(best, *held, _on(best.candidate.joints, held_errors))
-    values = found_values(observation, best)
+    values = found_values(observation, best.judged, best.candidate.free)
     margin = decision.margin + best.evidence - chosen.evidence
     candidates = tuple(listed(best if r is chosen else r) for r in ranking.fitted)
     candidates += only_probed(ranking, observation.samples)

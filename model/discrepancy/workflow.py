@@ -18,9 +18,11 @@ from model.discrepancy.candidates import OF_THE_CONTROLLER
 from model.discrepancy.case import Case, with_point
 from model.discrepancy.controller_check import ControllerFinding, check_controller, with_used_set_points
 from model.discrepancy.decision import Added, decide
+from model.discrepancy.estimates import found_values
 from model.discrepancy.holdout import HeldOut, held_out
 from model.discrepancy.next_experiment import Asked, Asker, rivals_of
 from model.discrepancy.noise_floor import noise_floor
+from model.discrepancy.notes import NOTHING_HELD_OUT, on_unfinished, on_what_is_stated
 from model.discrepancy.observation import Observation, observed
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.probing import Probed
@@ -97,9 +99,16 @@ def diagnose(
     answered = verdict((*proved, *found.steps), left)
     if answered == "unknown-effect":
         found = _taken_back(found, left)
+    found = _as_last_fitted(observation, found)
     remaining = case.remaining(found.current.point) if answered == "unknown-effect" else ()
     end = found.current.point
     asked = Asked(None) if ask is None else ask.after(answered, observation, end, found.rivals, traces)
+    notes = (
+        f"tolerance parameters: {len(traces)} trace(s), priors as the machine file states them",
+        *on_what_is_stated(_stated(end), {u.name: float(v) for u, v in zip(end.unknowns, end.values, strict=True)}),
+        *on_unfinished((*traces, *holdout)), *(() if holdout else (NOTHING_HELD_OUT,)),
+        *(() if asked.note is None else (asked.note,)),
+    )  # fmt: skip
     answer = Diagnosis(
         verdict=answered, summary=_summary(case, found, answered, proved, remaining),
         steps=(*proved, *found.steps), remaining=remaining,
@@ -109,7 +118,7 @@ def diagnose(
         rmse_holdout=case.held_errors(end.model, *case.held_residuals(given, end)),
         significant=case.thresholds.significant, seconds=time.perf_counter() - begun,
         robot_seconds=float(sum(t.time[-1] - t.time[0] for t in traces)),
-        notes=_notes(case) + (() if asked.note is None else (asked.note,)), next_experiment=asked.experiment,
+        notes=notes, next_experiment=asked.experiment,
     )  # fmt: skip
     progress(1.0, "done")
     return answer
@@ -221,6 +230,23 @@ def _taken_back(found: _Found, left: Sequence[int]) -> _Found:
     return replace(found, current=found.before[wrong], steps=steps)
 
 
+def _as_last_fitted(observation: Observation, found: _Found) -> _Found:
+    """Steps with the last fit's parameters: what was still missing at their turn has bent them."""
+    known = found.current.point.model.by_name
+    steps = []
+    for step in found.steps:
+        own = [known[name] for name in step.parameters] if step.adopted else []
+        last = found_values(observation, found.current, own)
+        steps.append(step.model_copy(update={"parameters": last}) if own else step)
+    return replace(found, steps=tuple(steps))
+
+
+def _stated(point: Point) -> list[Unknown]:
+    """The numbers of the machine itself that a fit may change: no effect's, and no start."""
+    known = point.model.by_name
+    return [u for u in point.unknowns if u.name in known and known[u.name].effect is None]
+
+
 def _adopted(model: Model, point: Point, names: tuple[str, ...]) -> Model:
     fit = {"misfit": point.misfit, "fitted": [u.name for u in point.unknowns if u.name in point.model.by_name]}
     lineage = Lineage(parent=model.identity, traces=names, fit=fit, note="diagnosis")
@@ -238,10 +264,3 @@ def _summary(
     if answered == "ambiguous":
         return reasons.undecided(steps[-1].group, steps[-1].where)
     return reasons.unexplained(case.where(found.current.point), remaining)
-
-
-def _notes(case: Case) -> tuple[str, ...]:
-    found = [f"tolerance parameters: {len(case.names)} trace(s), priors as the machine file states them"]
-    if case.held is None:
-        found.append("no held-out trace was given: nothing here has been shown on data it was not fitted to")
-    return tuple(found)

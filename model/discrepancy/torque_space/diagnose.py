@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
-from model.discrepancy.answer import Candidate, Diagnosis, Step, Verdict
+from model.discrepancy.answer import Candidate, Diagnosis, FoundValue, Step, Verdict
+from model.discrepancy.notes import on_unfinished, on_what_is_stated
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.torque_space import judging
 from model.discrepancy.torque_space.balance import TorqueBalance
@@ -24,7 +25,7 @@ from model.discrepancy.torque_space.locating import located, remaining_shapes
 from model.discrepancy.torque_space.noise_floor import noise_floor
 from model.discrepancy.torque_space.options import TorqueOptions, torque_options
 from model.discrepancy.torque_space.reasons import reason
-from model.discrepancy.torque_space.records import TorqueRecord, torque_records
+from model.discrepancy.torque_space.records import TorqueRecord, acts_until_next_sample, torque_records
 from model.discrepancy.torque_space.search import Fitted, Turn, evidence, look
 from model.discrepancy.torque_space.tolerances import tolerances
 from model.machine_model.model import Lineage, Model
@@ -64,7 +65,8 @@ def diagnose_torques(
         noise_floor(model, traces, cutoff), chosen, progress, cancel or Never(),
     )  # fmt: skip
     work.run()
-    robot = sum(float(t.time[-1] - t.time[0]) for t in (*traces, *holdout))
+    work.notes += on_unfinished((*traces, *holdout))
+    robot = sum(float(t.time[-1] - t.time[0]) for t in traces)
     names = [t.record.trace_id for t in traces]
     return work.answer(model, names, [t.record.trace_id for t in holdout], time.perf_counter() - begun, robot, cutoff)
 
@@ -131,13 +133,33 @@ class _Workflow:
                 continue
             removed = judging.share_removed(fell, left, before, after)
             holds = removed >= self.options.least_share
+            timing = self._timing(turn, chosen) if holds else None
+            if timing is not None:
+                self._take(timing)
+                self.notes.append(_timing_note(timing, self.records))
+                return True
             self.steps.append(self._step(turn, chosen, before, after, removed, holds=holds))
             if holds:
-                self.added |= {p.name for p in chosen.parameters}
-                self.model = chosen.model.with_values(chosen.fit.values)
-                self.now = self._fit(self.model, chosen.fit.values)
+                self._take(chosen)
                 return True
         return False
+
+    def _take(self, chosen: Fitted) -> None:
+        self.added |= {p.name for p in chosen.parameters}
+        self.model = chosen.model.with_values(chosen.fit.values)
+        self.now = self._fit(self.model, chosen.fit.values)
+
+    def _timing(self, turn: Turn, chosen: Fitted) -> Fitted | None:
+        """A delay of less than a sample that explains what the chosen one does. Whether a recorded drive acted at its
+        moment or until the next sample, no record tells: it is taken into the model, and is no effect."""
+        if acts_until_next_sample(self.model.machine):
+            return None
+        least = min(record.sampled for record in self.records)
+        for found in turn.fitted:
+            near = chosen.evidence - found.evidence < self.options.least_margin
+            if near and found.effect == "input_delay" and max(_delays(found)) < least:
+                return found
+        return None
 
     def _judged(self, before: TorqueFit, after: TorqueFit) -> tuple[Floats, Floats]:
         """Mean squares of both on records not fitted to: held-out ones, else blocks of the fitted ones."""
@@ -152,7 +174,7 @@ class _Workflow:
         margin = chosen.evidence - max([0.0, *(r.evidence for r in rivals)])
         near = [r for r in rivals if chosen.evidence - r.evidence < self.options.least_margin]
         group = {c.effect: c for c in reversed([chosen, *near])}
-        values = judging.found_values(chosen, self.data)
+        values = judging.found_values(chosen.fit, chosen.parameters, self.data)
         squares = [judging.mean_squares(self.data.stretches, f.residual) for f in (self.now, chosen.fit)]
         excess = np.maximum(before - self.floor**2, 1e-300)
         usable = np.isfinite(before) & np.isfinite(after) & (before > 1.2 * self.floor**2)
@@ -189,6 +211,9 @@ class _Workflow:
         return Candidate(
             effect=c.effect, joints=c.joints, evidence=c.evidence, refitted=True,
             misfit=float(np.nanmean(squares / self.floor**2)),
+            parameters={
+                p.name: FoundValue(value=c.fit.values[p.name], low=None, high=None, unit=p.unit) for p in c.parameters
+            },
         )  # fmt: skip
 
     def _prune(self, latest: int) -> None:
@@ -210,6 +235,15 @@ class _Workflow:
                 )
                 self.notes.append(f"{names}, step {index + 1}, was taken out again: a later effect explains it")
 
+    def _as_last_fitted(self) -> tuple[Step, ...]:
+        """Steps with the last fit's parameters: what was still missing at their turn has bent them."""
+        steps = []
+        for step in self.steps:
+            own = [self.model.parameter(name) for name in step.parameters] if step.adopted else []
+            last = judging.found_values(self.now, own, self.data)
+            steps.append(step.model_copy(update={"parameters": last}) if own else step)
+        return tuple(steps)
+
     def _shares(self) -> str:
         """Residual as a share of the recorded torque, before and after, a figure that other work gives too."""
         records, where = (self.held, "held-out traces") if self.held else (self.records, "the traces fitted to")
@@ -230,17 +264,31 @@ class _Workflow:
             verdict = "named"
         elif shapes:
             verdict = "unknown-effect"
+        stated = on_what_is_stated((p for p in self.now.adjustables if p.name not in self.added), self.now.values)
         lineage = Lineage(
             parent=before.identity, traces=tuple(traces), fit={"fitted": [p.name for p in self.now.adjustables]},
             note="; ".join(s.reason for s in adopted),
         )  # fmt: skip
         after = self.model.with_values(self.now.values).with_lineage(lineage)
         return Diagnosis(
-            verdict=verdict, summary=_summary(adopted, bool(shapes)), steps=tuple(self.steps), remaining=shapes,
+            verdict=verdict, summary=_summary(adopted, bool(shapes)), steps=self._as_last_fitted(), remaining=shapes,
             model_before=before, model_after=after, traces=tuple(traces), holdout=tuple(holdout), seconds=seconds,
             robot_seconds=robot, significant=self.options.least_evidence,
-            notes=(self._shares(), *_assumptions(cutoff), *self.notes),
+            notes=(self._shares(), *stated, *_assumptions(cutoff), *self.notes),
         )  # fmt: skip
+
+
+def _delays(found: Fitted) -> list[float]:
+    return [found.fit.values[p.name] for p in found.parameters]
+
+
+def _timing_note(found: Fitted, records: Sequence[TorqueRecord]) -> str:
+    times = ", ".join(f"{1e3 * t:.2g} ms" for t in _delays(found))
+    least = 1e3 * min(record.sampled for record in records)
+    return (
+        f"the drive acts {times} after its sample, less than the {least:.2g} ms between samples: taken for how it is "
+        "held between them, and for no effect"
+    )
 
 
 def _summary(adopted: Sequence[Step], more: bool) -> str:

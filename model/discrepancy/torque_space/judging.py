@@ -12,9 +12,9 @@ from model.discrepancy.torque_space.balance import TorqueBalance
 from model.discrepancy.torque_space.fitting import Data, TorqueFit, fit, slopes_of
 from model.discrepancy.torque_space.likelihood import LONGEST_MEMORY, Stretches, stretches_of
 from model.discrepancy.torque_space.records import TorqueRecord
-from model.discrepancy.torque_space.search import Fitted
 from model.fitting.covariance import sandwich
 from model.machine_model.model import Model
+from model.machine_model.parameter import Parameter
 
 Floats = NDArray[np.float64]
 
@@ -84,9 +84,8 @@ def beyond_noise(before: Floats, after: Floats, floor: Floats) -> bool:
         return bool(((after < (1 - AFFECTED) * before) & (before > (MORE_THAN_NOISE * floor) ** 2)).any())
 
 
-def found_values(chosen: Fitted, data: Data) -> dict[str, FoundValue]:
+def found_values(now: TorqueFit, parameters: Sequence[Parameter], data: Data) -> dict[str, FoundValue]:
     """Estimates of an effect's parameters with 95 % intervals that hold for correlated residuals."""
-    now = chosen.fit
     slopes = slopes_of(now)
     used = [p for p in now.adjustables if any(np.abs(s).max() > 0 for s in slopes[p.name])]
     scale = np.array([p.scale for p in used])
@@ -102,7 +101,7 @@ def found_values(chosen: Fitted, data: Data) -> dict[str, FoundValue]:
     covariance = sandwich(information + loose * np.eye(len(used)), scores, prior, LONGEST_MEMORY)
     deviations = dict(zip([p.name for p in used], scale * np.sqrt(np.diag(covariance)), strict=True))
     result = {}
-    for p in chosen.parameters:
+    for p in parameters:
         value, deviation = now.values[p.name], deviations.get(p.name)
         typical = max(abs(value), p.deviation or 0.0)
         if deviation is None or not np.isfinite(deviation) or deviation > BOUNDED * typical:

@@ -45,7 +45,8 @@ class TorqueRecord:
 
     position, speed, acceleration, drive: (k, n) in SI. contact: (k, n) direction of motion as friction has it, in
     [−1, 1]; it turns within a few standard deviations of the speed's noise, or a sample. moving: (m, n) False where a
-    joint rests: friction then takes whatever value holds it, so that the torque says nothing.
+    joint rests: friction then takes whatever value holds it, so that the torque says nothing. period, sampled: s
+    between samples of the grid, and between those of the record itself.
     """
 
     name: str
@@ -60,6 +61,7 @@ class TorqueRecord:
     every: int
     edge: int
     moving: Mask
+    sampled: float
 
     def compared(self, torque: Floats) -> Floats:
         """Torques (k, …) low-passed at the cutoff, at the samples that are compared (m, …)."""
@@ -120,7 +122,7 @@ def _record(trace: Trace, machine: Machine, cutoff: float) -> TorqueRecord:
     if not moving.any():
         raise TraceError(f"trace {raw.name}: no joint moves beyond the noise of its readings")
     return TorqueRecord(
-        raw.name, time, position, speed, acceleration, drive, contact, period, cutoff, every, edge, moving
+        raw.name, time, position, speed, acceleration, drive, contact, period, cutoff, every, edge, moving, raw.period
     )
 
 
