@@ -22,6 +22,8 @@ EXTERNAL = (
             EffectParameter("rest", at.SPRING_REST, "rad", null=None, start=0.0, low=-10.0, high=10.0, deviation=1.0),
         ),
     ),
+    # A record that begins at another moment meets it at another phase. Held-out records get a phase of their own
+    # (`model.discrepancy.holdout`); those that are fitted together share one, which is right for one record alone.
     Effect(
         "periodic_disturbance",
         physics="τ = a sin(2πft) + b cos(2πft), t from the start of the record",
