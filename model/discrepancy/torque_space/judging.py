@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from model.discrepancy.answer import FoundValue, SignalError
 from model.discrepancy.torque_space.balance import TorqueBalance
+from model.discrepancy.torque_space.disturbed import residuals_elsewhere
 from model.discrepancy.torque_space.fitting import Data, TorqueFit, fit, slopes_of
 from model.discrepancy.torque_space.likelihood import LONGEST_MEMORY, Stretches, stretches_of
 from model.discrepancy.torque_space.records import TorqueRecord
@@ -38,7 +39,7 @@ def mean_squares(stretches: Stretches, residual: Sequence[Floats]) -> Floats:
 
 def held_out_squares(model: Model, values: Mapping[str, float], records: tuple[TorqueRecord, ...]) -> Floats:
     """Mean squares (n,) of a fitted model on other records."""
-    return mean_squares(stretches_of(records), TorqueBalance(model, records).residual(values))
+    return mean_squares(stretches_of(records), residuals_elsewhere(model, values, records))
 
 
 def block_squares(now: TorqueFit, data: Data) -> Floats:
@@ -64,9 +65,9 @@ def _fold(count: int, fold: int) -> NDArray[np.bool_]:
 
 def relative_torque_error(model: Model, records: tuple[TorqueRecord, ...]) -> float:
     """√(Σ residual² / Σ torque²) over all joints and compared samples, joints at rest included."""
-    balance = TorqueBalance(model, records)
-    left = sum(float((r**2).sum()) for r in balance.residual({}))
-    return float(np.sqrt(left / sum(float((r**2).sum()) for r in balance.supplied_by_drive())))
+    left = sum(float((r**2).sum()) for r in residuals_elsewhere(model, {}, records))
+    driven = TorqueBalance(model, records).supplied_by_drive()
+    return float(np.sqrt(left / sum(float((r**2).sum()) for r in driven)))
 
 
 def share_removed(fitted_before: Floats, fitted_after: Floats, before: Floats, after: Floats) -> float:
