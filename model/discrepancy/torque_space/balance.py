@@ -20,6 +20,7 @@ from model.simulation.engines import is_rod_arm
 from model.simulation.own_table import own_table
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 BODY_COLUMNS = (*range(at.A, at.SHIFT + 1), at.ROTOR_INERTIA, at.GEAR, at.PRISMATIC, at.SHAPE)
 SENSOR_COLUMNS = (at.POTENTIOMETER_GAIN, at.POTENTIOMETER_OFFSET, at.BEND_1, at.BEND_2, at.BEND_3, at.BEND_4)
@@ -74,6 +75,7 @@ class TorqueBalance:
         for i, record in enumerate(self.records):
             volts = self._volts(record, vector, joints)
             torque = self._missing(record.time, motions[i], needed[i], volts, joints, levels[i], loads[i])
+            torque = _held_by_friction(torque, levels[i], motions[i].contact, record.turns)
             result.append(record.compared(torque))
         return result
 
@@ -133,6 +135,13 @@ class TorqueBalance:
         if loss.any():
             asked = asked / (1 - loss * motion.contact * np.sign(asked))
         return asked - motor + _lost_in_dead_zone(asked, speed, joints)
+
+
+def _held_by_friction(left: Floats, level: Floats, contact: Floats, turns: Mask) -> Floats:
+    """Residual torque (k, n) where a joint turns or stops for a moment: friction holds it there with whatever torque it
+    takes, up to its level (k, n), and not with a share of that which follows the speed."""
+    without = left - contact * level
+    return np.where(turns, without + np.clip(-without, -level, level), left)
 
 
 def _lost_in_dead_zone(asked: Floats, speed: Floats, joints: Floats) -> Floats:

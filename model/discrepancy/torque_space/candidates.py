@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from daq.contracts.machine import BoardPid, DcMotor, NoController, SampledPid
 from model.discrepancy.torque_space.balance import levels_along
 from model.discrepancy.torque_space.options import TorqueOptions
-from model.discrepancy.torque_space.records import TorqueRecord
+from model.discrepancy.torque_space.records import RESOLVED, TorqueRecord
 from model.effects.effect import Effect
 from model.effects.library import library
 from model.machine_model import layout as at
@@ -153,7 +153,10 @@ def _starts(
 
 def _narrowed(p: Parameter, column: int, records: Sequence[TorqueRecord]) -> Parameter:
     """A limit of the drive must leave most of the record below it: a drive that never acts explains any motion, by
-    bodies without mass."""
+    bodies without mass. And friction must not change within the speeds in which its direction is not resolved."""
+    if p.effect == "stribeck_friction" and p.null is None:
+        slowest = RESOLVED * max(float(r.turning[column]) for r in records)
+        return replace(p, low=min(p.high, max(p.low, slowest)))
     if p.effect != "supply_limit":
         return p
     drive = _magnitudes(lambda r: r.drive, records, column)

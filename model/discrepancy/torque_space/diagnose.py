@@ -127,6 +127,8 @@ class _Workflow:
         for chosen in turn.fitted[:CHANCES]:
             if chosen.evidence < self.options.least_evidence:
                 return False
+            if chosen.evidence < self.options.least_evidence + self.options.echo * self._collected(chosen.joints):
+                continue
             before, after = self._judged(self.now, chosen.fit)
             fell, left = (judging.mean_squares(self.data.stretches, f.residual) for f in (self.now, chosen.fit))
             if not judging.beyond_noise(fell, left, self.floor):
@@ -143,6 +145,11 @@ class _Workflow:
                 self._take(chosen)
                 return True
         return False
+
+    def _collected(self, joints: tuple[int, ...]) -> float:
+        """Evidence that the steps taken so far have brought on these joints, or on any for the whole machine's."""
+        near = (s for s in self.steps if s.adopted and (not joints or not s.joints or set(s.joints) & set(joints)))
+        return sum(s.evidence for s in near)
 
     def _take(self, chosen: Fitted) -> None:
         self.added |= {p.name for p in chosen.parameters}
@@ -190,10 +197,14 @@ class _Workflow:
             rmse_holdout=judging.signal_errors(self.model, before, after, self.floor) if self.held else (),
             excess_removed_holdout=lost if self.held else None,
             where=located(self.model, self.records, self.now.residual, self.data.stretches, self.floor),
-            reason=reason(chosen.effect, chosen.joints, values, removed),
+            reason=reason(chosen.effect, chosen.joints, values, removed, slides=self._slides(chosen.joints)),
             adopted=holds,
             rejected_because=None if holds else f"on records not fitted to the mean square falls by only {removed:.1%}",
         )  # fmt: skip
+
+    def _slides(self, joints: tuple[int, ...]) -> bool:
+        machine = self.model.machine
+        return all(machine.joint(j).kind == "prismatic" for j in joints or machine.modelled_joints)
 
     def _candidates(self, turn: Turn) -> tuple[Candidate, ...]:
         fitted = [self._candidate(c) for c in turn.fitted[:SHOWN]]

@@ -17,6 +17,8 @@ class TorqueOptions(BaseModel):
     joints: on these joints only; None for all that the model moves.
     most_steps: effects added at most, one after the other.
     least_evidence: what an effect must take off −2 log posterior, its own parameters and the places looked at paid for.
+    echo: share of the evidence that steps on its joints have brought, which a further effect must bring besides: what
+        is left where a law is not exactly the rig's is no effect of its own.
     least_margin: evidence by which it must lead over every other answer, to be named alone.
     least_share: share by which the torque left on held-out records (in mean square) must fall.
     """
@@ -28,6 +30,7 @@ class TorqueOptions(BaseModel):
     joints: tuple[int, ...] | None = None
     most_steps: Annotated[int, Field(ge=1, le=20)] = 8
     least_evidence: FiniteFloat = 30.0
+    echo: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.02
     least_margin: FiniteFloat = 12.0
     least_share: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.01
 

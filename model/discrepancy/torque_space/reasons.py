@@ -38,14 +38,31 @@ SHAPES = {
 """What each effect looks like in residual torques."""
 
 
-def reason(name: str, joints: tuple[int, ...], values: Mapping[str, FoundValue], removed: float) -> str:
-    """One line: what is seen, the size, and how much of the held-out residual it explains."""
+SLIDING = {
+    "torques": "forces",
+    "torque": "force",
+    "angles": "positions",
+    "angle": "position",
+    "a turn": "a metre, over 2π",
+}
+"""The same words for a joint that slides."""
+
+
+def reason(
+    name: str, joints: tuple[int, ...], values: Mapping[str, FoundValue], removed: float, *, slides: bool = False
+) -> str:
+    """One line: what is seen, the size, and how much of the held-out residual it explains. `slides`: whether the joints
+    do."""
     where = "" if not joints else ("joint " if len(joints) == 1 else "joints ") + ", ".join(map(str, joints)) + ": "
     seen = SHAPES.get(name) or (effect_names()[name].line if name in effect_names() else effect(name).physics)
-    sizes = ", ".join(f"{_short(n)} {v.value:.3g} {v.unit}".replace(" 1,", ",") for n, v in values.items())
+    for word, other in SLIDING.items() if slides else ():
+        seen = seen.replace(word, other)
+    sizes = ", ".join(_size(n, v, several=len(joints) > 1) for n, v in values.items())
     return f"{where}{seen} ({sizes}); it takes {removed:.0%} off the mean square on records not fitted to"
 
 
-def _short(name: str) -> str:
+def _size(name: str, value: FoundValue, *, several: bool) -> str:
     group, last = name.partition(".")[0], name.rpartition(".")[2]
-    return f"{last} of {group}" if "joint" in group else last
+    on = f" of {group}" if several and "joint" in group else ""
+    unit = "" if value.unit == "1" else f" {value.unit}"
+    return f"{last}{on} {value.value:.3g}{unit}"

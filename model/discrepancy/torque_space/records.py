@@ -31,6 +31,8 @@ SHORTEST = 1.0
 """s that a record must last."""
 TURNING_NOISE = 2.0
 """Standard deviations of the speed's noise over which friction turns."""
+RESOLVED = 5.0
+"""Times the speed within which friction turns, from which a joint is known to move."""
 REST_NOISE = 4.0
 """Standard deviations of the speed's noise below which a joint may be at rest, but at least"""
 REST_SHARE = 0.02
@@ -44,9 +46,9 @@ class TorqueRecord:
     """A record of k samples on an even grid of which m are compared.
 
     position, speed, acceleration, drive: (k, n) in SI. contact: (k, n) direction of motion as friction has it, in
-    [−1, 1]; it turns within a few standard deviations of the speed's noise, or a sample. moving: (m, n) False where a
-    joint rests: friction then takes whatever value holds it, so that the torque says nothing. period, sampled: s
-    between samples of the grid, and between those of the record itself.
+    [−1, 1]; it turns within `turning` (n,): a few standard deviations of the speed's noise, or a sample. moving: (m, n)
+    False where a joint rests: friction then takes whatever value holds it, so that the torque says nothing. period,
+    sampled: s between samples of the grid, and between those of the record itself.
     """
 
     name: str
@@ -62,11 +64,17 @@ class TorqueRecord:
     edge: int
     moving: Mask
     sampled: float
+    turning: Floats
 
     def compared(self, torque: Floats) -> Floats:
         """Torques (k, …) low-passed at the cutoff, at the samples that are compared (m, …)."""
         smooth = low_passed(torque, self.cutoff, self.period)
         return np.ascontiguousarray(smooth[self.rows])
+
+    @property
+    def turns(self) -> Mask:
+        """(k, n) where a joint is so slow that its smoothed speed does not tell whether it stands."""
+        return np.abs(self.speed) < RESOLVED * self.turning
 
     @property
     def rows(self) -> slice:
@@ -122,7 +130,20 @@ def _record(trace: Trace, machine: Machine, cutoff: float) -> TorqueRecord:
     if not moving.any():
         raise TraceError(f"trace {raw.name}: no joint moves beyond the noise of its readings")
     return TorqueRecord(
-        raw.name, time, position, speed, acceleration, drive, contact, period, cutoff, every, edge, moving, raw.period
+        raw.name,
+        time,
+        position,
+        speed,
+        acceleration,
+        drive,
+        contact,
+        period,
+        cutoff,
+        every,
+        edge,
+        moving,
+        raw.period,
+        turning,
     )
 
 
