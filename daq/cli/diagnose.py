@@ -22,7 +22,7 @@ from daq.cli.model_input import (
     read_traces,
 )  # fmt: skip
 from daq.cli.remote.jobs import numbers_of, require_no_programs
-from daq.contracts.errors import SpecError
+from daq.contracts.carried_load import carrying
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -132,19 +132,10 @@ def _beginning(call: Invocation, traces: Sequence[Trace], model: str | None, loa
 
 
 def with_load(model: Model, kilograms: float) -> Model:
-    """The model of the same machine with another load at its end, known as well as the old one relative to its size.
-
-    Raises SpecError for a machine that has no load.
-    """
+    """The model of the same machine with another load at its end. Raises SpecError as `carrying` does."""
     from model.machine_model.model import Model
 
-    load = model.machine.load
-    if load is None:
-        raise SpecError(f"--load: {model.machine.title} has no load in its machine file; give it one there")
-    scale = kilograms / load.value if load.value > 0 else 1.0
-    deviation = None if load.deviation is None else max(load.deviation * scale, 1e-3)
-    changed = load.model_copy(update={"value": kilograms, "deviation": deviation, "source": "given with --load"})
-    machine = model.machine.model_copy(update={"load": changed})
+    machine = carrying(model.machine, kilograms, "given with --load")
     values = {name: value for name, value in model.values.items() if name != "load.mass"}
     fields = {name: getattr(model, name) for name in type(model).model_fields}
     return Model(**{**fields, "machine": machine, "values": values})

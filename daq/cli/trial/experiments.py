@@ -6,12 +6,9 @@ import csv
 import math
 from pathlib import Path
 
+from daq.contracts.carried_load import carrying
 from daq.contracts.experiment import ExperimentSpec, Pause, Ramp, Segment, Sequence
 from daq.contracts.machine import Machine
-from daq.contracts.quantity import Quantity
-
-RELATIVE_LOAD_DEVIATION = 0.1
-"""Expected deviation of masses (section 7.4 of the source)."""
 
 
 def trial_experiment(name: str) -> ExperimentSpec:
@@ -46,8 +43,4 @@ def machine_with_load(machine: Machine, kilograms: float | None) -> Machine:
     """The machine with the load that was announced; None: its own."""
     if kilograms is None or machine.load is None:
         return machine
-    load = Quantity(
-        value=kilograms, unit="kg", source="announced", low=machine.load.low, high=machine.load.high,
-        deviation=RELATIVE_LOAD_DEVIATION * kilograms,
-    )  # fmt: skip
-    return machine.model_copy(update={"load": load})
+    return carrying(machine, kilograms, "announced")

@@ -1,0 +1,34 @@
+"""A machine with another load at its end than its file states."""
+
+from __future__ import annotations
+
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import Machine
+from daq.contracts.quantity import Quantity
+
+LEAST_DEVIATION = 1e-3
+"""kg: no load that is told is known better."""
+
+
+def carrying(machine: Machine, kilograms: float, source: str) -> Machine:
+    """The machine with a load of so many kg, known as well as the file's own relative to its size; where the file
+    states an arm without load, as well as that one in kg.
+
+    Args:
+        source: who says so.
+
+    Raises SpecError for a machine whose file has no load, and for a load outside the file's bounds.
+    """
+    own = machine.load
+    if own is None:
+        raise SpecError(f"load {kilograms:g} kg: {machine.title} has no load in its machine file; give it one there")
+    low, high = 0.0 if own.low is None else own.low, own.high
+    if kilograms < low or (high is not None and kilograms > high):
+        allowed = f"at least {low:g} kg" if high is None else f"{low:g} to {high:g} kg"
+        raise SpecError(f"load {kilograms:g} kg: the machine file of {machine.title} allows {allowed}")
+    scale = kilograms / own.value if own.value > 0 else 1.0
+    deviation = None if own.deviation is None else max(own.deviation * scale, LEAST_DEVIATION)
+    load = Quantity(
+        value=kilograms, unit=own.unit, source=source, low=own.low, high=own.high, deviation=deviation
+    )  # fmt: skip
+    return machine.model_copy(update={"load": load})
