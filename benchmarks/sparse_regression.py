@@ -4,11 +4,13 @@
     python -m benchmarks sparse_regression --cases FOLDER    with the truth, for FOLDER/SEED/fit.mcap of that secret
 
 Brunton, Proctor and Kutz (2016) with a library of physics instead of polynomials, which is the most that such a
-regression can be given here: the rigid bodies and motors of the model are taken off first (inverse dynamics on smoothed
-derivatives), tolerances of the model may answer with the deviations that the machine file expects of them, and every
-effect that the diagnosis knows has its own terms, those that need a shape at several shapes. pysindy's sequentially
-thresholded least squares then keeps few terms; an effect ranks by the threshold up to which one of its terms survives.
-A wrong gain and lost set points are regressed where they act, on the recorded drive.
+regression can be given here. The rigid bodies and motors of the model are taken off first: inverse dynamics on smoothed
+derivatives, the drive smoothed alike and shifted to when it acts, where joints move. Tolerances of the model may answer
+with the deviations that the machine file expects of them. Every effect that the diagnosis knows has its own terms,
+those that need a shape at several shapes; frequencies of disturbances and cycles of ripples are the peaks of the
+residual's periodogram, over time and over angle. pysindy's sequentially thresholded least squares then keeps few terms;
+an effect ranks by the threshold up to which one of its terms survives. A wrong gain and lost set points are regressed
+where they act, on the recorded drive.
 """
 
 from __future__ import annotations
@@ -27,18 +29,21 @@ from pathlib import Path
 import numpy as np
 import pysindy
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
+from scipy.ndimage import binary_erosion
+from scipy.signal import find_peaks, lombscargle, savgol_filter
 
 from benchmarks.figures import Figure, show
 from daq.contracts.machine import BoardPid
 from daq.contracts.trace import Trace
 from daq.traces.reader import read_trace
+from model.discrepancy.torque_space.records import acts_until_next_sample
 from model.fitting.options import HELD_BY_DEFAULT
 from model.machine_model import layout as at
 from model.machine_model.model import Model, base_model
 from model.simulation.torque_space import TorqueBalance, torque_balance
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Place = tuple[str, int | None]
 """An effect, and the joint (from 1) it is on; None for the whole machine."""
 
@@ -50,8 +55,16 @@ RIDGE = 0.05
 """Share of a term's own square: terms that are nearly alike must share what they explain instead of cancelling."""
 STRIBECK_SPEEDS = (0.05, 0.15, 0.4)
 STICTION_SPEED = 0.015
-RIPPLES = (4, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48, 60)
-FREQUENCIES = np.arange(0.2, 6.05, 0.2)
+PEAKS = 3
+"""Highest peaks of a joint's periodogram that a wave is tried at."""
+HIGHEST = 6.0
+"""Hz; beyond, the smoothing leaves little."""
+SHORTEST_WAVE = 0.01
+"""Of a ripple, as a share of the joint's travel."""
+MOVING = 0.03
+"""Share of its higher speeds from which a joint counts as moving."""
+ARM = 0.01
+"""m by which the arm of load-dependent friction is moved."""
 LIMITS = (0.9, 0.75, 0.6, 0.45)
 LEAST_GAIN_ERROR = 0.02
 """Relative residual of the controller's law from which it is the controller that is wrong."""
@@ -71,18 +84,20 @@ def ranked_effects(trace: Trace, model: Model) -> list[Place]:
 
 
 def _torque_scores(trace: Trace, model: Model) -> Iterator[tuple[Place, float]]:
-    base = torque_balance(model, trace, WINDOW)
+    base = torque_balance(model, _as_it_acts(trace, model), WINDOW)
     assert base.residual is not None
     target = base.residual
-    nuisances, scale = _tolerances(trace, model, target)
-    terms = list(_terms(trace, model, base, target))
-    keep = slice(10, len(target) - 10)
-    size = target[keep].std(axis=0)
+    nuisances = _tolerances(trace, model, target)
+    keep = _moving(base)
+    size = np.array([column[kept].std() for column, kept in zip(target.T, keep.T, strict=True)])
     y = _stacked(target / size, keep)
-    basis = _stacked_columns([n / size for n in nuisances], keep)
+    solve = _answered(_stacked_columns([n / size for n in nuisances], keep))
+    y = y - solve(y)
+    left = np.zeros_like(target)
+    left.T[keep.T] = y
+    terms = list(_terms(trace, model, base, target, left * size))
     library = _stacked_columns([column / size for _, column in terms], keep)
-    solve = _answered(basis, scale)
-    y, library = y - solve(y), library - solve(library)
+    library = library - solve(library)
     norms = np.linalg.norm(library, axis=0)
     used = norms > 1e-6 * np.sqrt(len(y))
     places = [place for (place, _), u in zip(terms, used, strict=True) if u]
@@ -90,8 +105,11 @@ def _torque_scores(trace: Trace, model: Model) -> Iterator[tuple[Place, float]]:
     yield from _survivors(normalised, y, places)
 
 
-def _survivors(library: Floats, y: Floats, places: list[Place]) -> Iterator[tuple[Place, float]]:
-    """Each place with the highest threshold that one of its terms survives, and its coefficient for ties."""
+def _survivors(library: Floats, y: Floats, places: list[Place | None]) -> Iterator[tuple[Place, float]]:
+    """Each place with the highest threshold that one of its terms survives, and its coefficient for ties.
+
+    Terms without a place only take their part of the residual.
+    """
     triangle = np.asarray(np.linalg.qr(np.column_stack([library, y]), mode="r"))  # the same least squares, fewer rows
     count, library, y = len(y), triangle[:, :-1], triangle[:, -1]
     for threshold in THRESHOLDS:
@@ -101,53 +119,94 @@ def _survivors(library: Floats, y: Floats, places: list[Place]) -> Iterator[tupl
             optimizer.fit(library, y[:, None])
         coefficients = np.abs(np.asarray(optimizer.coef_).ravel())
         for k in np.flatnonzero(coefficients > 0):
-            yield places[k], float(threshold + 1e-3 * coefficients[k])
+            if (place := places[k]) is not None:
+                yield place, float(threshold + 1e-3 * coefficients[k])
 
 
-def _stacked(signal: Floats, keep: slice) -> Floats:
-    return np.asarray(signal[keep].T.ravel())
+def _as_it_acts(trace: Trace, model: Model) -> Trace:
+    """The trace with its drive at the times at which it acts, smoothed as the motion is.
+
+    A controller answers the noise of its readings with far more drive than the motion asks for.
+    """
+    assert trace.drive is not None
+    drive = _smooth(trace.drive, float(np.median(np.diff(trace.time))))
+    held = 0.5 * float(model.vector[at.PERIOD]) if acts_until_next_sample(model.machine) else 0.0
+    for j, joint in enumerate(model.machine.modelled_joints):
+        late = held + float(model.vector[at.DELAY] + model.vector[at.slot(j + 1, at.EXTRA_DELAY)])
+        column = trace.column(joint)
+        drive[:, column] = np.interp(trace.time - late, trace.time, drive[:, column])
+    return replace(trace, drive=drive)
 
 
-def _stacked_columns(signals: list[Floats], keep: slice) -> Floats:
+def _moving(base: TorqueBalance) -> Mask:
+    """Samples (m, n) in which a joint moves, the whole window that smooths them through.
+
+    At rest friction takes whatever value holds the joint, so that the torque says nothing.
+    """
+    speed, window = np.abs(base.velocity), round(WINDOW / float(np.median(np.diff(base.time)))) | 1
+    moving = speed > MOVING * np.quantile(speed, 0.95, axis=0)
+    return np.asarray(binary_erosion(moving, np.ones((window, 1), dtype=bool)))
+
+
+def _stacked(signal: Floats, keep: Mask) -> Floats:
+    return np.asarray(signal.T[keep.T])
+
+
+def _stacked_columns(signals: list[Floats], keep: Mask) -> Floats:
     return np.stack([_stacked(s, keep) for s in signals], axis=1)
 
 
-def _answered(basis: Floats, scale: float) -> Callable[[Floats], Floats]:
+def _answered(basis: Floats) -> Callable[[Floats], Floats]:
     """What the tolerances would take of a signal: ridge regression, coefficients in expected deviations."""
-    inverse = np.linalg.inv(basis.T @ basis + scale * np.eye(basis.shape[1]))
+    inverse = np.linalg.inv(basis.T @ basis + np.eye(basis.shape[1]))
     return lambda signal: basis @ (inverse @ (basis.T @ signal))
 
 
-def _tolerances(trace: Trace, model: Model, target: Floats) -> tuple[list[Floats], float]:
+def _tolerances(trace: Trace, model: Model, target: Floats) -> list[Floats]:
     """Change of the residual for each tolerance parameter moved by its expected deviation."""
     columns = []
     for p in model.parameters:
-        if p.deviation is None or any(fnmatchcase(p.name, h) for h in HELD_BY_DEFAULT) or p.name == "controller.delay":
+        if p.deviation is None or any(fnmatchcase(p.name, h) for h in HELD_BY_DEFAULT):
             continue
         step = p.deviation if p.value + p.deviation <= p.high else -p.deviation
-        moved = torque_balance(model.with_values({p.name: p.value + step}), trace, WINDOW).residual
-        assert moved is not None
-        columns.append(moved - target)
-    return columns, 1.0
+        columns.append(_moved(model.with_values({p.name: p.value + step}), trace, target))
+    return columns
 
 
-def _terms(trace: Trace, model: Model, base: TorqueBalance, target: Floats) -> Iterator[tuple[Place, Floats]]:
-    yield from _own_terms(trace, model, base)
+def _terms(
+    trace: Trace, model: Model, base: TorqueBalance, target: Floats, left: Floats
+) -> Iterator[tuple[Place | None, Floats]]:
+    """Terms with their places. left: what the tolerances leave of the target, the residual torque, where a joint
+    moves; else 0."""
+    yield from _own_terms(trace, model, base, left)
     for name, values in (
         ("payload", {"mass": 0.1}),
         ("base_tilt", {"about_x": 0.02}),
         ("base_tilt", {"about_y": 0.02}),
     ):
         yield (name, None), _moved(model.with_effect(name, (), values), trace, target)
-    for joint in model.machine.modelled_joints:
+    joints = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
+    for j, joint in enumerate(model.machine.modelled_joints):
         for name, values in (("link_mass", {"added": 0.1}), ("centre_of_mass", {"shift": 0.01}),
-                             ("back_emf_error", {"relative": 0.05})):  # fmt: skip
+                             ("back_emf_error", {"relative": 0.05}), ("input_delay", {"time": 0.005})):  # fmt: skip
             yield (name, joint), _moved(model.with_effect(name, (joint,), values), trace, target)
+        arm = {"arm": float(joints[j, at.COULOMB_ARM]) + ARM}
+        yield ("load_dependent_friction", joint), _moved(_with_friction(model, joint, arm), trace, target)
         yield from _sensor_terms(trace, model, joint, target)
 
 
+def _with_friction(model: Model, joint: int, values: dict[str, float]) -> Model:
+    """The model with other load-dependent friction, which many machines state already: a share of what weighs on the
+    joint."""
+    name = "load_dependent_friction"
+    if any(use.name == name and joint in use.joints for use in model.effects):
+        return model.with_values({f"joint{joint}.{name}.{part}": value for part, value in values.items()})
+    return model.with_effect(name, (joint,), values)
+
+
 def _moved(model: Model, trace: Trace, target: Floats) -> Floats:
-    residual = torque_balance(model, trace, WINDOW).residual
+    """Change of the residual from the target to that of another model, or of a changed trace."""
+    residual = torque_balance(model, _as_it_acts(trace, model), WINDOW).residual
     assert residual is not None
     return residual - target
 
@@ -163,48 +222,72 @@ def _sensor_terms(trace: Trace, model: Model, joint: int, target: Floats) -> Ite
     for name, error in errors:
         position = trace.position.copy()
         position[:, column] -= error
-        residual = torque_balance(model, replace(trace, position=position), WINDOW).residual
-        assert residual is not None
-        yield (name, joint), residual - target
+        yield (name, joint), _moved(model, replace(trace, position=position), target)
 
 
-def _own_terms(trace: Trace, model: Model, base: TorqueBalance) -> Iterator[tuple[Place, Floats]]:
-    """Terms that act as a torque at one joint."""
+def _own_terms(trace: Trace, model: Model, base: TorqueBalance, left: Floats) -> Iterator[tuple[Place | None, Floats]]:
+    """Terms that act as a torque at one joint.
+
+    Where the motor's torque or its volts make a term, they are those that the motion asks for: the noise of what was
+    recorded is in the residual too, and a term that shares it explains it. A spring is a torque in proportion to the
+    angle beside a constant one, which by itself is no spring: it has no place.
+    """
     assert base.motor is not None
     assert trace.drive is not None
     step = float(np.median(np.diff(base.time)))
     joints = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
     for j, joint in enumerate(model.machine.modelled_joints):
-        v, q, motor = base.velocity[:, j], base.position[:, j], base.motor[:, j]
+        if joints[j, at.TORQUE_CONSTANT] == 0:
+            continue
+        v, q, asked = base.velocity[:, j], base.position[:, j], (base.required - base.friction)[:, j]
         volts = trace.drive[:, trace.column(joint)]
+        gain = joints[j, at.GEAR] * joints[j, at.TORQUE_CONSTANT] / joints[j, at.RESISTANCE]
+        wanted = asked / gain + joints[j, at.GEAR] * joints[j, at.BACK_EMF] * v
         sign = np.tanh(v / max(0.02 * float(np.quantile(np.abs(v), 0.95)), 1e-6))
-        load = np.abs(base.required[:, j])
-        own: list[tuple[str, Floats]] = [
+        own: list[tuple[str | None, Floats]] = [
             ("viscous_friction", v), ("coulomb_friction", sign), ("direction_dependent_friction", sign**2),
-            ("load_dependent_friction", sign * load), ("gear_loss", sign * np.abs(motor)),
-            ("stiction", sign * np.exp(-np.abs(v) / STICTION_SPEED)), ("spring_torque", q),
-            ("dead_zone", np.sign(volts)), ("resistance_drift", motor * np.cumsum(motor**2)),
-            ("input_delay", np.gradient(_smooth(volts, step), step)),
-            ("motor_inductance", np.gradient(_smooth(motor, step), step)),
+            ("gear_loss", sign * np.abs(asked)), ("stiction", sign * np.exp(-np.abs(v) / STICTION_SPEED)),
+            ("spring_torque", q - q.mean()), (None, np.ones_like(q)),
+            ("dead_zone", np.sign(wanted)), ("resistance_drift", asked * np.cumsum(base.motor[:, j] ** 2)),
+            ("motor_inductance", np.gradient(asked, step)),
             ("joint_compliance", _second(base.required[:, j], step)),
             ("backlash", _second(np.tanh(base.required[:, j] / (0.05 * base.required[:, j].std())), step)),
         ]  # fmt: skip
         own += [("stribeck_friction", sign * np.exp(-np.abs(v) / speed)) for speed in STRIBECK_SPEEDS]
-        own += [("torque_ripple", wave(n * q)) for n in RIPPLES for wave in (np.sin, np.cos)]
-        own += [
-            ("periodic_disturbance", wave(2 * np.pi * f * base.time)) for f in FREQUENCIES for wave in (np.sin, np.cos)
-        ]
+        own += _waves(base, left, j)
         largest = float(np.abs(volts).max())
         own += [("supply_limit", np.sign(volts) * np.maximum(np.abs(volts) - s * largest, 0.0)) for s in LIMITS]
         for name, signal in own:
             column = np.zeros_like(base.velocity)
             column[:, j] = _smooth(signal, step) if name in ("dead_zone", "supply_limit") else signal
-            if np.abs(column).max() > 0 and joints[j, at.TORQUE_CONSTANT] != 0:
-                yield (name, joint), column
+            if np.abs(column).max() > 0:
+                yield None if name is None else (name, joint), column
+
+
+def _waves(base: TorqueBalance, left: Floats, j: int) -> Iterator[tuple[str, Floats]]:
+    """Sines and cosines over angle and time, of the cycles and frequencies at which the residual has its peaks."""
+    moving, speed = left[:, j] != 0, np.abs(base.velocity[:, j])
+    if not moving.any():
+        return
+    travel, length = float(np.ptp(base.position[moving, j])), float(np.ptp(base.time))
+    highest = 2 * np.pi * min(HIGHEST / float(np.quantile(speed[moving], 0.25)), 1 / (SHORTEST_WAVE * travel))
+    for name, along, span, low, high in (
+        ("torque_ripple", base.position[:, j], travel, 2 * np.pi / travel, highest),
+        ("periodic_disturbance", base.time, length, 4 * np.pi / length, 2 * np.pi * HIGHEST),
+    ):
+        for rate in _peaks(along[moving], left[moving, j], np.arange(low, high, np.pi / (2 * span))):
+            yield from ((name, wave(rate * along)) for wave in (np.sin, np.cos))
+
+
+def _peaks(along: Floats, signal: Floats, rates: Floats) -> Floats:
+    """The rates (rad a unit of `along`) of the highest peaks of a signal's periodogram (Lomb 1976, Scargle 1982)."""
+    power = np.pad(np.asarray(lombscargle(along, signal - signal.mean(), rates)), 1)
+    tops, _ = find_peaks(power)
+    return np.asarray(rates[tops[np.argsort(-power[tops])][:PEAKS] - 1])
 
 
 def _smooth(signal: Floats, step: float) -> Floats:
-    return np.asarray(savgol_filter(signal, max(5, round(WINDOW / step)) | 1, 3))
+    return np.asarray(savgol_filter(signal, max(5, round(WINDOW / step)) | 1, 3, axis=0))
 
 
 def _second(signal: Floats, step: float) -> Floats:
