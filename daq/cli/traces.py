@@ -13,7 +13,7 @@ from daq.contracts.errors import SpecError, TraceError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from daq.contracts.trace import Trace
+    from daq.contracts.trace import Trace, TraceRecord
     from daq.traces.catalogue import TraceSummary
 
 app = typer.Typer(add_completion=False, help="List, show, plot, convert and verify traces.", no_args_is_help=True)
@@ -106,7 +106,7 @@ def show(
         return
     record = found.record
     what = record.spec.trajectory.kind if record.spec else "import"
-    print(f"{record.trace_id}: {what} on {record.robot} ({record.source}), {record.outcome or 'unfinished'}")
+    print(f"{record.trace_id}: {what} on {record.robot} ({record.source}), {_ended(record)}")
     print(f"recorded {record.created:%Y-%m-%d %H:%M:%S %Z} with {record.software}")
     print(f"{len(found)} samples on joints {', '.join(map(str, found.joints))}, {found.missing} missing")
     if record.operator or record.notes:
@@ -148,7 +148,11 @@ def print_figures(trace: Trace) -> None:
 
 
 def _angle(value: float | None, unit: str) -> str:
-    return "–" if value is None else f"{value:.2f}{unit}"
+    return "–" if value is None else f"{value:.2f}{'' if unit == '°' else ' '}{unit}"
+
+
+def _ended(record: TraceRecord) -> str:
+    return record.outcome or ("outcome not stated" if record.source == "imported" else "unfinished")
 
 
 @app.command()
@@ -186,7 +190,13 @@ def export(
 @app.command("import")
 def import_(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(help="A .csv file: time, then set_point_N, position_N, drive_N, velocity_N.")],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="A .csv file: time, then set_point_N, position_N, drive_N, velocity_N. "
+            "A .toml of its name says what columns cannot: drive_unit, machine, robot."
+        ),
+    ],
     folder: FolderOption = None,
 ) -> None:
     """Take in a trace of another rig or tool."""

@@ -20,7 +20,7 @@ def joint_figures(trace: Trace) -> list[JointFigureSet]:
 
 def _figures(trace: Trace, joint: int, column: int) -> JointFigureSet:
     machine = trace.record.machine
-    prismatic = machine is not None and machine.joint(joint).kind == "prismatic"
+    prismatic = trace.record.drive_unit == "N" if machine is None else machine.joint(joint).kind == "prismatic"
     scale = 1e3 if prismatic else math.degrees(1.0)
     position = trace.position[:, column] * scale
     set_point = None if trace.set_point is None else trace.set_point[:, column] * scale
