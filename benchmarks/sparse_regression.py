@@ -40,7 +40,7 @@ from model.discrepancy.torque_space.records import acts_until_next_sample
 from model.fitting.options import HELD_BY_DEFAULT
 from model.machine_model import layout as at
 from model.machine_model.model import Model, base_model
-from model.simulation.torque_space import TorqueBalance, torque_balance
+from model.simulation.torque_space import TorquesAlongTrace, torque_balance
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -138,7 +138,7 @@ def _as_it_acts(trace: Trace, model: Model) -> Trace:
     return replace(trace, drive=drive)
 
 
-def _moving(base: TorqueBalance) -> Mask:
+def _moving(base: TorquesAlongTrace) -> Mask:
     """Samples (m, n) in which a joint moves, the whole window that smooths them through.
 
     At rest friction takes whatever value holds the joint, so that the torque says nothing.
@@ -174,7 +174,7 @@ def _tolerances(trace: Trace, model: Model, target: Floats) -> list[Floats]:
 
 
 def _terms(
-    trace: Trace, model: Model, base: TorqueBalance, target: Floats, left: Floats
+    trace: Trace, model: Model, base: TorquesAlongTrace, target: Floats, left: Floats
 ) -> Iterator[tuple[Place | None, Floats]]:
     """Terms with their places. left: what the tolerances leave of the target, the residual torque, where a joint
     moves; else 0."""
@@ -225,7 +225,9 @@ def _sensor_terms(trace: Trace, model: Model, joint: int, target: Floats) -> Ite
         yield (name, joint), _moved(model, replace(trace, position=position), target)
 
 
-def _own_terms(trace: Trace, model: Model, base: TorqueBalance, left: Floats) -> Iterator[tuple[Place | None, Floats]]:
+def _own_terms(
+    trace: Trace, model: Model, base: TorquesAlongTrace, left: Floats
+) -> Iterator[tuple[Place | None, Floats]]:
     """Terms that act as a torque at one joint.
 
     Where the motor's torque or its volts make a term, they are those that the motion asks for: the noise of what was
@@ -264,7 +266,7 @@ def _own_terms(trace: Trace, model: Model, base: TorqueBalance, left: Floats) ->
                 yield None if name is None else (name, joint), column
 
 
-def _waves(base: TorqueBalance, left: Floats, j: int) -> Iterator[tuple[str, Floats]]:
+def _waves(base: TorquesAlongTrace, left: Floats, j: int) -> Iterator[tuple[str, Floats]]:
     """Sines and cosines over angle and time, of the cycles and frequencies at which the residual has its peaks."""
     moving, speed = left[:, j] != 0, np.abs(base.velocity[:, j])
     if not moving.any():

@@ -30,7 +30,7 @@ ORDER = 3
 
 
 @dataclass(frozen=True)
-class TorqueBalance:
+class TorquesAlongTrace:
     """Torques at the joints along a trace, (m, n), N·m (N on prismatic joints).
 
     required: D q̈ + H + G, rotors included. motor: of the recorded drive, back-EMF taken off; None without drive.
@@ -51,7 +51,7 @@ class TorqueBalance:
         return None if self.motor is None else self.motor + self.friction - self.required
 
 
-def torque_balance(model: Model, trace: Trace, window: float = WINDOW) -> TorqueBalance:
+def torque_balance(model: Model, trace: Trace, window: float = WINDOW) -> TorquesAlongTrace:
     """Inverse dynamics of a trace by a model: bodies, motors, viscous and Coulomb friction.
 
     Other effects stay in the residual, where a regression is to find them; `model.torque_space` knows them all.
@@ -81,7 +81,7 @@ def torque_balance(model: Model, trace: Trace, window: float = WINDOW) -> Torque
         volts = np.clip(trace.drive[:, columns], -joints[:, at.SUPPLY], joints[:, at.SUPPLY])
         back_emf = joints[:, at.BACK_EMF] * (1 + joints[:, at.BACK_EMF_ERROR]) * gear * velocity
         motor = gear * joints[:, at.TORQUE_CONSTANT] * (volts - back_emf) / joints[:, at.RESISTANCE]
-    return TorqueBalance(trace.time, position, velocity, acceleration, required, friction, motor)
+    return TorquesAlongTrace(trace.time, position, velocity, acceleration, required, friction, motor)
 
 
 def _motion(trace: Trace, columns: list[int], window: float) -> tuple[Floats, Floats, Floats]:
