@@ -14,8 +14,6 @@ TONES = ("torque_ripple", "periodic_disturbance")
 """Effects with a frequency, which trial sizes cannot find: a spectrum proposes it."""
 FLEXIBLE = ("backlash", "joint_compliance")
 """Effects that cost five times the simulation: tried only on joints where something is wrong."""
-OF_THE_CONTROLLER = ("wrong_gain", "lost_set_points")
-"""Effects that the recorded controller's own numbers prove or exclude, where it is recorded."""
 TRIALS: Mapping[str, tuple[float, ...]] = {
     "backlash": (0.15, 0.5, 1.5),
     "joint_compliance": (0.15, 0.5, 1.5),

@@ -19,7 +19,7 @@ from model.discrepancy.noise_model import NoiseModel, noise_model
 from model.discrepancy.observation import Observation
 from model.discrepancy.probing import Probed
 from model.discrepancy.search import Point, point_at, searched, settled
-from model.discrepancy.tones import MOST_TONES
+from model.discrepancy.tones import tones_tried
 from model.fitting.unknowns import Unknown
 
 Floats = NDArray[np.float64]
@@ -220,7 +220,9 @@ def with_evidence(observation: Observation, before: Judged, probed: Probed, poin
     after = judge(observation, point)
     price = len(probed.candidate.free) * math.log(observation.samples)
     if probed.candidate.name in TONES:
-        price += 2 * math.log(MOST_TONES) - math.log(observation.samples)  # the tries are what the frequency costs
+        price += 2 * math.log(tones_tried(observation, probed.candidate)) - math.log(
+            observation.samples
+        )  # the tries are what the frequency costs
     fall = before.description - after.description
     if point.cost > before.point.cost:  # the fit did not come to its end: what more freedom leaves is never more
         fall = min(fall, before.point.cost - point.cost)

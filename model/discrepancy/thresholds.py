@@ -28,7 +28,7 @@ class Thresholds:
         interesting: gain of a probe from which a candidate is worth a fit.
     """
 
-    significant: float = 12.0
+    significant: float = 18.0
     echo: float = 0.05
     distant_echo: float = 0.01
     kin: float = 0.5

@@ -14,9 +14,14 @@ from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.discrepancy import reasons
 from model.discrepancy.answer import Diagnosis, RemainingShape, Step, Verdict
-from model.discrepancy.candidates import OF_THE_CONTROLLER
 from model.discrepancy.case import Case, with_point
-from model.discrepancy.controller_check import ControllerFinding, check_controller, with_used_set_points
+from model.discrepancy.controller_check import (
+    ControllerFinding,
+    check_controller,
+    judged_by_records,
+    with_findings,
+    with_used_set_points,
+)
 from model.discrepancy.decision import Added, decide
 from model.discrepancy.estimates import found_values
 from model.discrepancy.holdout import HeldOut, held_out
@@ -24,7 +29,7 @@ from model.discrepancy.next_experiment import Asked, Asker, rivals_of
 from model.discrepancy.noise_floor import noise_floor
 from model.discrepancy.notes import NOTHING_HELD_OUT, on_unfinished, on_what_is_stated
 from model.discrepancy.observation import Observation, observed
-from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.probing import Probed
 from model.discrepancy.proved import proved_step
 from model.discrepancy.ranking import Ranking, ranked
@@ -78,20 +83,21 @@ def diagnose(
         CancelledError: when asked to end.
     """
     options, cancel, begun = options or DiagnosisOptions(), cancel or Never(), time.perf_counter()
+    check_options(options, model)
     _refuse_shared(traces, holdout)
     if isinstance(model.machine.controller, NoController) or any(t.set_point is None for t in traces):
         from model.discrepancy.torque_space.diagnose import diagnose_torques  # here: rigs with a controller need none
 
         return diagnose_torques(model, traces, holdout, options, progress, cancel)
     progress(0.0, "checking the controller's own numbers")
-    findings = check_controller(traces, model.machine)
-    known = _with_findings(model, findings)
+    findings = check_controller(traces, model.machine, model)
+    known, judged = with_findings(model, findings), judged_by_records(traces, model.machine)
     traces, holdout = tuple(_used(t, findings) for t in traces), tuple(_used(t, findings) for t in holdout)
     progress(0.02, "fitting the tolerance parameters")
     observation, wider, unknowns = observed(known, traces)
     given = _given(observation, wider, unknowns)
     point = _tolerances(observation, given)
-    case = _case(observation, held_out(known, holdout), point, traces, options)
+    case = _case(observation, held_out(known, holdout), point, traces, options, judged)
     found = _searched(case, judge(observation, point), progress, cancel)
     progress(0.95, "writing the answer")
     proved = tuple(proved_step(model, observation, f) for f in findings)
@@ -125,12 +131,12 @@ def diagnose(
 
 
 def _case(
-    observation: Observation, held: HeldOut | None, point: Point, traces: tuple[Trace, ...], options: DiagnosisOptions
+    observation: Observation, held: HeldOut | None, point: Point, traces: tuple[Trace, ...],
+    options: DiagnosisOptions, excluded: tuple[str, ...],
 ) -> Case:  # fmt: skip
-    recorded = all(t.error is not None and t.power_raw is not None for t in traces)
     return Case(
         observation, noise_floor(observation, point), held, np.zeros(0) if held is None else held.floor(point), traces,
-        options, THRESHOLDS, OF_THE_CONTROLLER if recorded else (),
+        options, THRESHOLDS, excluded,
     )  # fmt: skip
 
 
@@ -146,14 +152,6 @@ def _refuse_shared(traces: Sequence[Trace], holdout: Sequence[Trace]) -> None:
 def _used(trace: Trace, findings: Sequence[ControllerFinding]) -> Trace:
     """The trace with the set points that were not lost, where some were: what they did is known to the count."""
     return with_used_set_points(trace) if any(f.effect == "lost_set_points" for f in findings) else trace
-
-
-def _with_findings(model: Model, findings: Sequence[ControllerFinding]) -> Model:
-    """The model with the gains that the records prove."""
-    for finding in findings:
-        if finding.effect == "wrong_gain":
-            model = model.with_effect("wrong_gain", (finding.joint,), {"relative": finding.value})
-    return model
 
 
 def _given(observation: Observation, model: Model, unknowns: Sequence[Unknown]) -> Point:
