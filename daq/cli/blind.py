@@ -20,6 +20,7 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def blind(
+    context: typer.Context,
     folder: Annotated[Path, typer.Option(help="Where everything is kept; a trial that was broken off goes on there.")],
     seeds: Annotated[str | None, typer.Option(help="Numbers of arms: FIRST:LAST, or with commas.")] = None,
     cases: Annotated[int | None, typer.Option(min=1, help="No more than so many of them, kinds mixed.")] = None,
@@ -63,6 +64,8 @@ def blind(
             raise SpecError("--seeds and --registration: name one of them; a registered trial draws its own")
         if cases is not None:
             raise SpecError("--cases and --registration: a registered run has the cases that it registers, all of them")
+        if own := [n for n in ("kinds", "loads", "experiment", "acquire") if _asked_for(context, n)]:
+            raise SpecError(f"--{own[0]} and --registration: a registered run has what it registers, and nothing else")
         chosen, experiment, acquire, drawn = _registered(registration, run)
     else:
         if seeds is None:
@@ -77,6 +80,11 @@ def blind(
     if left:
         console().print(f"{left} cases are not done; the same command goes on with them")
         raise typer.Exit(5)
+
+
+def _asked_for(context: typer.Context, option: str) -> bool:
+    source = context.get_parameter_source(option)
+    return source is not None and source.name == "COMMANDLINE"
 
 
 def _chosen(seeds: str, kinds: str, loads: str, cases: int | None) -> list[int]:

@@ -320,6 +320,8 @@ def test_a_registered_trial_runs_only_committed_and_with_the_code_that_was_regis
     git(nobodys_desk, "commit", "-q", "-m", "registered")
     daq(*words, "--seeds", "1:2").complains(2, "--seeds and --registration")
     daq(*words, "--cases", "1").complains(2, "--cases and --registration")
+    daq(*words, "--acquire").complains(2, "--acquire and --registration")
+    daq(*words, "--kinds", "clean").complains(2, "--kinds and --registration")
     daq(*words, "--run", "ramp").complains(2, "run 'ramp': the registration has diagnostic")
     kept = nobodys_desk / "registration-diagnostic.md"
     kept.write_text("a table", "utf-8")
