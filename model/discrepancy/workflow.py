@@ -13,7 +13,7 @@ from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.discrepancy import reasons
-from model.discrepancy.answer import Diagnosis, RemainingShape, Step, Verdict
+from model.discrepancy.answer import Diagnosis, FoundValue, RemainingShape, Step, Verdict
 from model.discrepancy.case import Case, with_point
 from model.discrepancy.controller_check import (
     ControllerFinding,
@@ -40,7 +40,10 @@ from model.discrepancy.turn import LAST_STEPS, step_of
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
+from model.machine_model.parameter import Parameter
 
+CHANCES = 3
+"""Candidates of a turn that held-out traces may refuse, until there is nothing more to look for."""
 FIRST_STEPS = 6
 """Of a search before its derivatives are computed anew."""
 
@@ -101,11 +104,11 @@ def diagnose(
     found = _searched(case, judge(observation, point), progress, cancel)
     progress(0.95, "writing the answer")
     proved = tuple(proved_step(model, observation, f) for f in findings)
+    found = _as_last_fitted(observation, found)
     left = _unexplained(case, found)
     answered = verdict((*proved, *found.steps), left)
     if answered == "unknown-effect":
-        found = _taken_back(found, left)
-    found = _as_last_fitted(observation, found)
+        found = _as_last_fitted(observation, _taken_back(found, left))
     remaining = case.remaining(found.current.point) if answered == "unknown-effect" else ()
     end = found.current.point
     asked = Asked(None) if ask is None else ask.after(answered, observation, end, found.rivals, traces)
@@ -118,7 +121,7 @@ def diagnose(
     answer = Diagnosis(
         verdict=answered, summary=_summary(case, found, answered, proved, remaining),
         steps=(*proved, *found.steps), remaining=remaining,
-        model_before=model, model_after=_adopted(model, end, case.names),
+        model_before=model, model_after=_adopted(model, found, case.names),
         traces=case.names, holdout=tuple(t.record.trace_id for t in holdout),
         rmse_fit=case.fitted_errors(given, end),
         rmse_holdout=case.held_errors(end.model, *case.held_residuals(given, end)),
@@ -181,17 +184,22 @@ def _searched(case: Case, begun: Judged, progress: Progress, cancel: Cancel) -> 
 
 
 def _after_turn(case: Case, found: _Found, progress: Progress, cancel: Cancel) -> _Found:
+    """The best that held-out traces do not refuse, of the first few that fitted ones speak for."""
     turn, current = _ranked(case, found, progress, cancel)
-    first = current if not found.added else found.first
-    decision = decide(turn, case.thresholds, found.added)
-    step, following = step_of(case, current, turn, decision)
-    probes = (*found.probes, *turn.probed)
-    if step is None:
-        return replace(found, first=first, current=current, probes=probes, ended=True)
-    return _Found(
-        first, following, (*found.steps, step), (*found.before, current),
-        rivals_of(turn, decision) if step.adopted else found.rivals, probes, ended=not step.adopted or bool(step.group),
-    )  # fmt: skip
+    found = replace(found, current=current, probes=(*found.probes, *turn.probed))
+    if not found.added:
+        found = replace(found, first=current)
+    for _ in range(CHANCES):
+        decision = decide(turn, case.thresholds, found.added)
+        step, following = step_of(case, current, turn, decision)
+        if step is None:
+            break
+        found = replace(found, steps=(*found.steps, step), before=(*found.before, current))
+        if step.adopted:
+            rivals = rivals_of(turn, decision)
+            return replace(found, current=following, rivals=rivals, ended=bool(step.group))
+        turn = replace(turn, fitted=tuple(f for f in turn.fitted if f is not decision.best))
+    return replace(found, ended=True)
 
 
 def _ranked(case: Case, found: _Found, progress: Progress, cancel: Cancel) -> tuple[Ranking, Judged]:
@@ -229,14 +237,28 @@ def _taken_back(found: _Found, left: Sequence[int]) -> _Found:
 
 
 def _as_last_fitted(observation: Observation, found: _Found) -> _Found:
-    """Steps with the last fit's parameters: what was still missing at their turn has bent them."""
+    """Steps with the last fit's parameters: what was still missing at their turn has bent them. An effect that came out
+    as nothing, within its intervals, is none: a later one explains what it did."""
     known = found.current.point.model.by_name
+    newest = max((k for k, s in enumerate(found.steps) if s.adopted), default=0)
     steps = []
-    for step in found.steps:
+    for k, step in enumerate(found.steps):
         own = [known[name] for name in step.parameters] if step.adopted else []
+        if not own:
+            steps.append(step)
+            continue
         last = found_values(observation, found.current, own)
-        steps.append(step.model_copy(update={"parameters": last}) if own else step)
+        update: dict[str, object] = {"parameters": last}
+        if k != newest and all(_nothing(last[p.name], p) for p in own if p.null is not None):
+            update |= {"adopted": False, "rejected_because": "superfluous once a later effect was in"}
+        steps.append(step.model_copy(update=update))
     return replace(found, steps=tuple(steps))
+
+
+def _nothing(found: FoundValue, parameter: Parameter) -> bool:
+    """Whether the value at which the effect is absent lies in the interval."""
+    null, low, high = parameter.null, found.low, found.high
+    return null is not None and low is not None and high is not None and low <= null <= high
 
 
 def _stated(point: Point) -> list[Unknown]:
@@ -245,10 +267,17 @@ def _stated(point: Point) -> list[Unknown]:
     return [u for u in point.unknowns if u.name in known and known[u.name].effect is None]
 
 
-def _adopted(model: Model, point: Point, names: tuple[str, ...]) -> Model:
+def _adopted(model: Model, found: _Found, names: tuple[str, ...]) -> Model:
+    """The model after all steps, but for effects that became superfluous and that it was not given with."""
+    point, given = found.current.point, {u.name for u in model.effects}
+    after = with_point(point)
+    for step in found.steps:
+        gone = not step.adopted and step.effect in {u.name for u in after.effects} - given
+        if gone and not any(s.adopted and s.effect == step.effect for s in found.steps):
+            after = after.without_effect(step.effect or "", step.joints or None)
     fit = {"misfit": point.misfit, "fitted": [u.name for u in point.unknowns if u.name in point.model.by_name]}
     lineage = Lineage(parent=model.identity, traces=names, fit=fit, note="diagnosis")
-    return with_point(point).with_lineage(lineage)
+    return after.with_lineage(lineage)
 
 
 def _summary(
