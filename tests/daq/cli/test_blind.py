@@ -107,7 +107,7 @@ def test_it_is_told_the_load_that_was_announced(done: Campaign) -> None:
     assert given(done, SECRETS[1])["load"] == pytest.approx(1.250307)
     announced = machine_with_load(MACHINE, 0.4).load
     assert announced is not None
-    assert announced.deviation == pytest.approx(0.04)
+    assert announced.deviation == pytest.approx(0.04, rel=1e-3)  # the share that the machine file states of its own
 
 
 def test_traces_and_names_do_not_tell_the_secret(done: Campaign) -> None:
