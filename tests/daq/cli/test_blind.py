@@ -107,7 +107,10 @@ def test_it_is_told_the_load_that_was_announced(done: Campaign) -> None:
     assert given(done, SECRETS[1])["load"] == pytest.approx(1.250307)
     announced = machine_with_load(MACHINE, 0.4).load
     assert announced is not None
-    assert announced.deviation == pytest.approx(0.04, rel=1e-3)  # the share that the machine file states of its own
+    own = MACHINE.load
+    assert own is not None
+    assert own.deviation is not None
+    assert announced.deviation == pytest.approx(0.4 * own.deviation / own.value)  # as uncertain as the file's own
 
 
 def test_traces_and_names_do_not_tell_the_secret(done: Campaign) -> None:
