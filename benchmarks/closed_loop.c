@@ -34,10 +34,9 @@ static inline double mean_current(const double *j, double rise, double now, doub
 
 static double sensed_angle(double q, const double *j) {
   double s = q + j[POTENTIOMETER_GAIN] * (q - j[AT_ZERO] - 0.5 * j[RANGE]) + j[POTENTIOMETER_OFFSET];
-  if (j[BEND_1] != 0 || j[BEND_2] != 0 || j[BEND_3] != 0 || j[BEND_4] != 0) {
-    const double w = M_PI * (q - j[AT_ZERO]) / j[RANGE];
-    s += j[BEND_1] * sin(w) + j[BEND_2] * sin(2 * w) + j[BEND_3] * sin(3 * w) + j[BEND_4] * sin(4 * w);
-  }
+  const double w = M_PI * (q - j[AT_ZERO]) / j[RANGE];
+  for (int k = 0; k < 8; k++)
+    if (j[BEND_1 + k] != 0) s += j[BEND_1 + k] * sin((k + 1) * w);
   return s;
 }
 
@@ -45,7 +44,7 @@ static double extra_torque(const double *j, long flags, double t, double q, doub
   double torque = 0;
   if (flags & HAS_STICTION) torque -= z * stuck * j[BREAKAWAY];
   if (j[STRIBECK] != 0) torque -= z * j[STRIBECK] * exp(-fabs(v) / j[STRIBECK_SPEED]);
-  if (j[DIRECTION] != 0) torque -= 0.5 * j[DIRECTION] * z * z;
+  if (j[DIRECTION] != 0) torque -= 0.5 * (j[DIRECTION] * z * z + fabs(j[DIRECTION]) * z);
   if (j[GEAR_LOSS] != 0) torque -= z * j[GEAR_LOSS] * fabs(motor);
   if (j[RIPPLE_SINE] != 0 || j[RIPPLE_COSINE] != 0)
     torque += j[RIPPLE_SINE] * sin(j[RIPPLE_CYCLES] * q) + j[RIPPLE_COSINE] * cos(j[RIPPLE_CYCLES] * q);

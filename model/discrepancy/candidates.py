@@ -24,8 +24,11 @@ TRIALS: Mapping[str, tuple[float, ...]] = {
     "stiction": (0.5, 2.0, 6.0),
     "stribeck_friction": (0.4, 1.5, 5.0),
     "lost_set_points": (0.1, 0.5, 1.5),
+    "direction_dependent_friction": (0.3, 2.0),
 }
 """Trial sizes in expected deviations of effects that do not grow in proportion to their parameter."""
+BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
+"""Terms of a bent potentiometer that a candidate frees from their priors; shorter waves stay what a sound one has."""
 SMALL = 0.002
 """Expected deviations: the one trial of all others, which tells the size by itself. It is small: an effect that does
 what a tolerance parameter does can only be told by the price of that parameter's prior, and a curved response would
@@ -156,6 +159,8 @@ def _candidate(
             return None
         wider = model.with_effect(law, joints)
         free = tuple(p for p in wider.parameters if p.name not in model.by_name)
+    if law == "potentiometer_nonlinearity":
+        free = tuple(p for p in free if p.name.endswith(BENDS))
     full = tuple(_full(free, trial) for trial in trials)
     return Candidate(name, joints, wider, free, full, proportional, _full_bounds(free, bounds or {}))
 

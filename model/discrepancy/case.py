@@ -13,7 +13,7 @@ from model.discrepancy.answer import RemainingShape, SignalError, Where
 from model.discrepancy.excess import excess_removed
 from model.discrepancy.holdout import HeldOut, errors
 from model.discrepancy.noise_floor import noise_floor
-from model.discrepancy.observation import Observation, Signals
+from model.discrepancy.observation import FOLLOWING_FOR_ERRORS, Observation, Signals
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.refitting import Refitted
 from model.discrepancy.remaining import shapes
@@ -30,10 +30,12 @@ class Case:
     """The traces of a diagnosis, and what holds for all of its turns.
 
     floor, floor_held: (n,) rad, what noise alone leaves on the fitted and on the held-out traces; the second is empty
-    without any. excluded: effects that need not be tried.
+    without any. excluded: effects that need not be tried. told: the fitted traces as errors are told, which is how the
+    held-out ones are.
     """
 
     observation: Observation
+    told: Observation
     floor: Floats
     held: HeldOut | None
     floor_held: Floats
@@ -50,13 +52,13 @@ class Case:
     def with_floors_of(self, point: Point) -> Case:
         """The same with floors that are no less than a point's: with play, noise decides where a joint comes to rest,
         so what has been added may raise the floor."""
-        floor = np.maximum(self.floor, noise_floor(self.observation, point))
+        floor = np.maximum(self.floor, noise_floor(self.told, point))
         held = self.floor_held if self.held is None else np.maximum(self.floor_held, self.held.floor(point))
         return replace(self, floor=floor, floor_held=held)
 
     def fitted_errors(self, before: Point, after: Point) -> tuple[SignalError, ...]:
         """Of every joint, on the traces fitted to."""
-        return errors(self.observation, after.model, before.residuals, after.residuals, self.floor)
+        return errors(self.told, after.model, self._told(before), self._told(after), self.floor)
 
     def held_residuals(self, before: Point, after: Point) -> tuple[Signals, Signals]:
         """Residuals of the held-out traces; empty where there are no such traces."""
@@ -93,13 +95,17 @@ class Case:
     def where(self, point: Point) -> Where:
         """Where the point disagrees with the fitted traces."""
         driven = tuple(t for t in self.traces if t.drive is not None)
-        return located(
-            with_point(point), self.observation.records, point.residuals, self.observation.deviations, traces=driven
-        )
+        return located(with_point(point), self.told.records, self._told(point), self.told.deviations, traces=driven)
 
     def remaining(self, point: Point) -> tuple[RemainingShape, ...]:
         """What the point leaves of the fitted traces, as torques."""
-        return shapes(with_point(point), self.observation.records, point.residuals, self.observation.deviations)
+        return shapes(
+            with_point(point), self.told.records, self._told(point), self.told.deviations,
+            following=FOLLOWING_FOR_ERRORS,
+        )  # fmt: skip
+
+    def _told(self, point: Point) -> Signals:
+        return self.told.residuals(point.model, point.unknowns, point.values)
 
 
 def with_point(point: Point) -> Model:

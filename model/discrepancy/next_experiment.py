@@ -29,6 +29,7 @@ from model.discrepancy.next_experiment_signals import (
     imagined,
     known_so_far,
     names_of,
+    recorded,
     shown,
     tangents,
     values_of,
@@ -176,14 +177,15 @@ def _judged(rivals: Sequence[Refitted], experiment: Experiment, plan: Planner, b
     there = _possible(points[0], experiment, plan, budget)
     if there is None:
         return None
-    signals = [shown(there, p) for p in points]
+    records = [recorded(there, p) for p in points]
+    signals = [shown(own, p) for own, p in zip(records, points, strict=True)]
     if not all(np.isfinite(s).all() for s in signals):
         return None
     separations, left = {}, {}
     try:
-        first = _named(there, points[0], tangents(there, points[0], {}))
+        first = _named(records[0], points[0], tangents(records[0], points[0], {}))
         for a, b in combinations(range(len(rivals)), 2):
-            sides = [_unhidden(there, rivals[wrong], signals[true], first) for wrong, true in ((a, b), (b, a))]
+            sides = [_unhidden(records[true], rivals[wrong], signals[true], first) for wrong, true in ((a, b), (b, a))]
             separations[a, b], left[a, b] = min(sides, key=lambda side: side[0])
     except SpecError:
         return None
@@ -195,8 +197,8 @@ def _named(there: Imagined, point: Point, derivatives: Floats) -> dict[str, Floa
 
 
 def _unhidden(there: Imagined, wrong: Refitted, target: Floats, known: dict[str, Floats]) -> tuple[float, Floats]:
-    """d′ of a rival that is wrong from what would be shown, and what of the difference is left once its parameters have
-    moved. They move twice: what an effect does is not in proportion to its parameters.
+    """d′ of a rival that is wrong from what the record's own model would show, and what of the difference is left once
+    its parameters have moved. They move twice: what an effect does is not in proportion to its parameters.
 
     Raises SpecError when the simulation does not stay finite.
     """
@@ -225,7 +227,7 @@ def _information(
     if there is None:
         return None
     try:
-        new = tangents(there, point, {})
+        new = tangents(recorded(there, point), point, {})
     except SpecError:
         return None
     known = known_so_far(there, point)

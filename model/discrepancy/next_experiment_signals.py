@@ -7,7 +7,7 @@ far as that allows, and its posture at the start is unknown anew.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +33,10 @@ LOOSE = 1e-9
 
 @dataclass(frozen=True)
 class Imagined:
-    """An experiment as a diagnosis would see it. starts: its postures at the start, unknown within a reading or so.
-    noise: of the readings, counts."""
+    """An experiment as a diagnosis would see it, with the record that it is `recorded` to leave.
+
+    starts: its postures at the start, unknown within a reading or so. noise: of the readings, counts.
+    """
 
     observation: Observation
     starts: tuple[Unknown, ...]
@@ -54,8 +56,18 @@ def imagined(model: Model, spec: ExperimentSpec, plan: Planner) -> Imagined | No
     except DaqError:
         return None
     counts = observation.deviations / observation.unit
-    drawn = np.random.default_rng(NOISE_SEED).standard_normal(observation.quiet[0].shape)
+    drawn = np.random.default_rng(NOISE_SEED).standard_normal(observation.prepared[0].noise.shape)
     return Imagined(observation, tuple(u for u in unknowns if u.trace is not None), (drawn * counts,))
+
+
+def recorded(there: Imagined, point: Point) -> Imagined:
+    """The experiment with the record that an arm like the point's model would leave. Not finite where its simulation
+    is not."""
+    unknowns, values = _unknowns(there, point)
+    observation = there.observation.with_noise(there.noise)
+    vector, initials = observation.state(point.model, unknowns, values)
+    readings = observation.readings(point.model, vector[None], [i[None] for i in initials])
+    return replace(there, observation=there.observation.made_of([r[0] for r in readings]))
 
 
 def values_of(there: Imagined, point: Point) -> Floats:
@@ -70,11 +82,11 @@ def bounded(there: Imagined, point: Point, values: Floats) -> Floats:
 
 
 def shown(there: Imagined, point: Point, values: Floats | None = None) -> Floats:
-    """What a point's model would show, (N,) in deviations of a reading; with other values (p,) than the point's, if
-    given. Not finite where its simulation is not."""
+    """What a point's model shows where it follows the record, (N,) in deviations of a reading; with other values (p,)
+    than the point's, if given. Not finite where its simulation is not."""
     unknowns, own = _unknowns(there, point)
     vector, initials = there.observation.state(point.model, unknowns, own if values is None else values)
-    readings = there.observation.readings(point.model, vector[None], [i[None] for i in initials], there.noise)
+    readings = there.observation.readings(point.model, vector[None], [i[None] for i in initials])
     return there.observation.weighted([r[0] for r in readings])
 
 
@@ -89,7 +101,7 @@ def tangents(there: Imagined, point: Point, known: Mapping[str, Floats], values:
     rows = dict(known)
     missing = [k for k, u in enumerate(unknowns) if u.name not in rows]
     if missing:
-        new = there.observation.tangents(point.model, unknowns, at, there.noise, missing)
+        new = there.observation.tangents(point.model, unknowns, at, missing)
         rows |= {unknowns[k].name: row for k, row in zip(missing, new, strict=True)}
     return np.stack([rows[u.name] for u in unknowns])
 

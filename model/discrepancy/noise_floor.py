@@ -1,19 +1,18 @@
 """What noise and rounding alone would leave, if a model were the truth: no diagnosis can bring an error below it.
 
-It is more than the noise of one reading: noise goes round the loop, moves the arm a little near standstill, and the
-part of it that a residual shows is only estimated.
+It is more than the noise of one reading: what the simulated controller is not given of it goes round the loop, and
+moves the arm a little near standstill.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from model.discrepancy.observation import Observation, Signals
-from model.discrepancy.search import Point, point_at
+from model.discrepancy.search import Point
 from model.discrepancy.side_by_side import side_by_side
 
 Floats = NDArray[np.float64]
@@ -25,10 +24,9 @@ def noise_floor(observation: Observation, point: Point, left: Callable[[Observat
     """(n,) rad; root mean square of what remains of each joint, over records that the point's own model has made.
 
     Args:
-        left: residuals of an observation, worked out as those of the real records are; None for a simulation with the
-            noise put back.
+        left: residuals of an observation, worked out as those of the real records are; None for those of the point.
     """
-    left = left or (lambda made: _put_back(made, point))
+    left = left or (lambda made: made.residuals(point.model, point.unknowns, point.values))
     rng = np.random.default_rng(SEED)
     made = [_made(observation, point, rng) for _ in range(REPLICAS)]
     squares = []
@@ -40,16 +38,7 @@ def noise_floor(observation: Observation, point: Point, left: Callable[[Observat
 def _made(observation: Observation, point: Point, rng: np.random.Generator) -> Observation:
     """The same experiments on an arm that is the point's model, with random noise of the stated size."""
     scale = observation.deviations / observation.unit
-    noise = tuple(scale * rng.normal(size=quiet.shape) for quiet in observation.quiet)
+    noise = [scale * rng.normal(size=p.noise.shape) for p in observation.prepared]
     vector, initials = observation.state(point.model, point.unknowns, point.values)
-    angles = observation.readings(point.model, vector[None], [i[None] for i in initials], noise)
-    records = []
-    for record, own, counts in zip(observation.records, angles, noise, strict=True):
-        rows = np.round(record.inputs.rows).astype(np.int64)
-        records.append(replace(record, measured=own[0] + counts[rows] * observation.unit))
-    return replace(observation, records=tuple(records))
-
-
-def _put_back(made: Observation, point: Point) -> Signals:
-    none = np.zeros_like(point.tangents)
-    return point_at(made, point.model, point.unknowns, point.values, made.quiet, none).residuals
+    shown = observation.with_noise(noise).readings(point.model, vector[None], [i[None] for i in initials])
+    return observation.made_of([own[0] for own in shown])

@@ -1,10 +1,11 @@
-"""Traces as a diagnosis sees them: models are simulated with the noise that the record itself shows.
+"""Traces as a diagnosis sees them: the simulated controller is given most of what the real one has read.
 
-A simulation without noise comes to rest where the real arm, its readings trembling by a count, creeps on; and it stays
-in the middle of a count where the arm sits at an edge. So the fast part of the residual, which is noise and rounding
-and which no model of the arm can explain, is added to what the simulated controller reads. The slow part is left to
-be explained: a mean over three samples is what separates the two (five would put structure of real effects into the
-noise).
+The noise of a reading goes through the controller into the motor, and round the loop: a simulation in closed loop that
+does not know it is off by what the noise has moved, comes to rest where the real arm creeps on, and hides a torque
+behind a controller that makes up for it. A simulation that reads the record has all of that right, but nothing brings
+it back: an error of the smallest torque adds up. So the controller reads a share of the way from the simulated reading
+to the recorded one (Forssell and Ljung 1999 compare the two ends). What is left, measured less simulated, is nearly
+white where the model is right, and a missing torque shows 1/(1 − share) times as large as in closed loop.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from model.fitting.simulated import INITIAL, SimulatedProblem, unknown_place
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.simulation.engines import engine_for
+from model.simulation.inputs import readings_on_grid
 from model.simulation.period import OUT_READING, OUTPUTS
 from model.simulation.simulate import Options, Prepared, at_rows, prepare
 
@@ -31,18 +33,28 @@ Floats = NDArray[np.float64]
 Signals = tuple[Floats, ...]
 """One array (m, n) a record."""
 
-SMOOTHING = 3
-"""Samples over which the residual is averaged before what is left counts as noise."""
-STEP, STEP_OF_GEARS_THAT_GIVE = 7e-3, 2e-3
-"""s; longest step of integration: three a control period of 20 ms, and ten where a stiff gear would make longer ones
-unstable. Readings are right to 0.005 counts (root mean square), 0.02 with backlash, far below the noise."""
+FOLLOWING = 0.8
+"""Share of the way to the recorded reading that the simulated controller is given where models are fitted and
+compared. More finds less, for the laws of an arm are never exactly a model's, and a torque that is a little wrong adds
+up; with less, what noise has moved looks like torque."""
+FOLLOWING_FOR_ERRORS = 0.5
+"""The same where errors are told and judged, held-out ones above all: nearer to what the model alone would do."""
+STEP, FINE_STEP, COARSE_STEP = 3.5e-3, 2e-3, 7e-3
+"""s; longest step of integration: six a control period of 20 ms, ten for effects that change within less, and three for
+derivatives, which are differences and need no more."""
 HALVINGS = 2
 """Of the step, for runs that do not stay finite with it."""
 DIFFERENCE = 0.05
 """Of an expected deviation: over it, derivatives are taken."""
-BEND_SHARE = 0.45
+BEND_TERMS = 8
+"""Of the sine series of a sound potentiometer's curve: an arm moves over a part of the range, and what the curve does
+there, bent by a count or two, has to be within the series' reach."""
+BEND_SHARE = 0.3
 """Standard deviation of each term of a potentiometer's curve, as a share of the stated linearity."""
-GEARS_THAT_GIVE = ("backlash", "joint_compliance")
+STIFF = ("backlash", "joint_compliance")
+"""Gears that give: longer steps would make them unstable."""
+QUICK = (*STIFF, "motor_inductance", "stribeck_friction", "stiction")
+"""Effects that change within a few milliseconds; with longer steps a delay would explain an inductance as well."""
 LOOSE_START = 8.0
 """Times the tolerance of a reading: how far a trace may begin from where its first reading says. The trace itself shows
 where it began, and what it is read by may be what is missing."""
@@ -55,7 +67,8 @@ class Observation:
     """Records of one machine, and how well a reading can be known.
 
     records: what drives the simulations and what was measured. deviations: (n,) rad, noise and rounding of one reading.
-    unit: (n,) rad a count, 1 where the machine states no sensor. prepared: the records as compiled code reads them.
+    unit: (n,) rad a count, 1 where the machine states no sensor. prepared: the records as compiled code reads them,
+    with the share of the recorded readings that is followed.
     """
 
     records: tuple[Record, ...]
@@ -68,22 +81,35 @@ class Observation:
         """Readings that are compared, all joints together."""
         return sum(r.samples for r in self.records) * len(self.deviations)
 
-    @property
-    def quiet(self) -> Signals:
-        """No noise: (k, n) counts a record, on the grid of control periods."""
-        return tuple(np.zeros_like(p.noise) for p in self.prepared)
+    def following(self, share: float) -> Observation:
+        """The same with another share of the recorded readings that simulated controllers are given."""
+        return replace(self, prepared=tuple(replace(p, following=share) for p in self.prepared))
 
-    def readings(self, model: Model, vectors: Floats, initials: Sequence[Floats], noise: Signals) -> list[Floats]:
-        """What each of p parameter sets would show, without the noise's direct part.
+    def with_noise(self, noise: Sequence[Floats]) -> Observation:
+        """The same with simulations that follow no record: noise (k, n), in counts, is on what they read."""
+        prepared = zip(self.prepared, noise, strict=True)
+        return replace(self, prepared=tuple(replace(p, following=0.0, noise=own) for p, own in prepared))
+
+    def made_of(self, measured: Sequence[Floats]) -> Observation:
+        """The same records with other readings (m, n) rad, compared and followed as the real ones are."""
+        records = tuple(replace(r, measured=own) for r, own in zip(self.records, measured, strict=True))
+        shown = [readings_on_grid(r.measured, r.inputs.rows, len(r.inputs)) for r in records]
+        prepared = tuple(replace(p, readings=own) for p, own in zip(self.prepared, shown, strict=True))
+        return replace(self, records=records, prepared=prepared)
+
+    def readings(
+        self, model: Model, vectors: Floats, initials: Sequence[Floats], step: float | None = None
+    ) -> list[Floats]:
+        """What each of p parameter sets would show, its noise included where the simulation has one.
 
         Args:
-            vectors: (p, size). initials: per record (p, n, 2).
+            vectors: (p, size). initials: per record (p, n, 2). step: longest of the integration, s; None: as the
+                model's effects need.
 
         Returns:
             per record (p, m, n), rad; NaN where a run diverged.
         """  # fmt: skip
-        prepared = [replace(p, noise=own) for p, own in zip(self.prepared, noise, strict=True)]
-        longest = max(len(r.inputs) for r in self.records)
+        longest, first = max(len(r.inputs) for r in self.records), step or _longest_step(model)
         engine, count = engine_for(model), len(self.records)
         found: list[list[Floats]] = [[] for _ in self.records]
         for begin in range(0, len(vectors), BATCH):
@@ -92,10 +118,10 @@ class Observation:
             out = np.zeros((len(which), OUTPUTS, longest, model.joint_count), dtype=np.float64)
             starts = np.concatenate([i[begin : begin + BATCH] for i in initials])
             repeated = np.ascontiguousarray(np.tile(own, (count, 1)))
-            left, step = np.arange(len(which)), _longest_step(model)
+            left, step = np.arange(len(which)), first
             for _ in range(1 + HALVINGS):
                 tried = out[left]
-                engine.run(prepared, which[left], repeated[left], starts[left], model.flags, step, tried)
+                engine.run(self.prepared, which[left], repeated[left], starts[left], model.flags, step, tried)
                 out[left] = tried
                 left = left[~np.isfinite(tried[:, OUT_READING]).all(axis=(1, 2))]
                 if not len(left):
@@ -103,7 +129,7 @@ class Observation:
                 step /= 2
             for t, record in enumerate(self.records):
                 rows = slice(t * len(own), (t + 1) * len(own))
-                shown = out[rows, OUT_READING, : len(record.inputs)] - noise[t] * self.unit
+                shown = out[rows, OUT_READING, : len(record.inputs)]
                 found[t].append(np.stack([at_rows(one, record.inputs.rows) for one in shown]))
         return [np.concatenate(parts) for parts in found]
 
@@ -120,10 +146,10 @@ class Observation:
                     initials[t][place] += value
         return vector, initials
 
-    def residuals(self, model: Model, unknowns: Sequence[Unknown], values: Floats, noise: Signals) -> Signals:
+    def residuals(self, model: Model, unknowns: Sequence[Unknown], values: Floats) -> Signals:
         """Measured − simulated, rad. Not finite where the simulation is not."""
         vector, initials = self.state(model, unknowns, values)
-        shown = self.readings(model, vector[None], [i[None] for i in initials], noise)
+        shown = self.readings(model, vector[None], [i[None] for i in initials])
         return tuple(record.measured - one[0] for record, one in zip(self.records, shown, strict=True))
 
     def tangents(
@@ -131,7 +157,6 @@ class Observation:
         model: Model,
         unknowns: Sequence[Unknown],
         values: Floats,
-        noise: Signals,
         which: Sequence[int] | None = None,
     ) -> Floats:
         """Derivatives of the weighted readings by the unknowns of those indices (all), (p, N): by differences over a
@@ -148,7 +173,7 @@ class Observation:
             states.append(self.state(model, unknowns, moved))
         vectors = np.stack([vector for vector, _ in states])
         starts = [np.stack([initials[t] for _, initials in states]) for t in range(len(self.records))]
-        shown = self.readings(model, vectors, starts, noise)
+        shown = self.readings(model, vectors, starts, _step_of_derivatives(model))
         found = self.weighted([one[1:] - one[:1] for one in shown]) / np.array(moves)[:, None]
         if not np.isfinite(found).all():
             raise SpecError("the simulation does not stay finite: the loop is unstable")
@@ -176,21 +201,10 @@ class Observation:
                     runs[joint].append(part[..., joint])
         return runs
 
-    def noise_of(self, residuals: Signals) -> Signals:
-        """The fast part of residuals, in counts on the grid of control periods: what the controller's readings had
-        beside the angle."""
-        found = []
-        for prepared, record, residual in zip(self.prepared, self.records, residuals, strict=True):
-            half = SMOOTHING // 2
-            padded = np.pad(residual, ((half, half), (0, 0)), mode="edge")
-            mean = np.mean([padded[k : k + len(residual)] for k in range(SMOOTHING)], axis=0)
-            on_grid = np.zeros_like(prepared.noise)
-            on_grid[np.round(record.inputs.rows).astype(np.int64)] = (residual - mean) / self.unit
-            found.append(on_grid)
-        return tuple(found)
 
-
-def observed(model: Model, traces: Sequence[Trace]) -> tuple[Observation, Model, tuple[Unknown, ...]]:
+def observed(
+    model: Model, traces: Sequence[Trace], following: float = FOLLOWING
+) -> tuple[Observation, Model, tuple[Unknown, ...]]:
     """Traces ready for a diagnosis, the model with potentiometers that may bend within their linearity, and all that
     may differ from its values on a sound machine: every number with an expected deviation, the potentiometers' bends,
     the form of friction near zero speed, and the posture at the start.
@@ -201,18 +215,22 @@ def observed(model: Model, traces: Sequence[Trace]) -> tuple[Observation, Model,
     stated = tuple(p.name for p in model.parameters if p.deviation is not None and p.deviation > 0 and p.null is None)
     effects = tuple(p.name for p in model.parameters if p.effect is not None and p.deviation is not None)
     problem: SimulatedProblem = fit_problem(
-        model, traces, FitOptions(parameters=tuple(dict.fromkeys((*stated, *effects))))
+        model, traces, FitOptions(parameters=tuple(dict.fromkeys((*stated, *effects))), bend_terms=BEND_TERMS)
     )
     sensors = [model.machine.joint(j).sensor for j in model.machine.modelled_joints]
     unit = np.array([1.0 if s is None else s.range.value / 2**s.bits for s in sensors])
-    prepared = tuple(prepare(problem.model, r.inputs, Options(quantise=False)) for r in problem.records)
+    options = Options(quantise=False, following=following)
+    prepared = tuple(prepare(problem.model, r.inputs, options) for r in problem.records)
     unknowns = tuple(_loose_start(_even_bend(u, problem.model)) for u in problem.unknowns)
     return Observation(problem.records, problem.floor, unit, prepared), problem.model, unknowns
 
 
 def _longest_step(model: Model) -> float:
-    gives = any(use.name in GEARS_THAT_GIVE for use in model.effects)
-    return STEP_OF_GEARS_THAT_GIVE if gives else STEP
+    return FINE_STEP if any(use.name in QUICK for use in model.effects) else STEP
+
+
+def _step_of_derivatives(model: Model) -> float:
+    return FINE_STEP if any(use.name in STIFF for use in model.effects) else COARSE_STEP
 
 
 def _difference(model: Model, unknown: Unknown, value: float) -> float:

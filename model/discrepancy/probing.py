@@ -7,7 +7,7 @@ explain has been taken out of both, at the price of their priors.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -118,15 +118,12 @@ def _best_trial(
 ) -> Probed | None:
     if not candidate.trials:
         return None
-    vector, initials = observation.state(candidate.model, point.unknowns, point.values)
     trials = [_from_here(point, candidate, trial) for trial in candidate.trials]
-    vectors = np.tile(vector, (len(trials), 1))
-    for row, trial in zip(vectors, trials, strict=True):
-        for name, value in trial.items():
-            row[list(candidate.model.parameter(name).slots)] = value
-    starts = [np.tile(i, (len(vectors), 1, 1)) for i in initials]
-    shown = observation.readings(candidate.model, vectors, starts, point.noise)
-    responses = observation.weighted([y - y0 for y, y0 in zip(shown, reference, strict=True)])
+    held = {u.name: k for k, u in enumerate(point.unknowns)}
+    if all(p.name in held for p in candidate.free):
+        responses = _along_tangents(point, held, trials)
+    else:
+        responses = _simulated(observation, point, reference, candidate, trials)
     sound = np.asarray(np.isfinite(responses).all(axis=1))
     responses[~sound] = 0.0
     products, squares = clear.gains(responses)
@@ -142,6 +139,27 @@ def _best_trial(
         if best is None or gain > best.gain:
             best = Probed(candidate, gain, start, clear.moves(stretch * responses[k]), responses[k])
     return best
+
+
+def _along_tangents(point: Point, held: Mapping[str, int], trials: Sequence[dict[str, float]]) -> Floats:
+    """Responses (k, N) of a candidate that only lifts priors: along the very derivatives that are projected away, or
+    what those and a simulation differ by would look like the candidate's own."""
+    return np.stack([sum((v - point.values[held[n]]) * point.tangents[held[n]] for n, v in t.items()) for t in trials])
+
+
+def _simulated(
+    observation: Observation, point: Point, reference: Sequence[Floats], candidate: Candidate,
+    trials: Sequence[dict[str, float]],
+) -> Floats:  # fmt: skip
+    """Responses (k, N) of trials of a candidate, each simulated at its size; not finite where a simulation is not."""
+    vector, initials = observation.state(candidate.model, point.unknowns, point.values)
+    vectors = np.tile(vector, (len(trials), 1))
+    for row, trial in zip(vectors, trials, strict=True):
+        for name, value in trial.items():
+            row[list(candidate.model.parameter(name).slots)] = value
+    starts = [np.tile(i, (len(vectors), 1, 1)) for i in initials]
+    shown = observation.readings(candidate.model, vectors, starts)
+    return observation.weighted([y - y0 for y, y0 in zip(shown, reference, strict=True)])
 
 
 def _from_here(point: Point, candidate: Candidate, trial: dict[str, float]) -> dict[str, float]:

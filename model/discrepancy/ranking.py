@@ -12,7 +12,16 @@ from model.discrepancy.candidates import FLEXIBLE, TONES, candidates
 from model.discrepancy.observation import Observation
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.probing import Probed, probed, still_promising
-from model.discrepancy.refitting import Judged, Refitted, begun_again, finished, polished, refitted, same_answer
+from model.discrepancy.refitting import (
+    STRANGE,
+    Judged,
+    Refitted,
+    begun_again,
+    finished,
+    polished,
+    refitted,
+    same_answer,
+)
 from model.discrepancy.side_by_side import AT_ONCE, side_by_side
 from model.discrepancy.thresholds import Thresholds
 from model.discrepancy.together import fitted_together
@@ -70,7 +79,8 @@ def ranked(
     fits.sort(key=lambda r: -r.evidence)
     answers = _different(fits)[: options.polished]
     stop_if(cancel)
-    head = side_by_side(partial(_improved, observation, current), answers)
+    head = side_by_side(partial(polished, observation, current), answers)
+    head = _begun_again(observation, current, head, thresholds)
     head = _told_apart(observation, current, head, thresholds)
     rest = [r for r in fits if not any(r is a for a in answers)]
     return Ranking(_one_a_name(sorted([*head, *rest], key=lambda r: -r.evidence)), tuple(probes))
@@ -89,7 +99,8 @@ def _fitted(
             break
         names = " and ".join(describe(one.candidate.name, one.candidate.joints) for one in now)
         progress(0.4 + 0.5 * begin / len(chosen), f"fitting {names}")
-        fits += [fit for fit in side_by_side(partial(refitted, observation, current), now) if fit is not None]
+        again = not any(fit.misfit < STRANGE for fit in fits)  # the record is explained: others need no second way
+        fits += [f for f in side_by_side(partial(refitted, observation, current, again=again), now) if f is not None]
     return fits
 
 
@@ -114,10 +125,19 @@ def _told_apart(
     return [next((end for c, end in zip(close, ends, strict=True) if c is r), r) for r in head]
 
 
-def _improved(observation: Observation, current: Judged, found: Refitted) -> Refitted:
-    """A fit polished, and begun again where it has not explained the record; of several joints that has been done."""
-    better = polished(observation, current, found)
-    return better if len(better.candidate.joints) > 1 else begun_again(observation, current, better)
+def _begun_again(
+    observation: Observation, current: Judged, head: Sequence[Refitted], thresholds: Thresholds
+) -> list[Refitted]:
+    """The best fits, those begun again that have not explained the record: all of them where none has, else those that
+    are close to the best. Of several joints it has been done."""
+    best = max(head, key=lambda r: r.evidence, default=None)
+    least = -math.inf if best is None or best.misfit >= STRANGE else best.evidence - thresholds.close
+
+    def again(found: Refitted) -> Refitted:
+        hopeless = found.evidence < least or len(found.candidate.joints) > 1
+        return found if hopeless else begun_again(observation, current, found)
+
+    return side_by_side(again, head)
 
 
 def describe(name: str, joints: Sequence[int]) -> str:

@@ -26,6 +26,8 @@ Floats = NDArray[np.float64]
 
 STEPS = 8
 POLISHING = 4
+AGAIN = 3
+"""Searches of a fit that is begun again, at most: what is best then is taken to its end later."""
 DEEPER = 3.0
 """Fall of the cost from which a fit counts as better, not as ended elsewhere on the same flat ground."""
 STRANGE = 1.15
@@ -86,12 +88,12 @@ def judge(observation: Observation, point: Point) -> Judged:
     return Judged(point, noise_model(observation.by_joint(point.weighted)))
 
 
-def refitted(observation: Observation, before: Judged, probed: Probed) -> Refitted | None:
-    """A candidate fitted from where its probe points to, and, where that leads nowhere, from the numbers that are
-    expected: a strong effect may have driven the tolerance parameters far off. None where no simulation stays
+def refitted(observation: Observation, before: Judged, probed: Probed, *, again: bool = True) -> Refitted | None:
+    """A candidate fitted from where its probe points to, and, where that leads nowhere and `again`, from the numbers
+    that are expected: a strong effect may have driven the tolerance parameters far off. None where no simulation stays
     finite."""
     found: list[Point] = []
-    for fit in (_nearby, _from_expected):
+    for fit in (_nearby, _from_expected) if again else (_nearby,):
         try:
             point = fit(observation, before.point, probed)
         except SpecError:
@@ -109,7 +111,7 @@ def nearest(observation: Observation, before: Point, begun: Sequence[Probed]) ->
 
     def cost(probed: Probed) -> float:
         start = _started(before, probed)
-        point = point_at(observation, start.model, start.unknowns, start.values, start.noise, start.tangents)
+        point = point_at(observation, start.model, start.unknowns, start.values, start.tangents)
         return point.cost if np.isfinite(point.weighted).all() else math.inf
 
     return begun[0] if len(begun) == 1 else min(begun, key=cost)
@@ -119,22 +121,29 @@ def _nearby(observation: Observation, before: Point, probed: Probed) -> Point | 
     """A fit from where the probe points to."""
     start = _started(before, probed)
     changing = _indices(start.unknowns, [p.name for p in probed.candidate.free])
-    point = point_at(observation, start.model, start.unknowns, start.values, start.noise, start.tangents)
+    point = point_at(observation, start.model, start.unknowns, start.values, start.tangents)
     return searched(observation, point, STEPS, changing) if np.isfinite(point.weighted).all() else None
 
 
 def _from_expected(observation: Observation, before: Point, probed: Probed) -> Point | None:
-    """A fit from the expected values of all that has a prior, and the best of the candidate's trials there."""
+    """A fit from the expected values of all that has a prior, and the best of the candidate's trials there; in closed
+    loop first."""
+    alone = observation.following(0.0)
     best: Point | None = None
     for trial in probed.candidate.trials:
         start = _started(before, replace(probed, start=trial, moved=np.zeros_like(probed.moved)))
         values = np.array(
             [u.expected if u.deviation is not None else v for u, v in zip(start.unknowns, start.values, strict=True)]
         )
-        tried = point_at(observation, start.model, start.unknowns, values, observation.quiet, start.tangents)
+        tried = point_at(alone, start.model, start.unknowns, values, start.tangents)
         if np.isfinite(tried.weighted).all() and (best is None or tried.cost < best.cost):
             best = tried
-    return None if best is None else settled(observation, best, STEPS)
+    if best is None:
+        return None
+    near = settled(alone, best, STEPS, most=1)
+    return settled(
+        observation, point_at(observation, near.model, near.unknowns, near.values, near.tangents), STEPS, AGAIN
+    )
 
 
 def polished(observation: Observation, before: Judged, found: Refitted) -> Refitted:
@@ -146,7 +155,7 @@ def polished(observation: Observation, before: Judged, found: Refitted) -> Refit
     free = _indices(point.unknowns, [p.name for p in found.candidate.free])
     try:
         tangents = point.tangents.copy()
-        tangents[near] = observation.tangents(point.model, point.unknowns, point.values, point.noise, near)
+        tangents[near] = observation.tangents(point.model, point.unknowns, point.values, near)
         point = searched(observation, replace(point, tangents=tangents), POLISHING, free)
     except SpecError:
         return found
@@ -184,7 +193,7 @@ def deeper(observation: Observation, before: Judged, found: Refitted) -> Judged 
     point = before.point
     values = np.array([found.judged.point.value(u.name) for u in point.unknowns])
     try:
-        tried = point_at(observation, point.model, point.unknowns, values, found.judged.point.noise, point.tangents)
+        tried = point_at(observation, point.model, point.unknowns, values, point.tangents)
         if not tried.cost < point.cost - DEEPER:
             return None
         better = judge(observation, settled(observation, tried, STEPS))

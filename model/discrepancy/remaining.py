@@ -48,12 +48,13 @@ def shapes(
     residuals: Sequence[Floats],
     deviations: Floats,
     signal: Signal = "position",
+    following: float = 0.0,
 ) -> tuple[RemainingShape, ...]:  # fmt: skip
     """What is left as torques in bins of time, position, speed, direction and drive; what explains most comes first.
 
     Args:
         residuals: per record (m, n) measured − simulated. deviations: (n,) of their noise.
-        signal: what was measured.
+        signal: what was measured. following: the share of recorded readings that the residuals' simulation was given.
 
     Empty where no joint is off by more than noise, or what is left goes with none of these.
     Raises SpecError when a simulation does not stay finite.
@@ -66,7 +67,7 @@ def shapes(
             continue
         torque = np.concatenate(
             [
-                _torque(model, rec, r[:, j], j, float(deviations[j]), signal)
+                _torque(model, rec, r[:, j], j, float(deviations[j]), signal, following)
                 for rec, r in zip(records, residuals, strict=True)
             ]
         )
@@ -85,41 +86,46 @@ def shapes(
 
 
 def torque_of(
-    model: Model, record: Record, residual: Floats, deviations: Floats, signal: Signal = "position"
-) -> Floats:
+    model: Model, record: Record, residual: Floats, deviations: Floats, signal: Signal = "position",
+    following: float = 0.0,
+) -> Floats:  # fmt: skip
     """Torque (m, n), N·m or N, that leaves a residual (m, n) of a record, joint by joint."""
     columns = [
-        _torque(model, record, residual[:, j], j, float(deviations[j]), signal) for j in range(model.joint_count)
+        _torque(model, record, residual[:, j], j, float(deviations[j]), signal, following)
+        for j in range(model.joint_count)
     ]
     return np.stack(columns, axis=1)
 
 
-def _torque(model: Model, record: Record, residual: Floats, j: int, deviation: float, signal: Signal) -> Floats:
+def _torque(
+    model: Model, record: Record, residual: Floats, j: int, deviation: float, signal: Signal, following: float
+) -> Floats:
     """The same for one joint, (m,); zero outside the stretches that are compared."""
-    answer = _answer(model, record, j, signal)
+    answer = _answer(model, record, j, signal, following)
     torque = np.zeros(len(residual))
     for run in record.runs:
         torque[run] = _deconvolved(residual[run], answer, deviation)
     return torque
 
 
-def _answer(model: Model, record: Record, j: int, signal: Signal) -> Floats:
+def _answer(model: Model, record: Record, j: int, signal: Signal, following: float) -> Floats:
     """Readings (MEMORY,) after 1 N·m (N) at joint j for one period: exact derivatives by the speeds at the start.
 
     An impulse p at joint j changes all speeds by D⁻¹ e_j p.
     """
     loop: Literal["open", "closed"] = "open" if isinstance(model.machine.controller, NoController) else "closed"
-    run = simulate(model, record.inputs, Options(loop=loop, quantise=False))
+    run = simulate(model, record.inputs, Options(loop=loop, quantise=False, following=following))
     begin = _sliding(run.velocity[:, j])
     part = slice(begin, begin + MEMORY)
     inputs = replace(
         record.inputs, time=record.inputs.time[part], set_points=record.inputs.set_points[part],
-        drive=record.inputs.drive[part], initial=np.stack([run.position[begin], run.velocity[begin]], axis=1),
+        drive=record.inputs.drive[part], readings=record.inputs.readings[part],
+        initial=np.stack([run.position[begin], run.velocity[begin]], axis=1),
         first_drive=run.drive[max(begin - 1, 0)].copy(), rows=np.arange(float(len(run.time[part]))),
         noise=record.inputs.noise[part],
     )  # fmt: skip
     names = [f"initial.joint{number}.velocity" for number in model.machine.modelled_joints]
-    slopes = sensitivities(model, inputs, names, Options(loop=loop)).of(
+    slopes = sensitivities(model, inputs, names, Options(loop=loop, following=following)).of(
         OUT_SPEED if signal == "velocity" else OUT_READING
     )
     speeds = np.linalg.inv(mass_matrix(chain_of(model), run.position[begin]))[:, j]

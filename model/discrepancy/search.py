@@ -35,15 +35,13 @@ MOST_SEARCHES = 8
 class Point:
     """Values of the unknowns, and what they leave.
 
-    values (p,); noise: what the controller's readings had beside the angle; residuals: measured − simulated (m, n) rad
-    a record; weighted (N,); cost: |weighted|² + prior; tangents (p, N): derivatives of the weighted readings, at this
-    point or one near it.
+    values (p,); residuals: measured − simulated (m, n) rad a record; weighted (N,); cost: |weighted|² + prior;
+    tangents (p, N): derivatives of the weighted readings, at this point or one near it.
     """
 
     model: Model
     unknowns: tuple[Unknown, ...]
     values: Floats
-    noise: Signals
     residuals: Signals
     weighted: Floats
     tangents: Floats
@@ -84,19 +82,17 @@ class Point:
 
 
 def point_at(
-    observation: Observation, model: Model, unknowns: Sequence[Unknown], values: Floats, noise: Signals,
-    tangents: Floats | None = None,
-) -> Point:  # fmt: skip
-    """A point with its own noise put back. Derivatives are computed unless some of a point near it are given.
+    observation: Observation, model: Model, unknowns: Sequence[Unknown], values: Floats, tangents: Floats | None = None
+) -> Point:
+    """A point; derivatives are computed unless some of a point near it are given.
 
     Raises SpecError when the simulation does not stay finite.
     """
     unknowns = tuple(unknowns)
-    first = observation.residuals(model, unknowns, values, noise)
-    noise = observation.noise_of(first) if all(np.isfinite(r).all() for r in first) else noise
     if tangents is None:
-        tangents = observation.tangents(model, unknowns, values, noise)
-    return _point(observation, model, unknowns, values, noise, tangents)
+        tangents = observation.tangents(model, unknowns, values)
+    residuals = observation.residuals(model, unknowns, values)
+    return Point(model, unknowns, values, residuals, observation.weighted(residuals), tangents)
 
 
 def searched(observation: Observation, point: Point, steps: int, changing: Sequence[int] = ()) -> Point:
@@ -104,15 +100,14 @@ def searched(observation: Observation, point: Point, steps: int, changing: Seque
     anew at every step."""
     for number in range(steps):
         if changing:
-            own = observation.tangents(point.model, point.unknowns, point.values, point.noise, changing)
+            own = observation.tangents(point.model, point.unknowns, point.values, changing)
             tangents = point.tangents.copy()
             tangents[list(changing)] = own
             point = replace(point, tangents=tangents)
         following, descends = _step(observation, point)
         if not descends:
             return following
-        gained = point.cost - following.cost
-        point = _own_noise(observation, following)
+        gained, point = point.cost - following.cost, following
         if gained < SETTLED and number > 0:
             break
     return point
@@ -120,18 +115,18 @@ def searched(observation: Observation, point: Point, steps: int, changing: Seque
 
 def with_new_tangents(observation: Observation, point: Point) -> Point:
     """The point with derivatives that were computed at it."""
-    tangents = observation.tangents(point.model, point.unknowns, point.values, point.noise)
+    tangents = observation.tangents(point.model, point.unknowns, point.values)
     return replace(point, tangents=tangents)
 
 
-def settled(observation: Observation, point: Point, steps: int) -> Point:
+def settled(observation: Observation, point: Point, steps: int, most: int = MOST_SEARCHES) -> Point:
     """The point to which searches lead, each with derivatives computed where it begins, until one gains nothing more:
     what two close rivals still differ by then is not the state of their fits.
 
     Its derivatives are those of the last search's beginning, hardly away, without the corrections made on the way: a
     correction for a short step is mostly noise, and intervals come from derivatives.
     """
-    for _ in range(MOST_SEARCHES):
+    for _ in range(most):
         try:
             begun = with_new_tangents(observation, point)
             following = searched(observation, begun, steps)
@@ -149,7 +144,7 @@ def _step(observation: Observation, point: Point) -> tuple[Point, bool]:
     for share, damping in ATTEMPTS:
         step = _gauss_newton(point, low - point.values, high - point.values, damping)
         values = np.clip(point.values + share * step, low, high)  # against rounding: the whole step is within bounds
-        tried = _point(observation, point.model, point.unknowns, values, point.noise, point.tangents)
+        tried = point_at(observation, point.model, point.unknowns, values, point.tangents)
         if not np.isfinite(tried.weighted).all():
             continue
         corrected = _corrected(point, tried)
@@ -188,16 +183,3 @@ def _corrected(point: Point, tried: Point) -> Floats:
         return point.tangents
     surprise = (point.weighted - tried.weighted) - moved @ point.tangents
     return point.tangents + np.outer(metric / length, surprise)
-
-
-def _own_noise(observation: Observation, point: Point) -> Point:
-    noise = observation.noise_of(point.residuals)
-    return _point(observation, point.model, point.unknowns, point.values, noise, point.tangents)
-
-
-def _point(
-    observation: Observation, model: Model, unknowns: tuple[Unknown, ...], values: Floats, noise: Signals,
-    tangents: Floats,
-) -> Point:  # fmt: skip
-    residuals = observation.residuals(model, unknowns, values, noise)
-    return Point(model, unknowns, values, noise, residuals, observation.weighted(residuals), tangents)

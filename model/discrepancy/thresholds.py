@@ -28,9 +28,9 @@ class Thresholds:
         interesting: gain of a probe from which a candidate is worth a fit.
     """
 
-    significant: float = 18.0
-    echo: float = 0.05
-    distant_echo: float = 0.01
+    significant: float = 10.0
+    echo: float = 0.03
+    distant_echo: float = 0.005
     kin: float = 0.5
     margin: float = 4.0
     unexplained: float = 0.3

@@ -25,8 +25,8 @@ from model.machine_model.model import Model
 
 Floats = NDArray[np.float64]
 
-RESPONSE_SAMPLES = 30
-"""Length of the impulse response: 0.6 s at 20 ms."""
+RESPONSE_SAMPLES = 75
+"""Length of the impulse response: 1.5 s at 20 ms, for a simulation that follows the record comes back slowly."""
 SHAPES = {"torque_ripple": "cycles", "periodic_disturbance": "frequency"}
 """The parameter of each that a spectrum finds."""
 TRIAL_RATES = {"torque_ripple": (23.0, 47.0), "periodic_disturbance": (0.7, 2.1, 4.3)}
@@ -116,7 +116,7 @@ def torque_response(observation: Observation, point: Point, joint: int) -> Float
             sizes.append(size)
             waves.append(np.sin(_phase(observation, point, name, column, np.array([value]))[0]))
     starts = [np.tile(i, (len(vectors), 1, 1)) for i in initials]
-    shown = observation.readings(model, np.array(vectors), starts, point.noise)[0][..., column]
+    shown = observation.readings(model, np.array(vectors), starts)[0][..., column]
     shown = (shown[1:] - shown[:1]) / np.array(sizes)[:, None]
     rows = [_lagged(wave) for wave in waves]
     regressor = np.concatenate([r[RESPONSE_SAMPLES:] for r in rows])

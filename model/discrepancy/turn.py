@@ -59,11 +59,12 @@ def _on(joints: Sequence[int], found: Sequence[SignalError]) -> tuple[SignalErro
 
 
 def _left(observation: Observation, point: Point) -> Left:
-    """Measured − simulated of any model with the noise and the starts of a point: an effect is taken out, all else
-    stays."""
+    """Measured − simulated of any model with the starts of a point: an effect is taken out, all else stays. In closed
+    loop, for the sizes that are told are those that are seen on the arm."""
+    alone = observation.following(0.0)
     kept = [k for k, u in enumerate(point.unknowns) if u.name not in point.model.by_name]
     unknowns, values = [point.unknowns[k] for k in kept], point.values[kept]
-    return lambda model: observation.residuals(model, unknowns, values, point.noise)
+    return lambda model: alone.residuals(model, unknowns, values)
 
 
 def _sum_lambda2(point: Point, before: Point) -> float:

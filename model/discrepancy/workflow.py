@@ -28,7 +28,7 @@ from model.discrepancy.holdout import HeldOut, held_out
 from model.discrepancy.next_experiment import Asked, Asker, rivals_of
 from model.discrepancy.noise_floor import noise_floor
 from model.discrepancy.notes import NOTHING_HELD_OUT, on_unfinished, on_what_is_stated
-from model.discrepancy.observation import Observation, observed
+from model.discrepancy.observation import FOLLOWING_FOR_ERRORS, Observation, observed
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.probing import Probed
 from model.discrepancy.proved import proved_step
@@ -44,6 +44,8 @@ from model.machine_model.parameter import Parameter
 
 CHANCES = 3
 """Candidates of a turn that held-out traces may refuse, until there is nothing more to look for."""
+NEARER = (0.0, 0.5)
+"""Shares of the record that are followed on the way to a first fit."""
 FIRST_STEPS = 6
 """Of a search before its derivatives are computed anew."""
 
@@ -137,8 +139,9 @@ def _case(
     observation: Observation, held: HeldOut | None, point: Point, traces: tuple[Trace, ...],
     options: DiagnosisOptions, excluded: tuple[str, ...],
 ) -> Case:  # fmt: skip
+    told = observation.following(FOLLOWING_FOR_ERRORS)
     return Case(
-        observation, noise_floor(observation, point), held, np.zeros(0) if held is None else held.floor(point), traces,
+        observation, told, noise_floor(told, point), held, np.zeros(0) if held is None else held.floor(point), traces,
         options, THRESHOLDS, excluded,
     )  # fmt: skip
 
@@ -161,12 +164,18 @@ def _given(observation: Observation, model: Model, unknowns: Sequence[Unknown]) 
     """The model as it was given, with its derivatives. Effects proved by the controller's numbers stay as they are."""
     free = tuple(u for u in unknowns if ".wrong_gain." not in u.name)
     values = np.array([u.start for u in free])
-    return point_at(observation, model, free, values, observation.quiet)
+    return point_at(observation, model, free, values)
 
 
 def _tolerances(observation: Observation, given: Point) -> Point:
-    """The tolerance parameters fitted to the end: what they leave undone would look like an effect."""
-    return settled(observation, searched(observation, given, FIRST_STEPS), LAST_STEPS)
+    """The tolerance parameters fitted to the end: what they leave undone would look like an effect. In closed loop
+    first, where a model that is far off does not run away from the record."""
+    near = given
+    for share in NEARER:
+        here = observation.following(share)
+        near = searched(here, point_at(here, near.model, near.unknowns, near.values), FIRST_STEPS)
+    begun = point_at(observation, near.model, near.unknowns, near.values)
+    return settled(observation, searched(observation, begun, FIRST_STEPS), LAST_STEPS)
 
 
 def _searched(case: Case, begun: Judged, progress: Progress, cancel: Cancel) -> _Found:

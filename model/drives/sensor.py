@@ -18,12 +18,16 @@ def sensed_angle(angle: complex, joint: NDArray[Any]) -> Any:
     """Angle (rad) that the potentiometer reports: scale, shift and bend about the middle of its range."""
     middle = joint[at.AT_ZERO] + 0.5 * joint[at.RANGE]
     sensed = angle + joint[at.POTENTIOMETER_GAIN] * (angle - middle) + joint[at.POTENTIOMETER_OFFSET]
-    if joint[at.BEND_1] != 0.0 or joint[at.BEND_2] != 0.0 or joint[at.BEND_3] != 0.0 or joint[at.BEND_4] != 0.0:
+    bent = False
+    for column in range(at.BEND_1, at.BEND_8 + 1):
+        bent = bent or joint[column] != 0.0
+    if bent:
         half_wave = np.pi * (angle - joint[at.AT_ZERO]) / joint[at.RANGE]
-        s, c = sin_cos(half_wave)
-        s2, c2 = 2.0 * s * c, 1.0 - 2.0 * s * s
-        s3, s4 = s2 * c + c2 * s, 2.0 * s2 * c2
-        sensed += joint[at.BEND_1] * s + joint[at.BEND_2] * s2 + joint[at.BEND_3] * s3 + joint[at.BEND_4] * s4
+        wave, cosine = sin_cos(half_wave)
+        before = 0.0 * wave
+        for column in range(at.BEND_1, at.BEND_8 + 1):
+            sensed += joint[column] * wave
+            before, wave = wave, 2.0 * cosine * wave - before
     return sensed
 
 

@@ -46,7 +46,7 @@ SENSOR = (
         source="±0.25 % linearity of the plastic film (section 6.2), as the first terms of a sine series",
         parameters=tuple(
             EffectParameter(f"bend_{k}", column, "rad", low=_least_bend, high=_bend_limit, deviation=_bend)
-            for k, column in enumerate((at.BEND_1, at.BEND_2, at.BEND_3, at.BEND_4), start=1)
+            for k, column in enumerate(at.BENDS, start=1)
         ),
     ),
 )

@@ -65,6 +65,8 @@ def with_bends(model: Model, options: FitOptions, signal: Signal) -> tuple[Model
     for p in wider.parameters:
         if p.effect == BEND and p.joints[0] in joints:
             number = int(p.name.rpartition("_")[2])
+            if number > options.bend_terms:
+                continue
             size = _linearity(model.machine, p.joints[0]) or 0.0025
             sensor = model.machine.joint(p.joints[0]).sensor
             range_ = 2 * math.pi if sensor is None else sensor.range.value

@@ -33,6 +33,7 @@ class FitOptions(BaseModel):
     starts: searches from different beginnings, the model's own values and seeded draws from the priors.
     start_posture: let the arm start off the posture it was read at, by the sensor's error.
     sensor_bend: let the potentiometers bend within their stated linearity; None: where the machine states one.
+    bend_terms: of the sine series of each bend, at most 8.
     friction_form: leave open how friction behaves near zero speed, where laws of friction differ.
     whiten: take out the correlation of the residual before weighing it.
     """
@@ -50,6 +51,7 @@ class FitOptions(BaseModel):
     seed: Annotated[int, Field(ge=0)] = 0
     start_posture: bool = True
     sensor_bend: bool | None = None
+    bend_terms: Annotated[int, Field(ge=1, le=8)] = 4
     friction_form: bool = True
     whiten: bool = True
     replicas: Annotated[int, Field(ge=0, le=1000)] = 16

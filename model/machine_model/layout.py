@@ -81,13 +81,18 @@ SHARED = 10
     BEND_2,
     BEND_3,
     BEND_4,
+    BEND_5,
+    BEND_6,
+    BEND_7,
+    BEND_8,
     GAIN_ERROR,  # relative, of the controller
     EXTRA_DELAY,  # s
     LOST,  # share of set points
     SHAPE,  # of the link: CYLINDER, ROD or BODY
     PRISMATIC,  # 1, or 0 for a revolute joint
     USER,  # the first of USER_COLUMNS for effects from files of the user's own
-) = range(66)
+) = range(70)
+BENDS = range(BEND_1, BEND_8 + 1)
 USER_COLUMNS = 8
 PER_JOINT = USER + USER_COLUMNS
 

@@ -50,7 +50,8 @@ class Engine:
         parts = np.ascontiguousarray(vectors[:, at.SHARED :]).reshape(len(vectors), -1, at.PER_JOINT)
         arguments = (
             which, np.array([len(p.set_points) for p in prepared]), _padded([p.set_points for p in prepared]),
-            _padded([p.recorded for p in prepared]), _padded([p.noise for p in prepared]), initials,
+            _padded([p.recorded for p in prepared]), _padded([p.noise for p in prepared]),
+            _padded([p.readings for p in prepared]), np.array([p.following for p in prepared]), initials,
             np.array([p.first_drive for p in prepared]), shares, parts, np.array([p.gains for p in prepared]), flags,
             np.array([p.settings for p in prepared]), own_table(self.model, vectors.dtype), step, out,
         )  # fmt: skip

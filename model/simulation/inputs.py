@@ -18,6 +18,8 @@ REST_COUNTS = 2.0
 """Counts of the sensor within which the readings before the first new set point count as one posture."""
 REST_PERIODS = 25
 """At most so many of them are averaged."""
+NEIGHBOURS, NEARLY = 1.5, 1e-6
+"""Periods: samples further apart than the one have a gap between them; the other is rounding."""
 LARGEST_ANGLE = 20.0
 """rad; more than three turns of a joint are taken for degrees."""
 
@@ -31,6 +33,7 @@ class RunInputs:
         period: s. time: (k,) s, of the record's clock.
         set_points: (k, n) rad, held where the record has gaps. drive: (k, n) motor volts, for a run in open loop.
         initial: (n, 2) position (rad) and speed (rad/s). first_drive: (n,) commanded volts before the first period.
+        readings: (k, n) rad, NaN where the record has a gap.
         rows: (m,) position of each sample on the grid. gains: (n, GAINS).
         has_set_points, has_drive: whether the record has them; what it has not is held at the reading, or at zero.
     """
@@ -40,6 +43,7 @@ class RunInputs:
     time: Floats
     set_points: Floats
     drive: Floats
+    readings: Floats = field(repr=False)
     initial: Floats
     first_drive: Floats
     rows: Floats
@@ -86,9 +90,9 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
     if trace.velocity is not None:
         initial[:, 0], initial[:, 1] = measured[0], trace.velocity[0, columns]
     return RunInputs(
-        joints, period, trace.time[0] + period * np.arange(count), set_points, drive, initial, drive[0].copy(), rows,
-        _gains(machine, trace), np.zeros((count, len(joints))), trace.record.trace_id,
-        trace.set_point is not None, trace.drive is not None,
+        joints, period, trace.time[0] + period * np.arange(count), set_points, drive,
+        readings_on_grid(measured, rows, count), initial, drive[0].copy(), rows, _gains(machine, trace),
+        np.zeros((count, len(joints))), trace.record.trace_id, trace.set_point is not None, trace.drive is not None,
     )  # fmt: skip
 
 
@@ -127,6 +131,19 @@ def _held(samples: Floats, rows: Floats, count: int) -> Floats:
     """Samples on the grid, each held until the next one."""
     last = np.searchsorted(rows, np.arange(count) + 1e-6, side="right") - 1
     return np.ascontiguousarray(samples[np.clip(last, 0, len(samples) - 1)])
+
+
+def readings_on_grid(measured: Floats, rows: Floats, count: int) -> Floats:
+    """Readings (k, n) at whole periods: those of the samples there, or between two that are next to each other; NaN
+    where a sample is missing."""
+    grid = np.arange(float(count))
+    following = np.clip(np.searchsorted(rows, grid - NEARLY), 1, len(rows) - 1)
+    left, right = rows[following - 1], rows[following]
+    known = (right - left < NEIGHBOURS) | (np.abs(grid - left) < NEARLY) | (np.abs(grid - right) < NEARLY)
+    known &= (grid > rows[0] - NEARLY) & (grid < rows[-1] + NEARLY)
+    found = np.stack([np.interp(grid, rows, column) for column in measured.T], axis=1)
+    found[~known] = np.nan
+    return found
 
 
 def _rest_posture(trace: Trace, measured: Floats, first: Floats, machine: Machine) -> Floats:

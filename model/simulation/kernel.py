@@ -7,6 +7,7 @@ Every entry takes a batch of runs:
     which: (r,) record of each run; first, last: the runs to do, first ≤ i < last.
     lengths: (t,) periods of each record. set_points: (t, k, n) counts for the board's PID, rad else.
     recorded: (t, k, n) motor volts where nothing controls. noise: (t, k, n) added to the readings before rounding.
+    readings: (t, k, n) recorded ones in rad, NaN where there is none, and following: (t,), as `Options` tells.
     initial: (r, n, 2) position and speed. first_drive: (t, n) commanded volts before the record.
     shares: (r, SHARED) and parts: (r, n, PER_JOINT), the flat vectors. gains: (t, n, GAINS). flags: (n,).
     settings: (t, SETTINGS). own: (n, e, 2), the user's own effects (`model.simulation.own_torque`).
@@ -83,8 +84,9 @@ def _advance_of(
 @internal
 def batch(
     kind: Any, first: int, last: int, which: Array, lengths: Array,
-    set_points: Array, recorded: Array, noise: Array, initial: Array, first_drive: Array, shares: Array, parts: Array,
-    gains: Array, flags: Array, settings: Array, own: Array, step: float, out: Array,
+    set_points: Array, recorded: Array, noise: Array, readings: Array, following: Array, initial: Array,
+    first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array, settings: Array, own: Array,
+    step: float, out: Array,
 ) -> None:  # fmt: skip
     """Runs first … last − 1; `kind` is a tag that chooses the dynamics."""
     n = initial.shape[1]
@@ -117,8 +119,8 @@ def batch(
         for k in range(lengths[t]):
             for j in range(n):
                 queue[k % QUEUE, j] = sample(
-                    k, j, state, set_points[t], recorded[t], noise[t], gains[t], shared, joints, settings[t], memory,
-                    out[r],
+                    k, j, state, set_points[t], recorded[t], noise[t], readings[t], following[t], gains[t], shared,
+                    joints, settings[t], memory, out[r],
                 )  # fmt: skip
             done = 0.0 * period
             for i in range(n + 1):
@@ -169,37 +171,37 @@ def at_rest(
 @entry
 def run_closed_form(
     first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
-    initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array,
-    settings: Array, own: Array, step: float, out: Array,
+    readings: Array, following: Array, initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array,
+    flags: Array, settings: Array, own: Array, step: float, out: Array,
 ) -> None:  # fmt: skip
     """The waist-shoulder-elbow arm of rods with rigid transmissions."""
     batch(
-        ClosedForm(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
-        shares, parts, gains, flags, settings, own, step, out,
+        ClosedForm(0), first, last, which, lengths, set_points, recorded, noise, readings, following, initial,
+        first_drive, shares, parts, gains, flags, settings, own, step, out,
     )  # fmt: skip
 
 
 @entry
 def run_flexible(
     first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
-    initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array,
-    settings: Array, own: Array, step: float, out: Array,
+    readings: Array, following: Array, initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array,
+    flags: Array, settings: Array, own: Array, step: float, out: Array,
 ) -> None:  # fmt: skip
     """The same arm where a transmission gives or has play."""
     batch(
-        Flexible(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
-        shares, parts, gains, flags, settings, own, step, out,
+        Flexible(0), first, last, which, lengths, set_points, recorded, noise, readings, following, initial,
+        first_drive, shares, parts, gains, flags, settings, own, step, out,
     )  # fmt: skip
 
 
 @entry
 def run_chain(
     first: int, last: int, which: Array, lengths: Array, set_points: Array, recorded: Array, noise: Array,
-    initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array, flags: Array,
-    settings: Array, own: Array, step: float, out: Array,
+    readings: Array, following: Array, initial: Array, first_drive: Array, shares: Array, parts: Array, gains: Array,
+    flags: Array, settings: Array, own: Array, step: float, out: Array,
 ) -> None:  # fmt: skip
     """Any machine."""
     batch(
-        AnyChain(0), first, last, which, lengths, set_points, recorded, noise, initial, first_drive,
-        shares, parts, gains, flags, settings, own, step, out,
+        AnyChain(0), first, last, which, lengths, set_points, recorded, noise, readings, following, initial,
+        first_drive, shares, parts, gains, flags, settings, own, step, out,
     )  # fmt: skip

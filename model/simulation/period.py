@@ -25,10 +25,13 @@ OUTPUTS = 6
 @internal
 def sample(
     k: int, j: int, state: NDArray[Any], set_points: NDArray[Any], recorded: NDArray[Any], noise: NDArray[Any],
-    gains: NDArray[Any], shared: NDArray[Any], joints: NDArray[Any], settings: NDArray[Any], memory: NDArray[Any],
-    out: NDArray[Any],
+    readings: NDArray[Any], following: float, gains: NDArray[Any], shared: NDArray[Any], joints: NDArray[Any],
+    settings: NDArray[Any], memory: NDArray[Any], out: NDArray[Any],
 ) -> Any:  # fmt: skip
-    """Reading, error and power of joint index j in period k, written to `out`; returns the commanded motor volts."""
+    """Reading, error and power of joint index j in period k, written to `out`; returns the commanded motor volts.
+
+    The controller reads `following` of the way from the model's reading to the recorded one, where there is one.
+    """
     joint = joints[j]
     kind, quantise = settings[at.CONTROLLER], settings[at.QUANTISE] != 0
     has_sensor = joint[at.RAD_PER_COUNT].real != 0.0
@@ -36,6 +39,9 @@ def sample(
     wanted = set_points[k, j] - joint[at.LOST] * (set_points[k, j] - set_points[max(k - 1, 0), j])
     unit = joint[at.RAD_PER_COUNT] if has_sensor else 1.0 + 0.0 * joint[at.RAD_PER_COUNT]
     zero = joint[at.AT_ZERO] if has_sensor else 0.0 * joint[at.AT_ZERO]
+    out[OUT_READING, k, j] = zero + unit * read
+    if following != 0.0 and not np.isnan(readings[k, j]):
+        read += following * ((readings[k, j] - zero) / unit - read)
     if kind == at.BOARD_PID:
         error = wanted - read
         if k == 0:
@@ -59,7 +65,6 @@ def sample(
         power = drive / joint[at.VOLTS_PER_COUNT]
     out[OUT_POSITION, k, j] = state[j, POSITION]
     out[OUT_SPEED, k, j] = state[j, SPEED]
-    out[OUT_READING, k, j] = zero + unit * read
     out[OUT_ERROR, k, j] = error
     out[OUT_POWER, k, j] = power
     out[OUT_DRIVE, k, j] = drive

@@ -43,6 +43,9 @@ class Options:
         quantise: round readings and power as the board does. Without, both are left as they are.
         step: longest step of integration, s.
         noise: (k, n) added to the readings before rounding, in counts of the sensor; None for none.
+        following: share of the difference between recorded and simulated reading that the simulated controller is
+            given, where a reading was recorded. At 0 it reads the model alone: an output error in closed loop. At 1 it
+            reads the record, noise and all: the recorded drive moves the model, and nothing brings it back.
         initial: (n, 2) position (rad) and speed (rad/s) at the start; None: as estimated from the record.
         general: use the recursive dynamics even where there is a closed form.
     """
@@ -51,6 +54,7 @@ class Options:
     quantise: bool = True
     step: float = LONGEST_STEP
     noise: Floats | None = None
+    following: float = 0.0
     initial: Floats | None = None
     general: bool = False
 
@@ -59,9 +63,9 @@ class Options:
 class Simulation:
     """Motion of a model, one row a control period, one column a joint.
 
-    time (k,) s; position (k, n) rad, the joint's own angle; velocity rad/s; reading rad, what the controller read;
-    error rad, set point − reading; drive, motor volts commanded (before dead zone and supply limit); power, DAC
-    counts; rows (m,) where the samples of the record lie on this grid.
+    time (k,) s; position (k, n) rad, the joint's own angle; velocity rad/s; reading rad, what the model's sensor shows;
+    error rad, set point − what the controller read; drive, motor volts commanded (before dead zone and supply limit);
+    power, DAC counts; rows (m,) where the samples of the record lie on this grid.
     """
 
     joints: tuple[int, ...]
@@ -193,6 +197,8 @@ class Prepared:
     set_points: Floats
     recorded: Floats
     noise: Floats
+    readings: Floats
+    following: float
     initial: Floats
     first_drive: Floats
     gains: Floats
@@ -228,7 +234,10 @@ def prepare(model: Model, inputs: RunInputs, options: Options) -> Prepared:
     initial = inputs.initial if options.initial is None else np.ascontiguousarray(options.initial)
     if noise.shape != set_points.shape:
         raise SpecError(f"noise has shape {noise.shape}; {set_points.shape} is needed")
-    return Prepared(set_points, inputs.drive, noise, initial, inputs.first_drive, inputs.gains, settings, inputs.period)
+    return Prepared(
+        set_points, inputs.drive, noise, inputs.readings, options.following, initial, inputs.first_drive, inputs.gains,
+        settings, inputs.period,
+    )  # fmt: skip
 
 
 def _counts(model: Model, set_points: Floats) -> Floats:

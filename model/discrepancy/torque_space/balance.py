@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 BODY_COLUMNS = (*range(at.A, at.SHIFT + 1), at.ROTOR_INERTIA, at.GEAR, at.PRISMATIC, at.SHAPE)
-SENSOR_COLUMNS = (at.POTENTIOMETER_GAIN, at.POTENTIOMETER_OFFSET, at.BEND_1, at.BEND_2, at.BEND_3, at.BEND_4)
+SENSOR_COLUMNS = (at.POTENTIOMETER_GAIN, at.POTENTIOMETER_OFFSET, *at.BENDS)
 FRICTION_COLUMNS = (at.COULOMB, at.COULOMB_ARM)
 CONTACT_SHARE = 0.02
 """Torque through a transmission, as a share of its root mean square, over which play changes sides."""

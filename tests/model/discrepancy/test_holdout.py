@@ -21,7 +21,7 @@ def begun(traces: int, start: float) -> Point:
     """The arm's own model on that many fitted traces, each said to begin `start` rad off."""
     observation, model, unknowns = observed(imagined.arm(), imagined.traces(imagined.arm(), traces, seconds=3.0))
     values = np.array([start if u.name.startswith("initial.") else u.start for u in unknowns])
-    return point_at(observation, model, unknowns, values, observation.quiet)
+    return point_at(observation, model, unknowns, values)
 
 
 @pytest.mark.parametrize("fitted", [1, 3])
@@ -43,7 +43,7 @@ def found(model: Model) -> Point:
     """What a fit to a record of that very arm would lead to."""
     observation, wider, unknowns = observed(model, [imagined.trace(model, seconds=6.0)])
     values = np.array([u.start for u in unknowns])
-    return point_at(observation, wider, unknowns, values, observation.quiet)
+    return point_at(observation, wider, unknowns, values)
 
 
 def left_on(point: Point, *phases: float, size: float = SIZE) -> list[np.ndarray]:

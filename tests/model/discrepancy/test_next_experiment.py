@@ -51,7 +51,7 @@ def record(arm: Model, spec: ExperimentSpec, seed: int) -> Trace:
 def known(trace: Trace) -> Point:
     """The model without an effect, fitted."""
     observation, model, unknowns = observed(imagined.arm(), [trace])
-    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]), observation.quiet)
+    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
     return search.settled(observation, given, 6)
 
 
@@ -109,7 +109,7 @@ def again(point: Point, traces: list[Trace]) -> Point:
     starts = [u for u in unknowns if u.trace is not None]
     every = (*(point.unknowns[k] for k in shared), *starts)
     values = np.concatenate([point.values[shared], [u.start for u in starts]])
-    begun = point_at(observation, point.model, every, values, observation.quiet)
+    begun = point_at(observation, point.model, every, values)
     return search.settled(observation, begun, 6)
 
 

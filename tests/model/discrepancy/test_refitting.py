@@ -18,7 +18,7 @@ DELAY = 0.015
 def test_a_delay_that_has_driven_the_tolerance_parameters_to_the_brink_is_fitted_from_the_expected_numbers() -> None:
     arm = imagined.arm().with_effect("input_delay", (3,), {"time": DELAY})
     observation, model, unknowns = observed(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
-    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]), observation.quiet)
+    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
     before = judge(observation, settled(observation, given, 4))
     (found,) = probed(observation, before.point, candidates(before.point.model, ("input_delay",), (3,)))
     fitted = refitted(observation, before, found)

@@ -22,24 +22,25 @@ def arm() -> Model:
     return imagined.arm()
 
 
-def left(arm: Model, record: Record) -> np.ndarray:
-    run = simulate(arm, record.inputs, Options(quantise=False))
+def left(arm: Model, record: Record, following: float = 0.0) -> np.ndarray:
+    run = simulate(arm, record.inputs, Options(quantise=False, following=following))
     return np.asarray(record.measured - run.at_samples(run.reading))
 
 
-def test_a_spring_that_the_model_lacks_comes_out_as_a_torque_against_position(arm: Model) -> None:
+@pytest.mark.parametrize("following", [0.0, 0.5])
+def test_a_spring_that_the_model_lacks_comes_out_as_a_torque_against_position(arm: Model, following: float) -> None:
     sprung = arm.with_effect("spring_torque", (JOINT,), {"stiffness": STIFFNESS, "rest": -0.4})
     records = records_of([trace_of(sprung)], arm.machine, "position")
     deviations = noise_floor(records, arm.machine, "position")
-    residual = left(arm, records[0])
-    found = shapes(arm, records, [residual], deviations)
+    residual = left(arm, records[0], following)
+    found = shapes(arm, records, [residual], deviations, following=following)
     first = found[0]
     assert (first.joint, first.against, first.torque_unit) == (JOINT, "position", "N·m")
     assert first.explained > 0.5
     pairs = [(x, t) for x, t in zip(first.centres, first.torque, strict=True) if t is not None]
     slope = np.polyfit(*np.array(pairs).T, 1)[0]
     assert slope == pytest.approx(-STIFFNESS, rel=0.25)
-    torque = torque_of(arm, records[0], residual, deviations)[records[0].runs[0], JOINT - 1]
+    torque = torque_of(arm, records[0], residual, deviations, following=following)[records[0].runs[0], JOINT - 1]
     true = -STIFFNESS * (asked_motion(arm, records[0])[records[0].runs[0], JOINT - 1] + 0.4)
     assert np.corrcoef(torque, true)[0, 1] > 0.85
 

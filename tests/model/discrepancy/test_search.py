@@ -21,7 +21,7 @@ def case() -> tuple[Observation, Point]:
     record = imagined.trace(imagined.arm().with_values(TRUTH), seconds=8.0)
     observation, model, unknowns = observed(imagined.arm(), [record])
     values = np.array([u.start for u in unknowns])
-    return observation, point_at(observation, model, unknowns, values, observation.quiet)
+    return observation, point_at(observation, model, unknowns, values)
 
 
 def test_a_search_ends_at_the_noise(case: tuple[Observation, Point]) -> None:
@@ -31,7 +31,7 @@ def test_a_search_ends_at_the_noise(case: tuple[Observation, Point]) -> None:
     values = given.values.copy()
     for name, value in TRUTH.items():
         values[names.index(name)] = value
-    truth = point_at(observation, given.model, given.unknowns, values, given.noise, given.tangents)
+    truth = point_at(observation, given.model, given.unknowns, values, given.tangents)
     assert given.misfit > 2.0
     assert found.cost < truth.cost + 5.0, "the arm's own numbers explain the record no better"
 
@@ -52,7 +52,7 @@ def test_what_a_fit_without_the_candidate_reaches_too_is_not_the_candidates(case
 def test_a_corrected_derivative_repeats_the_step(case: tuple[Observation, Point]) -> None:
     observation, given = case
     values = given.values + 0.3 * np.array([0.0 if u.deviation is None else u.deviation for u in given.unknowns])
-    tried = point_at(observation, given.model, given.unknowns, values, given.noise, given.tangents)
+    tried = point_at(observation, given.model, given.unknowns, values, given.tangents)
     moved = tried.values - given.values
     assert np.allclose(moved @ _corrected(given, tried), given.weighted - tried.weighted, atol=1e-8)
 

@@ -25,7 +25,7 @@ def before(joints: tuple[int, ...]) -> tuple[Observation, Judged, tuple[Probed, 
     """A record of an arm whose gears lose so much on these joints, its tolerance fit, and gear loss probed there."""
     arm = imagined.arm().with_effect("gear_loss", joints, {"loss": LOSS})
     observation, model, unknowns = observed(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
-    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]), observation.quiet)
+    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
     fitted = judge(observation, settled(observation, given, 4))
     probes = probed(observation, fitted.point, candidates(fitted.point.model, ("gear_loss",), (1, 2, 3)))
     return observation, fitted, tuple(probes)

@@ -23,7 +23,7 @@ def seen(truth: Model, known: Model, seconds: float = 20.0) -> tuple[Observation
     """A record of `truth`, and what `known` leaves of it."""
     observation, model, unknowns = observed(known, [trace_of(truth, seconds)])
     values = np.array([u.start for u in unknowns])
-    return observation, point_at(observation, model, unknowns, values, observation.quiet)
+    return observation, point_at(observation, model, unknowns, values)
 
 
 def looked_at(seconds: float) -> Observation:

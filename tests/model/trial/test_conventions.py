@@ -116,8 +116,6 @@ def with_effect(name: str, share: float = 1.0) -> Model:
     null = own[decides].null
     absent = own[decides].value if present else (null if null is not None else 0.0)
     found[decides] = absent + share * (found[decides] - absent)
-    if name == "direction_dependent_friction":  # the mock's is in one direction only, the model's about a mean
-        model = model.with_effect("coulomb_friction", (joint,), {"torque": abs(0.5 * found[decides])})
     return model.with_values({own[last].name: value for last, value in found.items()})
 
 
