@@ -60,6 +60,11 @@ class Case:
         """Of every joint, on the traces fitted to."""
         return errors(self.told, after.model, self._told(before), self._told(after), self.floor)
 
+    def errors_of_fits(self, point: Point) -> tuple[SignalError, ...]:
+        """Of every joint, on the traces fitted to, following the record as closely as the fits do."""
+        floor = noise_floor(self.observation, point)
+        return errors(self.observation, point.model, point.residuals, point.residuals, floor)
+
     def held_residuals(self, before: Point, after: Point) -> tuple[Signals, Signals]:
         """Residuals of the held-out traces; empty where there are no such traces."""
         return ((), ()) if self.held is None else (self.held.residuals(before), self.held.residuals(after))

@@ -173,7 +173,7 @@ class Observation:
             states.append(self.state(model, unknowns, moved))
         vectors = np.stack([vector for vector, _ in states])
         starts = [np.stack([initials[t] for _, initials in states]) for t in range(len(self.records))]
-        shown = self.readings(model, vectors, starts, _step_of_derivatives(model))
+        shown = self.readings(model, vectors, starts, step_of_derivatives(model))
         found = self.weighted([one[1:] - one[:1] for one in shown]) / np.array(moves)[:, None]
         if not np.isfinite(found).all():
             raise SpecError("the simulation does not stay finite: the loop is unstable")
@@ -229,7 +229,8 @@ def _longest_step(model: Model) -> float:
     return FINE_STEP if any(use.name in QUICK for use in model.effects) else STEP
 
 
-def _step_of_derivatives(model: Model) -> float:
+def step_of_derivatives(model: Model) -> float:
+    """Longest step of integration, s, of runs that are compared over a small move."""
     return FINE_STEP if any(use.name in STIFF for use in model.effects) else COARSE_STEP
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.discrepancy.candidates import SMALL, Candidate
-from model.discrepancy.observation import Observation
+from model.discrepancy.observation import Observation, step_of_derivatives
 from model.discrepancy.search import Point
 
 Floats = NDArray[np.float64]
@@ -151,14 +151,18 @@ def _simulated(
     observation: Observation, point: Point, reference: Sequence[Floats], candidate: Candidate,
     trials: Sequence[dict[str, float]],
 ) -> Floats:  # fmt: skip
-    """Responses (k, N) of trials of a candidate, each simulated at its size; not finite where a simulation is not."""
+    """Responses (k, N) of trials of a candidate, each simulated at its size; not finite where a simulation is not.
+    Small ones are simulated as derivatives are, for derivatives are projected out of them."""
     vector, initials = observation.state(candidate.model, point.unknowns, point.values)
-    vectors = np.tile(vector, (len(trials), 1))
-    for row, trial in zip(vectors, trials, strict=True):
+    vectors = np.tile(vector, (1 + len(trials), 1))
+    for row, trial in zip(vectors[1:], trials, strict=True):
         for name, value in trial.items():
             row[list(candidate.model.parameter(name).slots)] = value
     starts = [np.tile(i, (len(vectors), 1, 1)) for i in initials]
-    shown = observation.readings(candidate.model, vectors, starts)
+    if candidate.proportional:
+        shown = observation.readings(candidate.model, vectors, starts, step_of_derivatives(candidate.model))
+        return observation.weighted([y[1:] - y[:1] for y in shown])
+    shown = observation.readings(candidate.model, vectors[1:], [s[1:] for s in starts])
     return observation.weighted([y - y0 for y, y0 in zip(shown, reference, strict=True)])
 
 

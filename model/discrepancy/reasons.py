@@ -104,18 +104,25 @@ def undecided(group: Sequence[Candidate], where: Where) -> str:
     return f"{where.summary}; these explain it, and {apart:.0f} of evidence is all that lies between them: {told}"
 
 
-def unexplained(where: Where, remaining: Sequence[RemainingShape], best: Candidate | None = None) -> str:
-    """Why none of the known effects is named, and what a torque that would explain it goes with."""
+def unexplained(
+    where: Where, remaining: Sequence[RemainingShape], joints: Sequence[int] = (), best: Candidate | None = None
+) -> str:
+    """Why none of the known effects is named, and what a torque that would explain it goes with. joints: those that are
+    left unexplained."""
+    place = where.summary
+    if where.joint is None and joints:
+        named = f"joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))}"
+        place = f"{named}: more than noise is left, over the whole record rather than at one moment"
     tried = "no known effect takes it off"
     if best is not None and best.misfit is not None:
         name = _named(best.effect, best.joints)
         tried = f"the best known one, {name}, leaves {best.misfit:.2f} times what noise would"
     if not remaining:
-        return f"{where.summary}; {tried}, and what is left goes with none of time, position, speed, direction or drive"
+        return f"{place}; {tried}, and what is left goes with none of time, position, speed, direction or drive"
     first = remaining[0]
     torques = [t for t in first.torque if t is not None]
     return (
-        f"{where.summary}; {tried}; a torque at joint {first.joint} of {min(torques):.2g} to {max(torques):.2g} "
+        f"{place}; {tried}; a torque at joint {first.joint} of {min(torques):.2g} to {max(torques):.2g} "
         f"{first.torque_unit} that goes with {first.against} explains {100 * first.explained:.0f} % of what is left"
     )
 

@@ -17,7 +17,9 @@ class Thresholds:
         kin: share of both that suffices for an effect that another joint has been found to have.
         margin: evidence over the next answer from which one name is given, instead of a group.
         unexplained: variance of a joint's error above its floor, in floors, above which something is missing that none
-            of the known effects is. unnamed: the same on the traces fitted to, while no effect has been added.
+            of the known effects is. unnamed: the same on the traces fitted to, while no effect has been added; then
+            also where the record is followed as in the fits. place: significance of one place that tells the same
+            then, standard deviations.
         least_share: share of a joint's excess that effects must explain, or they only resemble what is missing.
         worse: rise of the held-out sum of squares, in its own standard deviations, at which a step is rejected, unless
             it is less than the share `lost` of the evidence that as many samples have brought in the fit: the tolerance
@@ -35,6 +37,7 @@ class Thresholds:
     margin: float = 4.0
     unexplained: float = 0.3
     unnamed: float = 0.12
+    place: float = 4.3
     least_share: float = 0.8
     worse: float = 2.0
     lost: float = 0.5

@@ -81,9 +81,9 @@ def _of_record(model: Model, record: Record) -> dict[AgainstWhat, Floats]:
     rows = np.round(inputs.rows).astype(np.int64)
     asked = asked_motion(model, record)
     moved = directions(model, record).astype(np.float64)
-    drive = inputs.drive[rows] if np.any(inputs.drive) else np.full_like(asked, np.nan)
-    if isinstance(model.machine.controller, NoController) and not np.any(inputs.drive):
-        drive = np.full_like(asked, np.nan)
+    # A controller's drive holds the noise of the reading that it answers: a period later nothing goes with that.
+    late = 0 if isinstance(model.machine.controller, NoController) else 1
+    drive = inputs.drive[np.maximum(rows - late, 0)] if np.any(inputs.drive) else np.full_like(asked, np.nan)
     return {
         "time": np.repeat((inputs.time[rows] - inputs.time[0])[:, None], asked.shape[1], axis=1),
         "position": asked, "speed": asked_speed(asked, inputs.period), "direction": moved, "drive": drive,

@@ -121,7 +121,7 @@ def diagnose(
         *(() if asked.note is None else (asked.note,)),
     )  # fmt: skip
     answer = Diagnosis(
-        verdict=answered, summary=_summary(case, found, answered, proved, remaining),
+        verdict=answered, summary=_summary(case, found, answered, proved, remaining, left),
         steps=(*proved, *found.steps), remaining=remaining,
         model_before=model, model_after=_adopted(model, found, case.names),
         traces=case.names, holdout=tuple(t.record.trace_id for t in holdout),
@@ -233,7 +233,12 @@ def _unexplained(case: Case, found: _Found) -> tuple[int, ...]:
     joints = len(case.floor)
     judged = 0 if case.held is None else case.held.observation.samples
     counts = case.observation.samples // joints, judged // joints
-    return unexplained(case.fitted_errors(before, after), held_errors, case.thresholds, named=named, samples=counts)
+    left = unexplained(case.fitted_errors(before, after), held_errors, case.thresholds, named=named, samples=counts)
+    if named:
+        return left
+    closer = unexplained(case.errors_of_fits(after), (), case.thresholds, named=False, samples=counts)
+    places = [c.joint for c in case.where(after).cells if c.significance >= case.thresholds.place]
+    return tuple(sorted({*left, *closer, *places}))
 
 
 def _taken_back(found: _Found, left: Sequence[int]) -> _Found:
@@ -290,7 +295,8 @@ def _adopted(model: Model, found: _Found, names: tuple[str, ...]) -> Model:
 
 
 def _summary(
-    case: Case, found: _Found, answered: Verdict, proved: Sequence[Step], remaining: Sequence[RemainingShape]
+    case: Case, found: _Found, answered: Verdict, proved: Sequence[Step], remaining: Sequence[RemainingShape],
+    left: Sequence[int],
 ) -> str:  # fmt: skip
     steps = (*proved, *found.steps)
     if answered == "nothing-significant":
@@ -299,4 +305,4 @@ def _summary(
         return "; ".join(s.reason for s in steps if s.adopted)
     if answered == "ambiguous":
         return reasons.undecided(steps[-1].group, steps[-1].where)
-    return reasons.unexplained(case.where(found.current.point), remaining)
+    return reasons.unexplained(case.where(found.current.point), remaining, left)

@@ -2118,6 +2118,7 @@ export interface components {
          *     starts: searches from different beginnings, the model's own values and seeded draws from the priors.
          *     start_posture: let the arm start off the posture it was read at, by the sensor's error.
          *     sensor_bend: let the potentiometers bend within their stated linearity; None: where the machine states one.
+         *     bend_terms: of the sine series of each bend, at most 8.
          *     friction_form: leave open how friction behaves near zero speed, where laws of friction differ.
          *     whiten: take out the correlation of the residual before weighing it.
          */
@@ -2179,6 +2180,11 @@ export interface components {
             start_posture?: boolean;
             /** Sensor Bend */
             sensor_bend?: boolean | null;
+            /**
+             * Bend Terms
+             * @default 4
+             */
+            bend_terms?: number;
             /**
              * Friction Form
              * @default true
