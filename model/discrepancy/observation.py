@@ -39,9 +39,9 @@ compared. More finds less, for the laws of an arm are never exactly a model's, a
 up; with less, what noise has moved looks like torque."""
 FOLLOWING_FOR_ERRORS = 0.5
 """The same where errors are told and judged, held-out ones above all: nearer to what the model alone would do."""
-STEP, FINE_STEP, COARSE_STEP = 3.5e-3, 2e-3, 7e-3
-"""s; longest step of integration: six a control period of 20 ms, ten for effects that change within less, and three for
-derivatives, which are differences and need no more."""
+STEP, COARSE_STEP = 2e-3, 7e-3
+"""s; longest step of integration: ten a control period of 20 ms, and three for derivatives and probes, which are
+differences and need no more. With longer ones than the first a delay explains an inductance as well."""
 HALVINGS = 2
 """Of the step, for runs that do not stay finite with it."""
 DIFFERENCE = 0.05
@@ -53,8 +53,6 @@ BEND_SHARE = 0.3
 """Standard deviation of each term of a potentiometer's curve, as a share of the stated linearity."""
 STIFF = ("backlash", "joint_compliance")
 """Gears that give: longer steps would make them unstable."""
-QUICK = (*STIFF, "motor_inductance", "stribeck_friction", "stiction")
-"""Effects that change within a few milliseconds; with longer steps a delay would explain an inductance as well."""
 LOOSE_START = 8.0
 """Times the tolerance of a reading: how far a trace may begin from where its first reading says. The trace itself shows
 where it began, and what it is read by may be what is missing."""
@@ -103,13 +101,13 @@ class Observation:
         """What each of p parameter sets would show, its noise included where the simulation has one.
 
         Args:
-            vectors: (p, size). initials: per record (p, n, 2). step: longest of the integration, s; None: as the
-                model's effects need.
+            vectors: (p, size). initials: per record (p, n, 2). step: longest of the integration, s; None:
+                STEP.
 
         Returns:
             per record (p, m, n), rad; NaN where a run diverged.
         """  # fmt: skip
-        longest, first = max(len(r.inputs) for r in self.records), step or _longest_step(model)
+        longest, first = max(len(r.inputs) for r in self.records), step or STEP
         engine, count = engine_for(model), len(self.records)
         found: list[list[Floats]] = [[] for _ in self.records]
         for begin in range(0, len(vectors), BATCH):
@@ -225,13 +223,9 @@ def observed(
     return Observation(problem.records, problem.floor, unit, prepared), problem.model, unknowns
 
 
-def _longest_step(model: Model) -> float:
-    return FINE_STEP if any(use.name in QUICK for use in model.effects) else STEP
-
-
 def step_of_derivatives(model: Model) -> float:
     """Longest step of integration, s, of runs that are compared over a small move."""
-    return FINE_STEP if any(use.name in STIFF for use in model.effects) else COARSE_STEP
+    return STEP if any(use.name in STIFF for use in model.effects) else COARSE_STEP
 
 
 def _difference(model: Model, unknown: Unknown, value: float) -> float:

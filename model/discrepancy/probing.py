@@ -77,9 +77,13 @@ def projection(point: Point) -> Projection:
 def probed(observation: Observation, point: Point, candidates: Sequence[Candidate]) -> list[Probed]:
     """Every candidate at its best trial, the most promising first; those that do nothing are left out."""
     clear = projection(point)
-    reference = [r.measured - e for r, e in zip(observation.records, point.residuals, strict=True)]
+    vector, initials = observation.state(point.model, point.unknowns, point.values)
+    step = step_of_derivatives(point.model)
+    coarse = observation.readings(point.model, vector[None], [i[None] for i in initials], step)
+    fine = [r.measured - e for r, e in zip(observation.records, point.residuals, strict=True)]
     found = []
     for candidate in candidates:
+        reference = fine if step_of_derivatives(candidate.model) != step else [one[0] for one in coarse]
         best = _best_trial(observation, point, clear, reference, candidate)
         if best is not None:
             found.append(best)
@@ -152,17 +156,14 @@ def _simulated(
     trials: Sequence[dict[str, float]],
 ) -> Floats:  # fmt: skip
     """Responses (k, N) of trials of a candidate, each simulated at its size; not finite where a simulation is not.
-    Small ones are simulated as derivatives are, for derivatives are projected out of them."""
+    They are simulated as derivatives are, for derivatives are projected out of them."""
     vector, initials = observation.state(candidate.model, point.unknowns, point.values)
-    vectors = np.tile(vector, (1 + len(trials), 1))
-    for row, trial in zip(vectors[1:], trials, strict=True):
+    vectors = np.tile(vector, (len(trials), 1))
+    for row, trial in zip(vectors, trials, strict=True):
         for name, value in trial.items():
             row[list(candidate.model.parameter(name).slots)] = value
     starts = [np.tile(i, (len(vectors), 1, 1)) for i in initials]
-    if candidate.proportional:
-        shown = observation.readings(candidate.model, vectors, starts, step_of_derivatives(candidate.model))
-        return observation.weighted([y[1:] - y[:1] for y in shown])
-    shown = observation.readings(candidate.model, vectors[1:], [s[1:] for s in starts])
+    shown = observation.readings(candidate.model, vectors, starts, step_of_derivatives(candidate.model))
     return observation.weighted([y - y0 for y, y0 in zip(shown, reference, strict=True)])
 
 

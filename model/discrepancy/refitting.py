@@ -26,6 +26,8 @@ Floats = NDArray[np.float64]
 
 STEPS = 8
 POLISHING = 4
+LOST = 1.1
+"""Times the cost without the candidate: a fit that ends above has not found its way, and says nothing."""
 AGAIN = 3
 """Searches of a fit that is begun again, at most: what is best then is taken to its end later."""
 DEEPER = 3.0
@@ -91,7 +93,7 @@ def judge(observation: Observation, point: Point) -> Judged:
 def refitted(observation: Observation, before: Judged, probed: Probed, *, again: bool = True) -> Refitted | None:
     """A candidate fitted from where its probe points to, and, where that leads nowhere and `again`, from the numbers
     that are expected: a strong effect may have driven the tolerance parameters far off. None where no simulation stays
-    finite."""
+    finite, or all end far above where the effect is absent."""
     found: list[Point] = []
     for fit in (_nearby, _from_expected) if again else (_nearby,):
         try:
@@ -103,7 +105,8 @@ def refitted(observation: Observation, before: Judged, probed: Probed, *, again:
             if point.cost < before.point.cost:
                 break
     best = min(found, key=lambda p: p.cost, default=None)
-    return None if best is None else with_evidence(observation, before, probed, best)
+    lost = best is None or best.cost > LOST * before.point.cost
+    return None if best is None or lost else with_evidence(observation, before, probed, best)
 
 
 def nearest(observation: Observation, before: Point, begun: Sequence[Probed]) -> Probed:
