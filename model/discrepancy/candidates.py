@@ -27,7 +27,7 @@ TRIALS: Mapping[str, tuple[float, ...]] = {
     "direction_dependent_friction": (0.3, 2.0),
 }
 """Trial sizes in expected deviations of effects that do not grow in proportion to their parameter."""
-BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
+FREED_BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
 """Terms of a bent potentiometer that a candidate frees from their priors; shorter waves stay what a sound one has."""
 SMALL = 0.002
 """Expected deviations: the one trial of all others, which tells the size by itself. It is small: an effect that does
@@ -160,7 +160,7 @@ def _candidate(
         wider = model.with_effect(law, joints)
         free = tuple(p for p in wider.parameters if p.name not in model.by_name)
     if law == "potentiometer_nonlinearity":
-        free = tuple(p for p in free if p.name.endswith(BENDS))
+        free = tuple(p for p in free if p.name.endswith(FREED_BENDS))
     full = tuple(_full(free, trial) for trial in trials)
     return Candidate(name, joints, wider, free, full, proportional, _full_bounds(free, bounds or {}))
 

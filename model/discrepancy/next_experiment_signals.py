@@ -64,10 +64,8 @@ def recorded(there: Imagined, point: Point) -> Imagined:
     """The experiment with the record that an arm like the point's model would leave. Not finite where its simulation
     is not."""
     unknowns, values = _unknowns(there, point)
-    observation = there.observation.with_noise(there.noise)
-    vector, initials = observation.state(point.model, unknowns, values)
-    readings = observation.readings(point.model, vector[None], [i[None] for i in initials])
-    return replace(there, observation=there.observation.made_of([r[0] for r in readings]))
+    readings = there.observation.with_noise(there.noise).shown(point.model, unknowns, values)
+    return replace(there, observation=there.observation.made_of(readings))
 
 
 def values_of(there: Imagined, point: Point) -> Floats:
@@ -85,9 +83,8 @@ def shown(there: Imagined, point: Point, values: Floats | None = None) -> Floats
     """What a point's model shows where it follows the record, (N,) in deviations of a reading; with other values (p,)
     than the point's, if given. Not finite where its simulation is not."""
     unknowns, own = _unknowns(there, point)
-    vector, initials = there.observation.state(point.model, unknowns, own if values is None else values)
-    readings = there.observation.readings(point.model, vector[None], [i[None] for i in initials])
-    return there.observation.weighted([r[0] for r in readings])
+    readings = there.observation.shown(point.model, unknowns, own if values is None else values)
+    return there.observation.weighted(readings)
 
 
 def tangents(there: Imagined, point: Point, known: Mapping[str, Floats], values: Floats | None = None) -> Floats:

@@ -39,6 +39,4 @@ def _made(observation: Observation, point: Point, rng: np.random.Generator) -> O
     """The same experiments on an arm that is the point's model, with random noise of the stated size."""
     scale = observation.deviations / observation.unit
     noise = [scale * rng.normal(size=p.noise.shape) for p in observation.prepared]
-    vector, initials = observation.state(point.model, point.unknowns, point.values)
-    shown = observation.with_noise(noise).readings(point.model, vector[None], [i[None] for i in initials])
-    return observation.made_of([own[0] for own in shown])
+    return observation.made_of(observation.with_noise(noise).shown(point.model, point.unknowns, point.values))

@@ -96,18 +96,17 @@ class Observation:
         return replace(self, records=records, prepared=prepared)
 
     def readings(
-        self, model: Model, vectors: Floats, initials: Sequence[Floats], step: float | None = None
+        self, model: Model, vectors: Floats, initials: Sequence[Floats], longest_step: float = STEP
     ) -> list[Floats]:
         """What each of p parameter sets would show, its noise included where the simulation has one.
 
         Args:
-            vectors: (p, size). initials: per record (p, n, 2). step: longest of the integration, s; None:
-                STEP.
+            vectors: (p, size). initials: per record (p, n, 2). longest_step: of the integration, s.
 
         Returns:
             per record (p, m, n), rad; NaN where a run diverged.
         """  # fmt: skip
-        longest, first = max(len(r.inputs) for r in self.records), step or STEP
+        longest = max(len(r.inputs) for r in self.records)
         engine, count = engine_for(model), len(self.records)
         found: list[list[Floats]] = [[] for _ in self.records]
         for begin in range(0, len(vectors), BATCH):
@@ -116,7 +115,7 @@ class Observation:
             out = np.zeros((len(which), OUTPUTS, longest, model.joint_count), dtype=np.float64)
             starts = np.concatenate([i[begin : begin + BATCH] for i in initials])
             repeated = np.ascontiguousarray(np.tile(own, (count, 1)))
-            left, step = np.arange(len(which)), first
+            left, step = np.arange(len(which)), longest_step
             for _ in range(1 + HALVINGS):
                 tried = out[left]
                 engine.run(self.prepared, which[left], repeated[left], starts[left], model.flags, step, tried)
@@ -144,11 +143,16 @@ class Observation:
                     initials[t][place] += value
         return vector, initials
 
+    def shown(self, model: Model, unknowns: Sequence[Unknown], values: Floats, longest_step: float = STEP) -> Signals:
+        """What one set of values of the unknowns shows, rad. Not finite where the simulation is not."""
+        vector, initials = self.state(model, unknowns, values)
+        readings = self.readings(model, vector[None], [i[None] for i in initials], longest_step)
+        return tuple(one[0] for one in readings)
+
     def residuals(self, model: Model, unknowns: Sequence[Unknown], values: Floats) -> Signals:
         """Measured − simulated, rad. Not finite where the simulation is not."""
-        vector, initials = self.state(model, unknowns, values)
-        shown = self.readings(model, vector[None], [i[None] for i in initials])
-        return tuple(record.measured - one[0] for record, one in zip(self.records, shown, strict=True))
+        shown = self.shown(model, unknowns, values)
+        return tuple(record.measured - one for record, one in zip(self.records, shown, strict=True))
 
     def tangents(
         self,

@@ -77,13 +77,12 @@ def projection(point: Point) -> Projection:
 def probed(observation: Observation, point: Point, candidates: Sequence[Candidate]) -> list[Probed]:
     """Every candidate at its best trial, the most promising first; those that do nothing are left out."""
     clear = projection(point)
-    vector, initials = observation.state(point.model, point.unknowns, point.values)
     step = step_of_derivatives(point.model)
-    coarse = observation.readings(point.model, vector[None], [i[None] for i in initials], step)
+    coarse = observation.shown(point.model, point.unknowns, point.values, step)
     fine = [r.measured - e for r, e in zip(observation.records, point.residuals, strict=True)]
     found = []
     for candidate in candidates:
-        reference = fine if step_of_derivatives(candidate.model) != step else [one[0] for one in coarse]
+        reference = coarse if step_of_derivatives(candidate.model) == step else fine
         best = _best_trial(observation, point, clear, reference, candidate)
         if best is not None:
             found.append(best)

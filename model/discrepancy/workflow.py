@@ -161,10 +161,11 @@ def _used(trace: Trace, findings: Sequence[ControllerFinding]) -> Trace:
 
 
 def _given(observation: Observation, model: Model, unknowns: Sequence[Unknown]) -> Point:
-    """The model as it was given, with its derivatives. Effects proved by the controller's numbers stay as they are."""
+    """The model as it was given, to begin from: its derivatives are left at zero. Effects proved by the controller's
+    numbers stay as they are."""
     free = tuple(u for u in unknowns if ".wrong_gain." not in u.name)
     values = np.array([u.start for u in free])
-    return point_at(observation, model, free, values)
+    return point_at(observation, model, free, values, np.zeros((len(free), observation.samples)))
 
 
 def _tolerances(observation: Observation, given: Point) -> Point:

@@ -137,8 +137,8 @@ def readings_on_grid(measured: Floats, rows: Floats, count: int) -> Floats:
     """Readings (k, n) at whole periods: those of the samples there, or between two that are next to each other; NaN
     where a sample is missing."""
     grid = np.arange(float(count))
-    following = np.clip(np.searchsorted(rows, grid - NEARLY), 1, len(rows) - 1)
-    left, right = rows[following - 1], rows[following]
+    after = np.clip(np.searchsorted(rows, grid - NEARLY), 1, len(rows) - 1)
+    left, right = rows[after - 1], rows[after]
     known = (right - left < NEIGHBOURS) | (np.abs(grid - left) < NEARLY) | (np.abs(grid - right) < NEARLY)
     known &= (grid > rows[0] - NEARLY) & (grid < rows[-1] + NEARLY)
     found = np.stack([np.interp(grid, rows, column) for column in measured.T], axis=1)
