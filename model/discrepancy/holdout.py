@@ -14,7 +14,7 @@ from model.discrepancy.answer import SignalError
 from model.discrepancy.noise_floor import noise_floor
 from model.discrepancy.observation import FOLLOWING_FOR_ERRORS, Observation, Signals, observed
 from model.discrepancy.search import Point, point_at, searched
-from model.fitting.simulated import INITIAL, unknown_place
+from model.fitting.simulated import INITIAL
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 
@@ -23,8 +23,6 @@ Floats = NDArray[np.float64]
 DISTURBANCE = "periodic_disturbance"
 BLOCK = 10
 """Samples whose errors may be alike."""
-PLACINGS, BEGINNING = 4, 10
-"""Times that a start is moved to what is read there, over so many samples."""
 START_STEPS = 8
 """Of the search for where a held-out trace begins: with play in a gear, that is not a smooth problem."""
 
@@ -88,27 +86,10 @@ def _searched(observation: Observation, point: Point, own: tuple[Unknown, ...]) 
     """The point with unknowns of the record's own at their best; not searched for where no simulation stays finite."""
     unknowns, values = _here(point, own)
     none = np.zeros((len(unknowns), observation.samples))
-    begun = _placed(observation, point_at(observation, point.model, unknowns, values, none), len(own))
+    begun = point_at(observation, point.model, unknowns, values, none)
     if not np.isfinite(begun.weighted).all():
         return begun
     return searched(observation, begun, START_STEPS, range(len(unknowns) - len(own), len(unknowns)))
-
-
-def _placed(observation: Observation, begun: Point, own: int) -> Point:
-    """The point with its last `own` unknowns, those of them that are postures at the start, where the record's first
-    readings are: a search that begins a few counts off may leave for where friction holds the arm."""
-    values = begun.values.copy()
-    for _ in range(PLACINGS):
-        shifts = begun.residuals[0][:BEGINNING].mean(axis=0)
-        for k in range(len(values) - own, len(values)):
-            place = unknown_place(begun.model, begun.unknowns[k].name)[1]
-            if place is not None:
-                values[k] += shifts[place[0]]
-        placed = point_at(observation, begun.model, begun.unknowns, values, begun.tangents)
-        if not placed.cost < begun.cost:
-            break
-        begun = placed
-    return begun
 
 
 def _here(point: Point, own: tuple[Unknown, ...]) -> tuple[tuple[Unknown, ...], Floats]:

@@ -74,3 +74,15 @@ def test_a_disturbance_does_not_vanish_from_records_that_do_not_show_it() -> Non
     assert left[1] > 2.0
     (plain,) = left_on(found(imagined.arm()), 1.0, size=0.0)
     assert np.all(plain < 1.1)
+
+
+def test_a_held_out_record_of_bent_potentiometers_begins_where_its_readings_do() -> None:
+    """Its posture at the start is first taken from potentiometers that do not bend: a dozen counts off."""
+    bent = imagined.arm().with_effect("potentiometer_nonlinearity", (1, 2, 3), {"bend_1": 0.011, "bend_3": -0.008})
+    point = found(bent)
+    for number in range(3):
+        held = held_out(imagined.arm(), [imagined.trace(bent, number, seconds=6.0, seed=6)])
+        assert held is not None
+        (residual,), (record,) = held.residuals(point), held.observation.records
+        left = np.sqrt(np.mean(residual[record.runs[0]] ** 2, axis=0)) / held.floor(point)
+        assert np.all(left < 1.15)
