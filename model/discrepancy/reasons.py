@@ -109,10 +109,7 @@ def unexplained(
 ) -> str:
     """Why none of the known effects is named, and what a torque that would explain it goes with. joints: those that are
     left unexplained."""
-    place = where.summary
-    if where.joint is None and joints:
-        named = f"joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))}"
-        place = f"{named}: more than noise is left, over the whole record rather than at one moment"
+    place = where.summary if where.joint is not None or not joints else _left_on(joints, where)
     tried = "no known effect takes it off"
     if best is not None and best.misfit is not None:
         name = _named(best.effect, best.joints)
@@ -124,6 +121,18 @@ def unexplained(
     return (
         f"{place}; {tried}; a torque at joint {first.joint} of {min(torques):.2g} to {max(torques):.2g} "
         f"{first.torque_unit} that goes with {first.against} explains {100 * first.explained:.0f} % of what is left"
+    )
+
+
+def _left_on(joints: Sequence[int], where: Where) -> str:
+    """What is said of joints whose residual is too large, where the map names no joint."""
+    named = f"joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))}: more than noise is left"
+    clearest = max((c for c in where.cells if c.joint in joints), key=lambda c: c.significance, default=None)
+    if clearest is None:
+        return named
+    return (
+        f"{named}; the clearest place is joint {clearest.joint} at {clearest.start:.1f} s, "
+        f"by {clearest.significance:.1f} standard deviations"
     )
 
 

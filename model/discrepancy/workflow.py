@@ -27,7 +27,7 @@ from model.discrepancy.estimates import found_values
 from model.discrepancy.holdout import HeldOut, held_out
 from model.discrepancy.next_experiment import Asked, Asker, rivals_of
 from model.discrepancy.noise_floor import noise_floor
-from model.discrepancy.notes import NOTHING_HELD_OUT, on_unfinished, on_what_is_stated
+from model.discrepancy.notes import ERRORS_FOLLOW, NOTHING_HELD_OUT, on_unfinished, on_what_is_stated
 from model.discrepancy.observation import FOLLOWING_FOR_ERRORS, Observation, observed
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.probing import Probed
@@ -115,7 +115,7 @@ def diagnose(
     end = found.current.point
     asked = Asked(None) if ask is None else ask.after(answered, observation, end, found.rivals, traces)
     notes = (
-        f"tolerance parameters: {len(traces)} trace(s), priors as the machine file states them",
+        f"tolerance parameters: {len(traces)} trace(s), priors as the machine file states them", ERRORS_FOLLOW,
         *on_what_is_stated(_stated(end), {u.name: float(v) for u, v in zip(end.unknowns, end.values, strict=True)}),
         *on_unfinished((*traces, *holdout)), *(() if holdout else (NOTHING_HELD_OUT,)),
         *(() if asked.note is None else (asked.note,)),

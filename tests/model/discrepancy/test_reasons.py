@@ -161,5 +161,6 @@ def test_other_answers_have_their_reasons() -> None:
         joint=3, against="speed", unit="rad/s", torque_unit="N·m", centres=(0.0, 1.0), torque=(None, 2.5),
         deviation=(None, 0.1), explained=0.7,
     )  # fmt: skip
+    assert unexplained(NOWHERE, [], (2, 3)).startswith("joints 2, 3: more than noise is left")
     text = unexplained(NOWHERE, [shape])
     assert "a torque at joint 3 of 2.5 to 2.5 N·m that goes with speed explains 70 % of what is left" in text
