@@ -10,8 +10,8 @@ from model.discrepancy.observation import FOLLOWING_FOR_ERRORS
 
 NOTHING_HELD_OUT = "no held-out trace was given: nothing here has been shown on data it was not fitted to"
 ERRORS_FOLLOW = (
-    f"errors, their floor and the map are of a simulation whose controller is given {FOLLOWING_FOR_ERRORS:g} of the way "
-    "to each recorded reading; reasons tell sizes of the closed loop alone"
+    "errors, their floor and the map are of a simulation whose controller is given "
+    f"{FOLLOWING_FOR_ERRORS:g} of the way to each recorded reading; reasons tell sizes of the closed loop alone"
 )
 FAR = 4.0
 """Of its stated deviations, from which what a fit made of a number has to be said aloud."""
