@@ -19,6 +19,7 @@ from model.discrepancy.refitting import (
     begun_again,
     finished,
     polished,
+    price_of,
     refitted,
     same_answer,
 )
@@ -32,6 +33,10 @@ FLAGGED_SHARE = 0.1
 
 ALWAYS_FITTED, HOPELESS = 4, 0.2
 """After so many, no candidate is fitted whose probe promises less than this share of the best evidence so far."""
+PROMISING = 0.6
+"""Of the fall that would make an effect significant: a probe that promises less is not fitted."""
+WORTH_POLISHING = 0.5
+"""Of the best evidence: a fit with less stays behind, polished or not."""
 REMEMBERED = 0.3
 """A candidate is probed again where its old response promises this share of what is interesting."""
 
@@ -72,22 +77,29 @@ def ranked(
     flagged = _flagged(probes, joints, thresholds)
     probes += probed(observation, point, [c for c in every if c.name in FLEXIBLE and c.joints[0] in flagged])
     probes.sort(key=lambda p: -p.gain)
-    chosen = [p for p in probes if p.gain >= thresholds.interesting][: options.fitted]
-    fits = _fitted(observation, current, chosen, progress, cancel)
+    chosen = [p for p in probes if _hopeful(observation, p, thresholds)][: options.fitted]
+    fits = _fitted(observation, current, chosen, thresholds, progress, cancel)
     progress(0.9, "fitting effects of several joints")
     fits += fitted_together(observation, current, fits, probes, thresholds, cancel)
     fits.sort(key=lambda r: -r.evidence)
     answers = _different(fits)[: options.polished]
     stop_if(cancel)
-    head = side_by_side(partial(polished, observation, current), answers)
+    head = _polished(observation, current, answers)
     head = _begun_again(observation, current, head, thresholds)
     head = _told_apart(observation, current, head, thresholds)
     rest = [r for r in fits if not any(r is a for a in answers)]
     return Ranking(_one_a_name(sorted([*head, *rest], key=lambda r: -r.evidence)), tuple(probes))
 
 
+def _hopeful(observation: Observation, probed: Probed, thresholds: Thresholds) -> bool:
+    """Whether a probe promises enough of what its effect would need."""
+    needed = thresholds.significant + price_of(observation, probed.candidate)
+    return probed.gain >= max(thresholds.interesting, PROMISING * needed)
+
+
 def _fitted(
-    observation: Observation, current: Judged, chosen: Sequence[Probed], progress: Progress, cancel: Cancel
+    observation: Observation, current: Judged, chosen: Sequence[Probed], thresholds: Thresholds, progress: Progress,
+    cancel: Cancel,
 ) -> list[Refitted]:  # fmt: skip
     """Fits of the probed candidates, the most promising first, until there is no hope left."""
     fits: list[Refitted] = []
@@ -99,8 +111,9 @@ def _fitted(
             break
         names = " and ".join(describe(one.candidate.name, one.candidate.joints) for one in now)
         progress(0.4 + 0.5 * begin / len(chosen), f"fitting {names}")
-        again = not any(fit.misfit < STRANGE for fit in fits)  # the record is explained: others need no second way
-        fits += [f for f in side_by_side(partial(refitted, observation, current, again=again), now) if f is not None]
+        explained = min((f.judged.point.cost for f in fits if f.misfit < STRANGE), default=None)
+        goal = None if explained is None else explained + thresholds.close
+        fits += [f for f in side_by_side(partial(refitted, observation, current, goal=goal), now) if f is not None]
     return fits
 
 
@@ -111,6 +124,16 @@ def _different(fits: Sequence[Refitted]) -> list[Refitted]:
         if fit.evidence > 0 and not any(same_answer(fit, better) for better in found):
             found.append(fit)
     return found
+
+
+def _polished(observation: Observation, current: Judged, answers: Sequence[Refitted]) -> list[Refitted]:
+    """The answers, polished where that could make them the best."""
+    least = WORTH_POLISHING * max((r.evidence for r in answers), default=0.0)
+
+    def work(found: Refitted) -> Refitted:
+        return polished(observation, current, found) if found.evidence >= least else found
+
+    return side_by_side(work, answers)
 
 
 def _told_apart(
@@ -132,10 +155,11 @@ def _begun_again(
     are close to the best. Of several joints it has been done."""
     best = max(head, key=lambda r: r.evidence, default=None)
     least = -math.inf if best is None or best.misfit >= STRANGE else best.evidence - thresholds.close
+    goal = math.inf if best is None else best.judged.point.cost + thresholds.close
 
     def again(found: Refitted) -> Refitted:
         hopeless = found.evidence < least or len(found.candidate.joints) > 1
-        return found if hopeless else begun_again(observation, current, found)
+        return found if hopeless else begun_again(observation, current, found, goal)
 
     return side_by_side(again, head)
 

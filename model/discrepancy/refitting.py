@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,12 +91,17 @@ def judge(observation: Observation, point: Point) -> Judged:
     return Judged(point, noise_model(observation.by_joint(point.weighted)))
 
 
-def refitted(observation: Observation, before: Judged, probed: Probed, *, again: bool = True) -> Refitted | None:
-    """A candidate fitted from where its probe points to, and, where that leads nowhere and `again`, from the numbers
-    that are expected: a strong effect may have driven the tolerance parameters far off. None where no simulation stays
-    finite, or all end far above where the effect is absent."""
+def refitted(
+    observation: Observation, before: Judged, probed: Probed, goal: float | None = None
+) -> Refitted | None:  # fmt: skip
+    """A candidate fitted from where its probe points to, and, where that leads nowhere, from the numbers that are
+    expected: a strong effect may have driven the tolerance parameters far off. With a `goal`, the cost at which it
+    would be a rival of one that has explained the record, only the first, and no further than there is hope for it.
+    None where no simulation stays finite, or all end far above where the effect is absent."""
     found: list[Point] = []
-    for fit in (_nearby, _from_expected) if again else (_nearby,):
+    lost = LOST * before.point.cost
+    ways = (_nearby, partial(_from_expected, goal=lost)) if goal is None else (partial(_nearby, goal=goal),)
+    for fit in ways:
         try:
             point = fit(observation, before.point, probed)
         except SpecError:
@@ -105,8 +111,7 @@ def refitted(observation: Observation, before: Judged, probed: Probed, *, again:
             if point.cost < before.point.cost:
                 break
     best = min(found, key=lambda p: p.cost, default=None)
-    lost = best is None or best.cost > LOST * before.point.cost
-    return None if best is None or lost else with_evidence(observation, before, probed, best)
+    return None if best is None or best.cost > lost else with_evidence(observation, before, probed, best)
 
 
 def nearest(observation: Observation, before: Point, begun: Sequence[Probed]) -> Probed:
@@ -120,17 +125,18 @@ def nearest(observation: Observation, before: Point, begun: Sequence[Probed]) ->
     return begun[0] if len(begun) == 1 else min(begun, key=cost)
 
 
-def _nearby(observation: Observation, before: Point, probed: Probed) -> Point | None:
+def _nearby(observation: Observation, before: Point, probed: Probed, goal: float = math.inf) -> Point | None:
     """A fit from where the probe points to."""
     start = _started(before, probed)
     changing = _indices(start.unknowns, [p.name for p in probed.candidate.free])
     point = point_at(observation, start.model, start.unknowns, start.values, start.tangents)
-    return searched(observation, point, STEPS, changing) if np.isfinite(point.weighted).all() else None
+    return searched(observation, point, STEPS, changing, goal) if np.isfinite(point.weighted).all() else None
 
 
-def _from_expected(observation: Observation, before: Point, probed: Probed) -> Point | None:
+def _from_expected(observation: Observation, before: Point, probed: Probed, goal: float) -> Point | None:
     """A fit from the expected values of all that has a prior, and the best of the candidate's trials there; in closed
-    loop first."""
+    loop first. None where it explains less there than is explained already; given up when it would not come to a cost
+    of `goal`."""
     alone = observation.following(0.0)
     best: Point | None = None
     for trial in probed.candidate.trials:
@@ -144,9 +150,10 @@ def _from_expected(observation: Observation, before: Point, probed: Probed) -> P
     if best is None:
         return None
     near = settled(alone, best, STEPS, most=1)
-    return settled(
-        observation, point_at(observation, near.model, near.unknowns, near.values, near.tangents), STEPS, AGAIN
-    )
+    if near.cost > point_at(alone, before.model, before.unknowns, before.values, before.tangents).cost:
+        return None
+    begun = point_at(observation, near.model, near.unknowns, near.values, near.tangents)
+    return settled(observation, begun, STEPS, AGAIN, goal)
 
 
 def polished(observation: Observation, before: Judged, found: Refitted) -> Refitted:
@@ -166,13 +173,14 @@ def polished(observation: Observation, before: Judged, found: Refitted) -> Refit
     return better if better.judged.point.cost < found.judged.point.cost else found
 
 
-def begun_again(observation: Observation, before: Judged, found: Refitted) -> Refitted:
+def begun_again(observation: Observation, before: Judged, found: Refitted, goal: float = math.inf) -> Refitted:
     """The same, or, where it leaves the record unexplained, a better fit from the expected numbers: a descent from
-    where a strong effect has driven the tolerance parameters may end in another valley."""
+    where a strong effect has driven the tolerance parameters may end in another valley. Given up when it would not come
+    to a cost of `goal`."""
     if found.misfit < STRANGE:
         return found
     try:
-        point = _from_expected(observation, before.point, found.probed)
+        point = _from_expected(observation, before.point, found.probed, min(goal, found.judged.point.cost))
     except SpecError:
         return found
     if point is None or not point.cost < found.judged.point.cost - DEEPER:
@@ -230,15 +238,19 @@ def _started(point: Point, probed: Probed) -> Point:
 def with_evidence(observation: Observation, before: Judged, probed: Probed, point: Point) -> Refitted:
     """What the point that a fit of the candidate has led to is worth."""
     after = judge(observation, point)
-    price = len(probed.candidate.free) * math.log(observation.samples)
-    if probed.candidate.name in TONES:
-        price += 2 * math.log(tones_tried(observation, probed.candidate)) - math.log(
-            observation.samples
-        )  # the tries are what the frequency costs
     fall = before.description - after.description
     if point.cost > before.point.cost:  # the fit did not come to its end: what more freedom leaves is never more
         fall = min(fall, before.point.cost - point.cost)
-    return Refitted(probed, after, fall - price)
+    return Refitted(probed, after, fall - price_of(observation, probed.candidate))
+
+
+def price_of(observation: Observation, candidate: Candidate) -> float:
+    """What a candidate's freedom costs."""
+    count = len(candidate.free)
+    if candidate.name not in TONES:
+        return count * math.log(observation.samples)
+    tries = 2 * math.log(tones_tried(observation, candidate))  # are what the frequency costs
+    return tries + (count - 1) * math.log(observation.samples)
 
 
 def _indices(unknowns: Sequence[Unknown], names: Sequence[str]) -> list[int]:

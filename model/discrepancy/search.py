@@ -8,6 +8,7 @@ shortened or damped, and in the end given up.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -95,9 +96,12 @@ def point_at(
     return Point(model, unknowns, values, residuals, observation.weighted(residuals), tangents)
 
 
-def searched(observation: Observation, point: Point, steps: int, changing: Sequence[int] = ()) -> Point:
+def searched(
+    observation: Observation, point: Point, steps: int, changing: Sequence[int] = (), goal: float = math.inf
+) -> Point:
     """The point to which at most so many steps lead. Derivatives by the unknowns of the indices `changing` are computed
-    anew at every step."""
+    anew at every step. Ends early where the steps that are left, each as good as the last, would not lead to a cost of
+    `goal`."""
     for number in range(steps):
         if changing:
             own = observation.tangents(point.model, point.unknowns, point.values, changing)
@@ -108,7 +112,8 @@ def searched(observation: Observation, point: Point, steps: int, changing: Seque
         if not descends:
             return following
         gained, point = point.cost - following.cost, following
-        if gained < SETTLED and number > 0:
+        hopeless = point.cost - gained * (steps - number - 1) > goal
+        if number > 0 and (gained < SETTLED or hopeless):
             break
     return point
 
@@ -119,21 +124,24 @@ def with_new_tangents(observation: Observation, point: Point) -> Point:
     return replace(point, tangents=tangents)
 
 
-def settled(observation: Observation, point: Point, steps: int, most: int = MOST_SEARCHES) -> Point:
-    """The point to which searches lead, each with derivatives computed where it begins, until one gains nothing more:
-    what two close rivals still differ by then is not the state of their fits.
+def settled(
+    observation: Observation, point: Point, steps: int, most: int = MOST_SEARCHES, goal: float = math.inf
+) -> Point:  # fmt: skip
+    """The point to which searches lead, each with derivatives computed where it begins, until one gains nothing more,
+    or is given up for what is left of the way to `goal`: what two close rivals still differ by then is not the state of
+    their fits.
 
     Its derivatives are those of the last search's beginning, hardly away, without the corrections made on the way: a
     correction for a short step is mostly noise, and intervals come from derivatives.
     """
-    for _ in range(most):
+    for number in range(most):
         try:
             begun = with_new_tangents(observation, point)
-            following = searched(observation, begun, steps)
+            following = searched(observation, begun, steps, goal=goal)
         except SpecError:
             break  # at the brink of instability, where a delay is missing: there is no going on
         gained, point = point.cost - following.cost, replace(following, tangents=begun.tangents)
-        if gained < SETTLED:
+        if gained < SETTLED or point.cost - gained * (most - number - 1) > goal:
             break
     return point
 

@@ -27,7 +27,7 @@ class Thresholds:
             evidence below what is significant. grown: growth of what is beyond the noise floor of the held-out traces,
             on the effect's own joints, at which it is rejected as well; stuck joints let go by chance, so not at once.
         close: evidence within which rivals are fitted to their ends before they are compared.
-        interesting: gain of a probe from which a candidate is worth a fit.
+        interesting: gain of a probe below which no candidate is worth a fit.
     """
 
     significant: float = 10.0
