@@ -8,22 +8,32 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from daq.contracts.errors import SpecError
 from model.discrepancy.answer import Candidate, FoundValue
 from model.discrepancy.observation import Observation
 from model.discrepancy.ranking import Ranking
 from model.discrepancy.refitting import Judged, Refitted, says_no_more
+from model.discrepancy.search import Point, point_at, searched
 from model.fitting.fit import INTERVAL
 from model.fitting.whitening import Whitener
 from model.machine_model.parameter import Parameter
 
 Floats = NDArray[np.float64]
 
+FOLLOWING_FOR_INTERVALS = 0.9
+"""Share of the way to the recorded readings, where it is asked how much of an estimate is the noise's: half of what
+fits leave outside."""
+MOST_STEPS = 8
 
-def found_values(observation: Observation, found: Judged, parameters: Sequence[Parameter]) -> dict[str, FoundValue]:
+
+def found_values(
+    observation: Observation, found: Judged, parameters: Sequence[Parameter], moved: Floats | float = 0.0
+) -> dict[str, FoundValue]:
     """Estimates and 95 % intervals of parameters that a fit has found: from the curvature at the solution, and the size
-    and colour of the residual that is left."""
+    and colour of the residual that is left. `moved` (p,) is added to the deviations, in squares."""
     point = found.point
-    deviations = standard_deviations(point.precision, found.noise.whiteners, observation.by_joint(point.tangents))
+    statistical = standard_deviations(point.precision, found.noise.whiteners, observation.by_joint(point.tangents))
+    deviations = np.hypot(statistical, moved)
     values = {}
     for p in parameters:
         k = [u.name for u in point.unknowns].index(p.name)
@@ -34,6 +44,23 @@ def found_values(observation: Observation, found: Judged, parameters: Sequence[P
         high = min(unknown.high, value + INTERVAL * deviation) if known else None
         values[p.name] = FoundValue(value=value, low=low, high=high, unit=p.unit)
     return values
+
+
+def moved_by_noise(observation: Observation, point: Point, parameters: Sequence[Parameter]) -> Floats:
+    """How far estimates move, (p,), when simulations follow the record more closely: a measure of what the share of a
+    reading's noise that they do not see has done to them.
+
+    Noise that passes a law with a corner or a limit does not average out: a dead zone looks narrower, friction near
+    zero speed softer. As in the extrapolation of simulated noise (Cook and Stefanski 1994), what that does is seen
+    where there is less of it; here it tells how much is uncertain. All zero where that fit does not stay finite.
+    """
+    nearer, names = observation.following(FOLLOWING_FOR_INTERVALS), {p.name for p in parameters}
+    own = [k for k, u in enumerate(point.unknowns) if u.name in names]
+    try:
+        begun = point_at(nearer, point.model, point.unknowns, point.values)
+        return searched(nearer, begun, MOST_STEPS, own).values - point.values
+    except SpecError:
+        return np.zeros_like(point.values)
 
 
 def standard_deviations(

@@ -46,6 +46,8 @@ HALVINGS = 2
 """Of the step, for runs that do not stay finite with it."""
 DIFFERENCE = 0.05
 """Of an expected deviation: over it, derivatives are taken."""
+TONE_DIFFERENCES = {"cycles": 0.02, "frequency": 3e-4}
+"""The same of a tone, in cycles a turn and Hz: its phase then turns by less than 0.1 over a turn, or a minute."""
 BEND_TERMS = 8
 """Of the sine series of a sound potentiometer's curve: an arm moves over a part of the range, and what the curve does
 there, bent by a count or two, has to be within the series' reach."""
@@ -237,6 +239,7 @@ def _difference(model: Model, unknown: Unknown, value: float) -> float:
     parameter = model.by_name.get(unknown.name)
     stated = None if parameter is None else parameter.deviation
     size = DIFFERENCE * (unknown.deviation or stated or unknown.scale)
+    size = TONE_DIFFERENCES.get(unknown.name.rpartition(".")[2], size)
     if unknown.name.startswith(INITIAL + "."):
         size /= LOOSE_START
     return -size if value + size > unknown.high else size

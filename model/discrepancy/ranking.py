@@ -151,8 +151,8 @@ def _told_apart(
 def _begun_again(
     observation: Observation, current: Judged, head: Sequence[Refitted], thresholds: Thresholds
 ) -> list[Refitted]:
-    """The best fits, those begun again that have not explained the record: all of them where none has, else those that
-    are close to the best. Of several joints it has been done."""
+    """The best fits, those begun again that have not explained the record with numbers that can be: all of them where
+    none has explained it, else those that are close to the best. Of several joints it has been done."""
     best = max(head, key=lambda r: r.evidence, default=None)
     least = -math.inf if best is None or best.misfit >= STRANGE else best.evidence - thresholds.close
     goal = math.inf if best is None else best.judged.point.cost + thresholds.close

@@ -35,6 +35,8 @@ DEEPER = 3.0
 """Fall of the cost from which a fit counts as better, not as ended elsewhere on the same flat ground."""
 STRANGE = 1.15
 """Misfit at which a fit has not explained the record, perhaps because it ended at a wrong place: it is tried again."""
+STRAINED = 4.0
+"""Expected deviations: the same of a fit that has to move a number so far."""
 SHAPE_PRIOR = 3.0
 """Expected deviations within which a parameter that only shapes an effect is looked for: keeps it from running away
 where the effect is too small to show its shape."""
@@ -174,10 +176,10 @@ def polished(observation: Observation, before: Judged, found: Refitted) -> Refit
 
 
 def begun_again(observation: Observation, before: Judged, found: Refitted, goal: float = math.inf) -> Refitted:
-    """The same, or, where it leaves the record unexplained, a better fit from the expected numbers: a descent from
-    where a strong effect has driven the tolerance parameters may end in another valley. Given up when it would not come
-    to a cost of `goal`."""
-    if found.misfit < STRANGE:
+    """The same, or, where it leaves the record unexplained or takes a number that nobody expects, a better fit from the
+    expected numbers: a descent from where a strong effect has driven the tolerance parameters may end in another
+    valley. Given up when it would not come to a cost of `goal`."""
+    if found.misfit < STRANGE and _strain(found.judged.point) < STRAINED:
         return found
     try:
         point = _from_expected(observation, before.point, found.probed, min(goal, found.judged.point.cost))
@@ -186,6 +188,11 @@ def begun_again(observation: Observation, before: Judged, found: Refitted, goal:
     if point is None or not point.cost < found.judged.point.cost - DEEPER:
         return found
     return with_evidence(observation, before, found.probed, point)
+
+
+def _strain(point: Point) -> float:
+    """The largest deviation from what is expected, in those that are."""
+    return float(np.max(np.abs(point.values - point.expected) * np.sqrt(point.precision), initial=0.0))
 
 
 def finished(observation: Observation, before: Judged, found: Refitted) -> Refitted:

@@ -23,7 +23,7 @@ from model.discrepancy.controller_check import (
     with_used_set_points,
 )
 from model.discrepancy.decision import Added, decide
-from model.discrepancy.estimates import found_values
+from model.discrepancy.estimates import found_values, moved_by_noise
 from model.discrepancy.holdout import HeldOut, held_out
 from model.discrepancy.next_experiment import Asked, Asker, rivals_of
 from model.discrepancy.noise_floor import noise_floor
@@ -111,6 +111,7 @@ def diagnose(
     answered = verdict((*proved, *found.steps), left)
     if answered == "unknown-effect":
         found = _as_last_fitted(observation, _taken_back(found, left))
+    found = _as_sure_as_it_is(observation, found)
     remaining = case.remaining(found.current.point) if answered == "unknown-effect" else ()
     end = found.current.point
     asked = Asked(None) if ask is None else ask.after(answered, observation, end, found.rivals, traces)
@@ -268,6 +269,20 @@ def _as_last_fitted(observation: Observation, found: _Found) -> _Found:
             update |= {"adopted": False, "rejected_because": "superfluous once a later effect was in"}
         steps.append(step.model_copy(update=update))
     return replace(found, steps=tuple(steps))
+
+
+def _as_sure_as_it_is(observation: Observation, found: _Found) -> _Found:
+    """Steps with intervals that know what noise has done to the estimates."""
+    point, known = found.current.point, found.current.point.model.by_name
+    own = [known[name] for s in found.steps if s.adopted for name in s.parameters]
+    if not own:
+        return found
+    values = found_values(observation, found.current, own, moved_by_noise(observation, point, own))
+
+    def told(step: Step) -> Step:
+        return step.model_copy(update={"parameters": {n: values[n] for n in step.parameters}}) if step.adopted else step
+
+    return replace(found, steps=tuple(told(s) for s in found.steps))
 
 
 def _nothing(found: FoundValue, parameter: Parameter) -> bool:
