@@ -7,12 +7,44 @@ import numpy as np
 from model.discrepancy.candidates import candidates
 from model.discrepancy.observation import observed
 from model.discrepancy.probing import probed
-from model.discrepancy.refitting import judge, refitted
+from model.discrepancy.refitting import begun_again, judge, refitted, with_evidence
 from model.discrepancy.search import point_at, settled
 from tests.model.fitting import imagined
 
 DELAY = 0.015
 """s: the tolerance parameters go to the brink of instability to imitate so much."""
+
+
+def test_a_rival_without_hope_is_left_where_it_is() -> None:
+    """With a cost to come to that it cannot reach, a fit takes few steps, and has no second way."""
+    arm = imagined.arm().with_effect("dead_zone", (2,), {"width": 1.5})
+    observation, model, unknowns = observed(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
+    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
+    before = judge(observation, settled(observation, given, 4))
+    (found,) = probed(observation, before.point, candidates(before.point.model, ("back_emf_error",), (2,)))
+    fitted = refitted(observation, before, found)
+    hopeless = refitted(observation, before, found, goal=1.0)
+    assert fitted is not None
+    assert hopeless is None or hopeless.judged.point.cost >= fitted.judged.point.cost
+
+
+def test_a_fit_with_numbers_that_nobody_expects_is_begun_again() -> None:
+    """An inductance that has been taken for a rotor's inertia, ten of its deviations off, with the record explained."""
+    arm = imagined.arm().with_effect("motor_inductance", (2,), {"inductance": 0.06})
+    observation, model, unknowns = observed(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
+    before = judge(observation, point_at(observation, model, unknowns, np.array([u.start for u in unknowns])))
+    (probe,) = probed(observation, before.point, candidates(model, ("motor_inductance",), (2,)))
+    fitted = refitted(observation, before, probe)
+    assert fitted is not None
+    assert begun_again(observation, before, fitted) is fitted, "nothing is strange here"
+    point = fitted.judged.point
+    k = [u.name for u in point.unknowns].index("joint2.motor.rotor_inertia")
+    strained = point.values.copy()
+    strained[k] += 10 * (point.unknowns[k].deviation or 0.0)
+    off = point_at(observation, point.model, point.unknowns, strained, point.tangents)
+    again = begun_again(observation, before, with_evidence(observation, before, probe, off))
+    assert again.judged.point.cost < off.cost - 50
+    assert abs(again.judged.point.values[k] - point.values[k]) < 2 * (point.unknowns[k].deviation or 0.0)
 
 
 def test_a_delay_that_has_driven_the_tolerance_parameters_to_the_brink_is_fitted_from_the_expected_numbers() -> None:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
+from model.discrepancy import search
 from model.discrepancy.candidates import Candidate
 from model.discrepancy.observation import Observation, observed
 from model.discrepancy.probing import Probed, projection
 from model.discrepancy.refitting import Refitted, deeper, judge
-from model.discrepancy.search import Point, _corrected, point_at, settled
+from model.discrepancy.search import Point, _corrected, point_at, searched, settled
 from tests.model.fitting import imagined
 
 TRUTH = {"joint2.viscous_friction.coefficient": 2.2e-4, "load.mass": 1.4, "joint1.motor.back_emf_constant": 0.0352}
@@ -34,6 +38,17 @@ def test_a_search_ends_at_the_noise(case: tuple[Observation, Point]) -> None:
     truth = point_at(observation, given.model, given.unknowns, values, given.tangents)
     assert given.misfit > 2.0
     assert found.cost < truth.cost + 5.0, "the arm's own numbers explain the record no better"
+
+
+@pytest.mark.parametrize(("goal", "ends_at"), [(np.inf, 460.0), (460.0, 460.0), (459.0, 490.0), (0.0, 490.0)])
+def test_a_search_that_would_not_come_to_its_goal_is_given_up(
+    goal: float, ends_at: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At 490 after two of five steps, the last of 10: three more like it would lead to 460."""
+    costs = iter((500.0, 490.0, 480.0, 470.0, 460.0))
+    monkeypatch.setattr(search, "_step", lambda _o, _p: (SimpleNamespace(cost=next(costs)), True))
+    begun = cast(Any, SimpleNamespace(cost=1000.0))
+    assert searched(cast(Any, None), begun, 5, goal=goal).cost == ends_at
 
 
 def test_what_a_fit_without_the_candidate_reaches_too_is_not_the_candidates(case: tuple[Observation, Point]) -> None:
