@@ -1,7 +1,7 @@
 """Sparse regression in the manner of SINDy, naming effects from traces: the rival of `daq diagnose`.
 
     python -m benchmarks sparse_regression TRACE…            effects, best first, for each trace
-    python -m benchmarks sparse_regression --cases FOLDER    with the truth, for FOLDER/SEED/fit.mcap of that secret
+    python -m benchmarks sparse_regression --trial FOLDER    beside the diagnosis, on the scored cases of a trial
 
 Brunton, Proctor and Kutz (2016) with a library of physics instead of polynomials, which is the most that such a
 regression can be given here. The rigid bodies and motors of the model are taken off first: inverse dynamics on smoothed
@@ -17,14 +17,14 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pysindy
@@ -330,57 +330,74 @@ def _nominal_gain(trace: Trace, model: Model, joint: int) -> float:
     return float(gain * controller.dac_counts_per_adc_count.value * counts * volts)
 
 
-def _truths(folder: Path) -> list[tuple[Path, str, set[int]]]:
-    """Tuning cases with exactly one known effect: trace, name, joints."""
-    found = []
-    for path in sorted(folder.glob("*/fit.mcap"), key=lambda p: int(p.parent.name)):
-        told = subprocess.run(
-            [sys.executable, "-m", "mock_controller.reveal", path.parent.name],
-            capture_output=True,
-            check=True,
-            text=True,
+@dataclass(frozen=True)
+class Scored:
+    """A detectable single effect of a trial: the trace that was diagnosed, the truth, and how the diagnosis did."""
+
+    trace: Path
+    effect: str
+    joints: frozenset[int]
+    named_right: bool
+    in_first: bool
+    joint_right: bool
+
+
+def _scored(folder: Path) -> list[Scored]:
+    """Cases of a folder that `daq blind` has written. Raises OSError, KeyError for any other."""
+    recorded = {row["seed"]: row for row in _rows(folder / "record.jsonl")}
+    return [
+        Scored(
+            folder / "traces" / recorded[row["seed"]]["trace"], row["known_as"][0], frozenset(row["joints"][0]),
+            row["named_right"], row["in_first"], bool(row["joint_right"]),
         )
-        effects = json.loads(told.stdout)["effects"]
-        if len(effects) == 1 and effects[0]["known_as"] != "unknown_effect":
-            found.append((path, effects[0]["known_as"], set(effects[0]["joints"])))
-    return found
+        for row in _rows(folder / "score.jsonl")
+        if row["kind"] == "single" and row["detectable"]
+    ]  # fmt: skip
+
+
+def _rows(file: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in file.read_text("utf-8").splitlines()]
 
 
 def main(arguments: list[str]) -> int:
     """The exit code."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks sparse_regression")
     parser.add_argument("traces", nargs="*", type=Path)
-    parser.add_argument("--cases", type=Path, help="folder of SEED/fit.mcap; the truth is asked of the mock's own side")
+    parser.add_argument("--trial", type=Path, help="folder of a trial that daq blind has run")
     parser.add_argument("--quick", action="store_true", help="every fifth case")
     options = parser.parse_args(arguments)
     for path in options.traces:
-        trace = read_trace(path)
-        assert trace.record.machine is not None
-        print(path, *(_spoken(p) for p in ranked_effects(trace, base_model(trace.record.machine))[:5]), sep="\n  ")
-    if options.cases is None:
-        return 0
+        print(path, *(_spoken(p) for p in _ranked(path)[:5]), sep="\n  ")
+    return 0 if options.trial is None else _beside_the_diagnosis(_scored(options.trial)[:: 5 if options.quick else 1])
+
+
+def _ranked(path: Path) -> list[Place]:
+    trace = read_trace(path)
+    assert trace.record.machine is not None
+    return ranked_effects(trace, base_model(trace.record.machine))
+
+
+def _beside_the_diagnosis(cases: Sequence[Scored]) -> int:
     first = three = joint_right = 0
-    cases = _truths(options.cases)[:: 5 if options.quick else 1]
     begun = time.process_time()
-    for path, name, joints in cases:
-        trace = read_trace(path)
-        assert trace.record.machine is not None
-        ranked = ranked_effects(trace, base_model(trace.record.machine))
+    for case in cases:
+        ranked = _ranked(case.trace)
         names = list(dict.fromkeys(n for n, _ in ranked))
-        first += names[:1] == [name]
-        three += name in names[:3]
-        joint_right += bool(ranked) and (not joints or ranked[0][1] in joints)
-        print(f"{path.parent.name:>5} {name:<30} {', '.join(_spoken(p) for p in ranked[:3])}", flush=True)
-    n = max(1, len(cases))
-    seconds = (time.process_time() - begun) / n
+        first += names[:1] == [case.effect]
+        three += case.effect in names[:3]
+        joint_right += bool(ranked) and (not case.joints or ranked[0][1] in case.joints)
+        print(f"{case.trace.name} {case.effect:<30} {', '.join(_spoken(p) for p in ranked[:3])}", flush=True)
+    n, right = len(cases), sum(c.named_right for c in cases)
+    seconds = (time.process_time() - begun) / max(1, n)
+    beside = "daq diagnose of that trial: "
     figures = [
-        Figure("named right", f"{first} of {len(cases)}"),
-        Figure("the right name among the first three", f"{three} of {len(cases)}"),
-        Figure("joint right", f"{joint_right} of {len(cases)}"),
+        Figure("named right", f"{first} of {n}", "≤ half of the diagnosis'", 2 * first <= right, f"{beside}{right}"),
+        Figure("right name in the first three", f"{three} of {n}", beside=f"{beside}{sum(c.in_first for c in cases)}"),
+        Figure("joint right", f"{joint_right} of {n}", beside=f"{beside}{sum(c.joint_right for c in cases)}"),
         Figure("processor time a case", f"{seconds:.1f} s"),
     ]
     return show(
-        "Sparse regression naming hidden effects", "python -m benchmarks sparse_regression --cases FOLDER", figures
+        "Sparse regression naming hidden effects", "python -m benchmarks sparse_regression --trial FOLDER", figures
     )
 
 
