@@ -74,23 +74,24 @@ class Case:
         return () if self.held is None else errors(self.held.observation, model, before, after, self.floor_held)
 
     def refused(
-        self, found: Refitted, before: Signals, after: Signals, own: Sequence[SignalError]
+        self, found: Refitted, current: Point, held: tuple[Signals, Signals], own: Sequence[SignalError]
     ) -> str | None:  # fmt: skip
         """Why an effect is not taken, if held-out traces speak against it.
 
         Args:
-            before, after: residuals of these traces without and with it. own: their errors on its joints; on others,
-                something else may be missing, which the tolerance parameters bend to make up for.
+            current: the point without it. held: residuals of these traces without and with it. own: their errors on its
+                joints; on others, something else may be missing, which the tolerance parameters bend to make up for.
         """
         if self.held is None:
             return None
         removed, lines = excess_removed(own), self.thresholds
         if removed is not None and removed < -lines.grown:
             return f"the error on the held-out traces grows, by {-removed:.0%} of what is beyond noise there"
-        rise, deviation = self.held.rise(before, after)
+        rise, deviation = self.held.rise(*held)
         share = self.held.observation.samples / self.observation.samples
-        by_chance = max(lines.worse * deviation, lines.lost * found.evidence * share)
-        if rise > min(by_chance, found.evidence - lines.significant):
+        fall = self._square(current) - self._square(found.judged.point)
+        by_chance = max(lines.worse * deviation, lines.lost * fall * share)
+        if rise > min(by_chance, max(deviation, found.evidence - lines.significant)):
             return (
                 f"the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} variances "
                 "of a reading"
@@ -108,6 +109,11 @@ class Case:
             with_point(point), self.told.records, self._told(point), self.told.deviations,
             following=FOLLOWING_FOR_ERRORS,
         )  # fmt: skip
+
+    def _square(self, point: Point) -> float:
+        """Weighted sum of squares of a point, on the fitted traces as errors are told."""
+        weighted = self.told.weighted(self._told(point))
+        return float(weighted @ weighted)
 
     def _told(self, point: Point) -> Signals:
         return self.told.residuals(point.model, point.unknowns, point.values)

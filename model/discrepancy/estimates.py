@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,7 +11,7 @@ from daq.contracts.errors import SpecError
 from model.discrepancy.answer import Candidate, FoundValue
 from model.discrepancy.observation import Observation
 from model.discrepancy.ranking import Ranking
-from model.discrepancy.refitting import Judged, Refitted, says_no_more
+from model.discrepancy.refitting import Judged, Refitted, price_of, says_no_more
 from model.discrepancy.search import Point, point_at, searched
 from model.fitting.fit import INTERVAL
 from model.fitting.whitening import Whitener
@@ -52,7 +51,8 @@ def moved_by_noise(observation: Observation, point: Point, parameters: Sequence[
 
     Noise that passes a law with a corner or a limit does not average out: a dead zone looks narrower, friction near
     zero speed softer. As in the extrapolation of simulated noise (Cook and Stefanski 1994), what that does is seen
-    where there is less of it; here it tells how much is uncertain. All zero where that fit does not stay finite.
+    where there is less of it. What is left of the way is about as long again, and two deviations reach so far. All zero
+    where that fit does not stay finite.
     """
     nearer, names = observation.following(FOLLOWING_FOR_INTERVALS), {p.name for p in parameters}
     own = [k for k, u in enumerate(point.unknowns) if u.name in names]
@@ -96,7 +96,7 @@ def listed(found: Refitted) -> Candidate:
     )  # fmt: skip
 
 
-def only_probed(ranking: Ranking, samples: int) -> tuple[Candidate, ...]:
+def only_probed(ranking: Ranking, observation: Observation) -> tuple[Candidate, ...]:
     """Candidates that were not worth a fit, by what their probe promised less the price of their parameters."""
     fitted = {(r.candidate.name, r.candidate.joints) for r in ranking.fitted}
     left = []
@@ -104,8 +104,8 @@ def only_probed(ranking: Ranking, samples: int) -> tuple[Candidate, ...]:
         key = probe.candidate.name, probe.candidate.joints
         if key not in fitted:
             fitted.add(key)
-            price = len(probe.candidate.free) * math.log(samples)
-            left.append(Candidate(effect=key[0], joints=key[1], evidence=probe.gain - price))
+            evidence = probe.gain - price_of(observation, probe.candidate)
+            left.append(Candidate(effect=key[0], joints=key[1], evidence=evidence))
     return tuple(left)
 
 

@@ -21,8 +21,8 @@ from model.machine_model.model import Model
 Floats = NDArray[np.float64]
 
 DISTURBANCE = "periodic_disturbance"
-BLOCK = 10
-"""Samples whose errors may be alike."""
+BLOCK = 0.2
+"""s over which errors may be alike."""
 START_STEPS = 8
 """Of the search for where a held-out trace begins: with play in a gear, that is not a smooth problem."""
 
@@ -63,7 +63,8 @@ class HeldOut:
         if not np.isfinite(new).all():
             return float("inf"), 0.0
         risen = new**2 - old**2
-        width = BLOCK * len(self.observation.deviations)
+        period = self.observation.records[0].inputs.period
+        width = max(1, round(BLOCK / period)) * len(self.observation.deviations)
         blocks = np.add.reduceat(risen, np.arange(0, len(risen), width))
         return float(risen.sum()), float(np.sqrt(len(blocks)) * blocks.std())
 
@@ -83,11 +84,12 @@ def _residuals(observation: Observation, point: Point, starts: tuple[Unknown, ..
 
 
 def _searched(observation: Observation, point: Point, own: tuple[Unknown, ...]) -> Point:
-    """The point with unknowns of the record's own at their best; not searched for where no simulation stays finite."""
+    """The point with unknowns of the record's own at their best; not searched for where it has none, or where no
+    simulation stays finite."""
     unknowns, values = _here(point, own)
     none = np.zeros((len(unknowns), observation.samples))
     begun = point_at(observation, point.model, unknowns, values, none)
-    if not np.isfinite(begun.weighted).all():
+    if not own or not np.isfinite(begun.weighted).all():
         return begun
     return searched(observation, begun, START_STEPS, range(len(unknowns) - len(own), len(unknowns)))
 

@@ -9,6 +9,7 @@ there is already. Either may be the wrong one; the smaller of the two d′ count
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -89,7 +90,7 @@ class Asker:
             if not rivals:
                 return Asked(None)
             ended = settled(observation, rivals)
-            return best_experiment(ended, self.experiments, self.plan, self.budget)
+            return best_experiment(ended, self.experiments, self.plan, self.budget) if len(ended) > 1 else Asked(None)
         done = [t.record.spec for t in traces if t.record.spec is not None]
         return most_information(current, self.experiments, self.plan, done, self.budget)
 
@@ -119,11 +120,12 @@ def rivals_of(ranking: Ranking, decision: Decision) -> tuple[Refitted, ...]:
 
 def settled(observation: Observation, rivals: Sequence[Refitted]) -> list[Refitted]:
     """Rivals with their fits taken to the end, from derivatives computed there: a difference that a fit would still
-    take away separates nothing."""
+    take away separates nothing. A rival at the brink of instability, which has none, is left out."""
     found = []
     for rival in rivals[:MOST_RIVALS]:
         point = search.settled(observation, rival.judged.point, SETTLING)
-        found.append(replace(rival, judged=judge(observation, with_new_tangents(observation, point))))
+        with suppress(SpecError):
+            found.append(replace(rival, judged=judge(observation, with_new_tangents(observation, point))))
     return found
 
 

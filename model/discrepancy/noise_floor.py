@@ -23,12 +23,16 @@ REPLICAS, SEED = 6, 1991
 def noise_floor(observation: Observation, point: Point, left: Callable[[Observation], Signals] | None = None) -> Floats:
     """(n,) rad; root mean square of what remains of each joint, over records that the point's own model has made.
 
+    Where its simulations in closed loop do not stay finite: the noise of a reading.
+
     Args:
         left: residuals of an observation, worked out as those of the real records are; None for those of the point.
     """
     left = left or (lambda made: made.residuals(point.model, point.unknowns, point.values))
     rng = np.random.default_rng(SEED)
     made = [_made(observation, point, rng) for _ in range(REPLICAS)]
+    if not all(np.isfinite(r.measured).all() for one in made for r in one.records):
+        return observation.deviations.copy()
     squares = []
     for one, residuals in zip(made, side_by_side(left, made), strict=True):
         squares.append([np.mean(np.concatenate(runs) ** 2) for runs in one.by_joint(one.weighted(residuals))])

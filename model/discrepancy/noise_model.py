@@ -23,6 +23,9 @@ LONGEST_MEMORY = 6
 LEAST_DEVIATION = 0.8
 """Of a prediction error, in deviations of a reading: rounding is not always as random as its variance says. No
 likelihood counts an error as smaller, or a joint at rest would make evidence of shaving a rounding offset."""
+PRICE_OF_MEMORY = 2.0
+"""Of each sample that a noise model looks back: Akaike's, by which the order was chosen. Without it, a description
+would jump by twelve where the choice is close, and with it a margin between rivals."""
 CLIP = 5.0
 """Prediction errors beyond so many deviations count as that: one bad reading proves no effect."""
 
@@ -31,8 +34,8 @@ CLIP = 5.0
 class NoiseModel:
     """Colour and size of a residual, joint by joint.
 
-    whiteners: a filter a joint. description: −2 ln likelihood of the prediction errors, up to a constant.
-    by_joint: its parts.
+    whiteners: a filter a joint. description: −2 ln likelihood of the prediction errors, up to a constant, and the price
+    of memory. by_joint: its parts.
     """
 
     whiteners: tuple[Whitener, ...]
@@ -40,7 +43,7 @@ class NoiseModel:
 
     @property
     def description(self) -> float:
-        """−2 ln likelihood, all joints."""
+        """−2 ln likelihood and the price of memory, all joints."""
         return sum(self.by_joint)
 
 
@@ -51,6 +54,7 @@ def noise_model(runs_by_joint: Sequence[Sequence[Floats]]) -> NoiseModel:
         whitener = fitted_whitener(runs, LONGEST_MEMORY, LEAST_DEVIATION)
         errors = np.concatenate([whitener.whitened(run) for run in runs])
         spread = float(np.sqrt(np.mean(np.clip(errors, -CLIP, CLIP) ** 2))) * float(whitener.deviations[-1])
-        parts.append(2 * len(errors) * float(np.log(max(spread, LEAST_DEVIATION))))
+        order = len(whitener.predictors) - 1
+        parts.append(2 * len(errors) * float(np.log(max(spread, LEAST_DEVIATION))) + PRICE_OF_MEMORY * order)
         whiteners.append(whitener)
     return NoiseModel(tuple(whiteners), tuple(parts))

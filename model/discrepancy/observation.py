@@ -10,7 +10,7 @@ white where the model is right, and a missing torque shows 1/(1 − share) times
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,8 +46,8 @@ HALVINGS = 2
 """Of the step, for runs that do not stay finite with it."""
 DIFFERENCE = 0.05
 """Of an expected deviation: over it, derivatives are taken."""
-TONE_DIFFERENCES = {"cycles": 0.02, "frequency": 3e-4}
-"""The same of a tone, in cycles a turn and Hz: its phase then turns by less than 0.1 over a turn, or a minute."""
+TONE_DIFFERENCE = 0.02
+"""The same of a tone, in waves over a turn or over the longest record: its phase moves by an eighth of a radian."""
 BEND_TERMS = 8
 """Of the sine series of a sound potentiometer's curve: an arm moves over a part of the range, and what the curve does
 there, bent by a count or two, has to be within the series' reach."""
@@ -169,7 +169,8 @@ class Observation:
         Raises SpecError when the simulation does not stay finite.
         """  # fmt: skip
         which = range(len(unknowns)) if which is None else which
-        moves = [_difference(model, unknowns[k], float(values[k])) for k in which]
+        seconds = max(len(r.inputs) * r.inputs.period for r in self.records)
+        moves = [_difference(model, unknowns[k], float(values[k]), seconds) for k in which]
         states = [self.state(model, unknowns, values)]
         for index, move in zip(which, moves, strict=True):
             moved = values.copy()
@@ -225,8 +226,14 @@ def observed(
     unit = np.array([1.0 if s is None else s.range.value / 2**s.bits for s in sensors])
     options = Options(quantise=False, following=following)
     prepared = tuple(prepare(problem.model, r.inputs, options) for r in problem.records)
-    unknowns = tuple(_loose_start(_even_bend(u, problem.model)) for u in problem.unknowns)
+    given = {p.name: p.value for p in model.parameters if p.effect is not None}
+    unknowns = tuple(_loose_start(_even_bend(_as_given(u, given), problem.model)) for u in problem.unknowns)
     return Observation(problem.records, problem.floor, unit, prepared), problem.model, unknowns
+
+
+def _as_given(unknown: Unknown, given: Mapping[str, float]) -> Unknown:
+    """An effect that the model was given with is expected to be what it was found to be."""
+    return replace(unknown, expected=given[unknown.name]) if unknown.name in given else unknown
 
 
 def step_of_derivatives(model: Model) -> float:
@@ -234,12 +241,15 @@ def step_of_derivatives(model: Model) -> float:
     return STEP if any(use.name in STIFF for use in model.effects) else COARSE_STEP
 
 
-def _difference(model: Model, unknown: Unknown, value: float) -> float:
-    """The move over which a derivative is taken, towards the inside of the unknown's bounds."""
+def _difference(model: Model, unknown: Unknown, value: float, seconds: float) -> float:
+    """The move over which a derivative is taken, towards the inside of the unknown's bounds. `seconds`: of the longest
+    record."""
     parameter = model.by_name.get(unknown.name)
     stated = None if parameter is None else parameter.deviation
     size = DIFFERENCE * (unknown.deviation or stated or unknown.scale)
-    size = TONE_DIFFERENCES.get(unknown.name.rpartition(".")[2], size)
+    last = None if parameter is None else (parameter.effect, unknown.name.rpartition(".")[2])
+    if last in (("torque_ripple", "cycles"), ("periodic_disturbance", "frequency")):
+        size = TONE_DIFFERENCE / (1.0 if last[1] == "cycles" else seconds)
     if unknown.name.startswith(INITIAL + "."):
         size /= LOOSE_START
     return -size if value + size > unknown.high else size

@@ -111,10 +111,18 @@ def _fitted(
             break
         names = " and ".join(describe(one.candidate.name, one.candidate.joints) for one in now)
         progress(0.4 + 0.5 * begin / len(chosen), f"fitting {names}")
-        explained = min((f.judged.point.cost for f in fits if f.misfit < STRANGE), default=None)
-        goal = None if explained is None else explained + thresholds.close
-        fits += [f for f in side_by_side(partial(refitted, observation, current, goal=goal), now) if f is not None]
+        reach = min((_priced(observation, f) for f in fits if f.misfit < STRANGE), default=None)
+
+        def fit(probed: Probed, reach: float | None = reach) -> Refitted | None:
+            goal = None if reach is None else reach + thresholds.close - price_of(observation, probed.candidate)
+            return refitted(observation, current, probed, goal)
+
+        fits += [f for f in side_by_side(fit, now) if f is not None]
     return fits
+
+
+def _priced(observation: Observation, fit: Refitted) -> float:
+    return fit.judged.point.cost + price_of(observation, fit.candidate)
 
 
 def _different(fits: Sequence[Refitted]) -> list[Refitted]:

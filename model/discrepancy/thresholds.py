@@ -18,14 +18,15 @@ class Thresholds:
         margin: evidence over the next answer from which one name is given, instead of a group.
         unexplained: variance of a joint's error above its floor, in floors, above which something is missing that none
             of the known effects is. unnamed: the same on the traces fitted to, while no effect has been added; then
-            also where the record is followed as in the fits. place: significance of one place that tells the same
-            then, standard deviations.
+            also where the record is followed as in the fits. place: chance that one place of the map of a sound arm
+            tells the same then.
         least_share: share of a joint's excess that effects must explain, or they only resemble what is missing.
         worse: rise of the held-out sum of squares, in its own standard deviations, at which a step is rejected, unless
-            it is less than the share `lost` of the evidence that as many samples have brought in the fit: the tolerance
-            parameters, none of them known for sure, have moved too. It is also rejected where the rise takes the
-            evidence below what is significant. grown: growth of what is beyond the noise floor of the held-out traces,
-            on the effect's own joints, at which it is rejected as well; stuck joints let go by chance, so not at once.
+            it is less than the share `lost` of what as many samples have brought on the fitted traces: the tolerance
+            parameters, none of them known for sure, have moved too. It is also rejected where a rise by more than its
+            deviation takes the evidence below what is significant. grown: growth of what is beyond the noise floor of
+            the held-out traces, on the effect's own joints, at which it is rejected as well; stuck joints let go by
+            chance, so not at once.
         close: evidence within which rivals are fitted to their ends before they are compared.
         interesting: gain of a probe below which no candidate is worth a fit.
     """
@@ -37,7 +38,7 @@ class Thresholds:
     margin: float = 4.0
     unexplained: float = 0.3
     unnamed: float = 0.12
-    place: float = 4.3
+    place: float = 0.005
     least_share: float = 0.8
     worse: float = 2.0
     lost: float = 0.5

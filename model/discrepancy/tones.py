@@ -19,14 +19,14 @@ from model.discrepancy.candidates import TONES, Candidate, tone
 from model.discrepancy.observation import DIFFERENCE, Observation
 from model.discrepancy.probing import Probed, Projection, projection
 from model.discrepancy.search import Point
-from model.fitting.records import resolution
+from model.fitting.records import Record, resolution
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.model import Model
 
 Floats = NDArray[np.float64]
 
-RESPONSE_SAMPLES = 75
-"""Length of the impulse response: 1.5 s at 20 ms, for a simulation that follows the record comes back slowly."""
+RESPONSE = 1.5
+"""s; length of the impulse response, for a simulation that follows the record comes back slowly."""
 SHAPES = {"torque_ripple": "cycles", "periodic_disturbance": "frequency"}
 """The parameter of each that a spectrum finds."""
 TRIAL_RATES = {"torque_ripple": (23.0, 47.0), "periodic_disturbance": (0.7, 2.1, 4.3)}
@@ -50,7 +50,10 @@ def proposed_tones(observation: Observation, point: Point, joints: Sequence[int]
         absent = _absent(point.model, joint)
         if not absent:
             continue
-        response = torque_response(observation, point, joint)
+        shown_by = _most_moving(observation, joint, point.model)
+        if shown_by is None:
+            continue
+        response = torque_response(observation, point, joint, shown_by)
         for name in absent:
             best = _best_tone(observation, point, clear, name, joint, response)
             if best is not None:
@@ -91,8 +94,24 @@ def rates_tried(observation: Observation, machine: Machine, name: str, joint: in
     return np.linspace(low, high, int(max(2.0, min(span / step, max(MOST_TONES, math.ceil(span / alike) + 1)))))
 
 
-def torque_response(observation: Observation, point: Point, joint: int) -> Floats:
-    """Impulse response (RESPONSE_SAMPLES,) of a joint's reading to a torque on it, rad/(N·m).
+def _most_moving(observation: Observation, joint: int, model: Model) -> int | None:
+    """The record in which a joint travels furthest, of those that are twice as long as a response; None without any."""
+    column = model.machine.modelled_joints.index(joint)
+    travels = [
+        float(np.ptp(r.measured[:, column])) if len(r.measured) >= 2 * _samples(r) else -1.0
+        for r in observation.records
+    ]
+    best = int(np.argmax(travels))
+    return None if travels[best] < 0.0 else best
+
+
+def _samples(record: Record) -> int:
+    """Of an impulse response, at a record's rate."""
+    return max(2, round(RESPONSE / record.inputs.period))
+
+
+def torque_response(observation: Observation, point: Point, joint: int, record: int = 0) -> Floats:
+    """Impulse response (s,) of a joint's reading to a torque on it, rad/(N·m), as one record shows it.
 
     It is taken with tones that the joint has not yet: to move those it has would show what their own size does. Raises
     ValueError where it has both.
@@ -114,15 +133,16 @@ def torque_response(observation: Observation, point: Point, joint: int) -> Float
             row[list(sine.slots)] += size
             vectors.append(row)
             sizes.append(size)
-            waves.append(np.sin(_phase(observation, point, name, column, np.array([value]))[0]))
+            waves.append(np.sin(_phase(observation, point, name, column, np.array([value]), record)[0]))
     starts = [np.tile(i, (len(vectors), 1, 1)) for i in initials]
-    shown = observation.readings(model, np.array(vectors), starts)[0][..., column]
+    shown = observation.readings(model, np.array(vectors), starts)[record][..., column]
     shown = (shown[1:] - shown[:1]) / np.array(sizes)[:, None]
-    rows = [_lagged(wave) for wave in waves]
-    regressor = np.concatenate([r[RESPONSE_SAMPLES:] for r in rows])
-    target = np.concatenate([s[RESPONSE_SAMPLES:] for s in shown])
+    count = _samples(observation.records[record])
+    rows = [_lagged(wave, count) for wave in waves]
+    regressor = np.concatenate([r[count:] for r in rows])
+    target = np.concatenate([s[count:] for s in shown])
     gram = regressor.T @ regressor
-    gram[np.diag_indices_from(gram)] += 1e-6 * np.trace(gram) / RESPONSE_SAMPLES
+    gram[np.diag_indices_from(gram)] += 1e-6 * np.trace(gram) / count
     return np.asarray(np.linalg.solve(gram, regressor.T @ target))
 
 
@@ -131,9 +151,9 @@ def _absent(model: Model, joint: int) -> list[str]:
     return [name for name in TONES if not any(u.name == name and joint in u.joints for u in model.effects)]
 
 
-def _lagged(wave: Floats) -> Floats:
-    padded = np.concatenate([np.zeros(RESPONSE_SAMPLES - 1), wave])
-    return np.ascontiguousarray(np.lib.stride_tricks.sliding_window_view(padded, RESPONSE_SAMPLES)[:, ::-1])
+def _lagged(wave: Floats, count: int) -> Floats:
+    padded = np.concatenate([np.zeros(count - 1), wave])
+    return np.ascontiguousarray(np.lib.stride_tricks.sliding_window_view(padded, count)[:, ::-1])
 
 
 def _phase(observation: Observation, point: Point, name: str, column: int, values: Floats, record: int = 0) -> Floats:
@@ -154,10 +174,10 @@ def _passed(
     waves = np.exp(1j * _phase(observation, point, name, column, values, record))
     if name == "torque_ripple":
         samples = waves.shape[1]
-        room = next_fast_len(samples + RESPONSE_SAMPLES - 1)
+        room = next_fast_len(samples + len(response) - 1)
         waves = ifft(fft(waves, room, axis=1) * fft(response, room), axis=1)[:, :samples]
     else:  # a frequency passes a linear response as it is, but for its size and phase
-        lags = np.arange(RESPONSE_SAMPLES) * source.inputs.period
+        lags = np.arange(len(response)) * source.inputs.period
         waves *= np.exp(-2j * np.pi * values[:, None] * lags) @ response[:, None]
     return np.concatenate([waves[:, run] for run in source.runs], axis=1)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from model.discrepancy import reasons
-from model.discrepancy.answer import SignalError, Step
+from model.discrepancy.answer import Candidate, SignalError, Step
 from model.discrepancy.case import Case, with_point
 from model.discrepancy.decision import Decision
 from model.discrepancy.distortion import sum_of_contributions
@@ -14,8 +14,9 @@ from model.discrepancy.excess import excess_removed
 from model.discrepancy.observation import Observation
 from model.discrepancy.ranking import Ranking
 from model.discrepancy.reasons_samples import Left
-from model.discrepancy.refitting import Judged, with_evidence
+from model.discrepancy.refitting import Judged, Refitted, same_answer, with_evidence
 from model.discrepancy.search import Point, settled
+from model.discrepancy.thresholds import Thresholds
 
 LAST_STEPS = 4
 """Of a search after its derivatives are computed anew."""
@@ -32,11 +33,12 @@ def step_of(case: Case, current: Judged, ranking: Ranking, decision: Decision) -
     before, after = current.point, best.judged.point
     held = case.held_residuals(before, after)
     held_errors = case.held_errors(after.model, *held)
-    refused = case.refused(best, *held, _on(best.candidate.joints, held_errors))
+    refused = case.refused(best, before, held, _on(best.candidate.joints, held_errors))
     values = found_values(observation, best.judged, best.candidate.free)
     margin = decision.margin + best.evidence - chosen.evidence
+    group = _still_close(best, chosen, ranking, case.thresholds)
     candidates = tuple(listed(best if r is chosen else r) for r in ranking.fitted)
-    candidates += only_probed(ranking, observation.samples)
+    candidates += only_probed(ranking, observation)
     reason = reasons.reason(
         best.candidate.name, best.candidate.joints, values, best.evidence, margin, model=with_point(after),
         before=with_point(before), records=observation.records, runner_up=runner_up(listed(best), candidates),
@@ -44,13 +46,22 @@ def step_of(case: Case, current: Judged, ranking: Ranking, decision: Decision) -
     )  # fmt: skip
     step = Step(
         effect=best.candidate.name, joints=best.candidate.joints, parameters=values, evidence=best.evidence,
-        margin=margin, candidates=candidates, group=tuple(listed(best if r is chosen else r) for r in decision.group),
+        margin=margin, candidates=candidates, group=group,
         rmse_fit=case.fitted_errors(before, after), rmse_holdout=held_errors,
         excess_removed_holdout=excess_removed(held_errors),
         sum_lambda2_before=_sum_lambda2(before, before), sum_lambda2_after=_sum_lambda2(after, before),
         where=case.where(before), reason=reason, adopted=refused is None, rejected_because=refused,
     )  # fmt: skip
     return step, current if refused is not None else best.judged
+
+
+def _still_close(
+    best: Refitted, chosen: Refitted, ranking: Ranking, thresholds: Thresholds
+) -> tuple[Candidate, ...]:  # fmt: skip
+    """The group that the data cannot tell apart, now that the best of it has come to its end; empty for one name."""
+    after = ranking.fitted[ranking.fitted.index(chosen) + 1 :]
+    rivals = [r for r in after if not same_answer(r, chosen) and best.evidence - r.evidence < thresholds.margin]
+    return tuple(listed(r) for r in (best, *rivals)) if rivals else ()
 
 
 def _on(joints: Sequence[int], found: Sequence[SignalError]) -> tuple[SignalError, ...]:

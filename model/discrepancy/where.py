@@ -135,9 +135,8 @@ def _cells(
         for run in record.runs:
             windows = _windows(run, period)
             squares = np.array([np.mean(signal[w] ** 2, axis=0) for w in windows])
-            usual = windows[0].stop - windows[0].start
             for j, joint in enumerate(model.machine.modelled_joints):
-                beyond = significance_of_squares(squares[:, j], usual, correlations[j])
+                beyond = _beyond(windows, squares[:, j], correlations[j])
                 for window, square, significance in zip(windows, squares[:, j], beyond, strict=True):
                     counts = np.bincount(phase[window, j], minlength=len(PHASES))
                     found.append(PhaseCell(
@@ -145,6 +144,15 @@ def _cells(
                         end=round(float(time[window.stop - 1] + period), 4), phase=PHASES[int(counts.argmax())],
                         mean_square=float(square), significance=float(significance), trace=t,
                     ))  # fmt: skip
+    return found
+
+
+def _beyond(windows: Sequence[slice], squares: Floats, correlation: Correlation) -> Floats:
+    """Significance of the mean square of every window, each for as many samples as it holds."""
+    counts = np.array([w.stop - w.start for w in windows])
+    found = np.zeros(len(windows))
+    for count in np.unique(counts):
+        found[counts == count] = significance_of_squares(squares[counts == count], int(count), correlation)
     return found
 
 

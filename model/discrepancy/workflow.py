@@ -13,7 +13,7 @@ from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.discrepancy import reasons
-from model.discrepancy.answer import Diagnosis, FoundValue, RemainingShape, Step, Verdict
+from model.discrepancy.answer import Diagnosis, RemainingShape, Step, Verdict
 from model.discrepancy.case import Case, with_point
 from model.discrepancy.controller_check import (
     ControllerFinding,
@@ -23,8 +23,8 @@ from model.discrepancy.controller_check import (
     with_used_set_points,
 )
 from model.discrepancy.decision import Added, decide
-from model.discrepancy.estimates import found_values, moved_by_noise
 from model.discrepancy.holdout import HeldOut, held_out
+from model.discrepancy.last_fit import as_last_fitted
 from model.discrepancy.next_experiment import Asked, Asker, rivals_of
 from model.discrepancy.noise_floor import noise_floor
 from model.discrepancy.notes import ERRORS_FOLLOW, NOTHING_HELD_OUT, on_unfinished, on_what_is_stated
@@ -38,9 +38,9 @@ from model.discrepancy.search import Point, point_at, searched, settled
 from model.discrepancy.thresholds import THRESHOLDS
 from model.discrepancy.turn import LAST_STEPS, step_of
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn
+from model.discrepancy.where_statistics import chance_significance
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
-from model.machine_model.parameter import Parameter
 
 CHANCES = 3
 """Candidates of a turn that held-out traces may refuse, until there is nothing more to look for."""
@@ -106,34 +106,41 @@ def diagnose(
     found = _searched(case, judge(observation, point), progress, cancel)
     progress(0.95, "writing the answer")
     proved = tuple(proved_step(model, observation, f) for f in findings)
-    found = _as_last_fitted(observation, found)
+    answer = _answer(case, model, given, found, proved, ask, tuple(holdout))
+    progress(1.0, "done")
+    return answer.model_copy(update={"seconds": time.perf_counter() - begun})
+
+
+def _answer(
+    case: Case, model: Model, given: Point, found: _Found, proved: tuple[Step, ...], ask: Asker | None,
+    holdout: tuple[Trace, ...],
+) -> Diagnosis:  # fmt: skip
+    """What the turns have come to, and what is taken back of it. The time that it took is not known here."""
     left = _unexplained(case, found)
     answered = verdict((*proved, *found.steps), left)
     if answered == "unknown-effect":
-        found = _as_last_fitted(observation, _taken_back(found, left))
-    found = _as_sure_as_it_is(observation, found)
-    remaining = case.remaining(found.current.point) if answered == "unknown-effect" else ()
-    end = found.current.point
-    asked = Asked(None) if ask is None else ask.after(answered, observation, end, found.rivals, traces)
+        found = _taken_back(found, left)
+    current, steps = as_last_fitted(case.observation, found.current, found.steps)
+    found, end = replace(found, current=current, steps=steps), current.point
+    remaining = case.remaining(end) if answered == "unknown-effect" else ()
+    asked = Asked(None) if ask is None else ask.after(answered, case.observation, end, found.rivals, case.traces)
     notes = (
-        f"tolerance parameters: {len(traces)} trace(s), priors as the machine file states them", ERRORS_FOLLOW,
+        f"tolerance parameters: {len(case.traces)} trace(s), priors as the machine file states them", ERRORS_FOLLOW,
         *on_what_is_stated(_stated(end), {u.name: float(v) for u, v in zip(end.unknowns, end.values, strict=True)}),
-        *on_unfinished((*traces, *holdout)), *(() if holdout else (NOTHING_HELD_OUT,)),
+        *on_unfinished((*case.traces, *holdout)), *(() if holdout else (NOTHING_HELD_OUT,)),
         *(() if asked.note is None else (asked.note,)),
     )  # fmt: skip
-    answer = Diagnosis(
+    return Diagnosis(
         verdict=answered, summary=_summary(case, found, answered, proved, remaining, left),
         steps=(*proved, *found.steps), remaining=remaining,
-        model_before=model, model_after=_adopted(model, found, case.names),
+        model_before=model, model_after=_with_lineage(model, end, case.names),
         traces=case.names, holdout=tuple(t.record.trace_id for t in holdout),
         rmse_fit=case.fitted_errors(given, end),
         rmse_holdout=case.held_errors(end.model, *case.held_residuals(given, end)),
-        significant=case.thresholds.significant, seconds=time.perf_counter() - begun,
-        robot_seconds=float(sum(t.time[-1] - t.time[0] for t in traces)),
+        significant=case.thresholds.significant, seconds=0.0,
+        robot_seconds=float(sum(t.time[-1] - t.time[0] for t in case.traces)),
         notes=notes, next_experiment=asked.experiment,
     )  # fmt: skip
-    progress(1.0, "done")
-    return answer
 
 
 def _case(
@@ -239,7 +246,9 @@ def _unexplained(case: Case, found: _Found) -> tuple[int, ...]:
     if named:
         return left
     closer = unexplained(case.errors_of_fits(after), (), case.thresholds, named=False, samples=counts)
-    places = [c.joint for c in case.where(after).cells if c.significance >= case.thresholds.place]
+    cells = case.where(after).cells
+    line = chance_significance(len(cells), case.thresholds.place)
+    places = [c.joint for c in cells if c.significance >= line]
     return tuple(sorted({*left, *closer, *places}))
 
 
@@ -252,62 +261,16 @@ def _taken_back(found: _Found, left: Sequence[int]) -> _Found:
     return replace(found, current=found.before[wrong], steps=steps)
 
 
-def _as_last_fitted(observation: Observation, found: _Found) -> _Found:
-    """Steps with the last fit's parameters: what was still missing at their turn has bent them. An effect that came out
-    as nothing, within its intervals, is none: a later one explains what it did."""
-    known = found.current.point.model.by_name
-    newest = max((k for k, s in enumerate(found.steps) if s.adopted), default=0)
-    steps = []
-    for k, step in enumerate(found.steps):
-        own = [known[name] for name in step.parameters] if step.adopted else []
-        if not own:
-            steps.append(step)
-            continue
-        last = found_values(observation, found.current, own)
-        update: dict[str, object] = {"parameters": last}
-        if k != newest and all(_nothing(last[p.name], p) for p in own if p.null is not None):
-            update |= {"adopted": False, "rejected_because": "superfluous once a later effect was in"}
-        steps.append(step.model_copy(update=update))
-    return replace(found, steps=tuple(steps))
-
-
-def _as_sure_as_it_is(observation: Observation, found: _Found) -> _Found:
-    """Steps with intervals that know what noise has done to the estimates."""
-    point, known = found.current.point, found.current.point.model.by_name
-    own = [known[name] for s in found.steps if s.adopted for name in s.parameters]
-    if not own:
-        return found
-    values = found_values(observation, found.current, own, moved_by_noise(observation, point, own))
-
-    def told(step: Step) -> Step:
-        return step.model_copy(update={"parameters": {n: values[n] for n in step.parameters}}) if step.adopted else step
-
-    return replace(found, steps=tuple(told(s) for s in found.steps))
-
-
-def _nothing(found: FoundValue, parameter: Parameter) -> bool:
-    """Whether the value at which the effect is absent lies in the interval."""
-    null, low, high = parameter.null, found.low, found.high
-    return null is not None and low is not None and high is not None and low <= null <= high
-
-
 def _stated(point: Point) -> list[Unknown]:
     """The numbers of the machine itself that a fit may change: no effect's, and no start."""
     known = point.model.by_name
     return [u for u in point.unknowns if u.name in known and known[u.name].effect is None]
 
 
-def _adopted(model: Model, found: _Found, names: tuple[str, ...]) -> Model:
-    """The model after all steps, but for effects that became superfluous and that it was not given with."""
-    point, given = found.current.point, {u.name for u in model.effects}
-    after = with_point(point)
-    for step in found.steps:
-        gone = not step.adopted and step.effect in {u.name for u in after.effects} - given
-        if gone and not any(s.adopted and s.effect == step.effect for s in found.steps):
-            after = after.without_effect(step.effect or "", step.joints or None)
+def _with_lineage(model: Model, point: Point, names: tuple[str, ...]) -> Model:
+    """The model of the last fit, and what it came from."""
     fit = {"misfit": point.misfit, "fitted": [u.name for u in point.unknowns if u.name in point.model.by_name]}
-    lineage = Lineage(parent=model.identity, traces=names, fit=fit, note="diagnosis")
-    return after.with_lineage(lineage)
+    return with_point(point).with_lineage(Lineage(parent=model.identity, traces=names, fit=fit, note="diagnosis"))
 
 
 def _summary(

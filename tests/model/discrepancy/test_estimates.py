@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from model.discrepancy.estimates import found_values, moved_by_noise, standard_deviations
 from model.discrepancy.noise_model import noise_model
-from model.discrepancy.observation import TONE_DIFFERENCES, Observation, observed
+from model.discrepancy.observation import Observation, observed
 from model.discrepancy.refitting import Judged, judge
 from model.discrepancy.search import point_at, settled
 from model.fitting.fit import INTERVAL
@@ -89,6 +89,6 @@ def test_derivatives_by_a_tones_frequency_are_taken_over_little_of_a_turn(monkey
     free = (*unknowns, Unknown(cycles.name, cycles.unit, 30.0, 1.0, 100.0, 30.0, 18.0))
     values = np.array([u.start for u in free])
     taken = observation.tangents(model, free, values, [len(free) - 1])
-    monkeypatch.setitem(TONE_DIFFERENCES, "cycles", TONE_DIFFERENCES["cycles"] / 4)
+    monkeypatch.setattr("model.discrepancy.observation.TONE_DIFFERENCE", 0.005)
     finer = observation.tangents(model, free, values, [len(free) - 1])
     assert np.linalg.norm(taken - finer) < 0.05 * np.linalg.norm(finer)

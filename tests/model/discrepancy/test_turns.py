@@ -8,8 +8,9 @@ from typing import Any, cast
 import pytest
 
 from daq.contracts.progress import Never, silent
-from model.discrepancy import workflow
+from model.discrepancy import last_fit, workflow
 from model.discrepancy.answer import FoundValue, Step, Where
+from model.discrepancy.last_fit import SUPERFLUOUS, _is_nothing, as_last_fitted
 from model.discrepancy.ranking import Ranking
 from model.discrepancy.refitting import Judged
 from model.discrepancy.thresholds import Thresholds
@@ -69,11 +70,25 @@ def test_what_a_later_effect_explains_is_taken_out_again(monkeypatch: pytest.Mon
             rmse_fit=(), where=nowhere, reason="", adopted=True,
         )  # fmt: skip
 
-    known = {"a": SimpleNamespace(name="a", null=0.0), "b": SimpleNamespace(name="b", null=1.0)}
-    known["c"] = SimpleNamespace(name="c", null=0.0)
+    def parameter(name: str, null: float, low: float = -1.0) -> Any:
+        return SimpleNamespace(name=name, null=null, low=low, effect=name, joints=(1,))
+
+    known = {"a": parameter("a", 0.0), "b": parameter("b", 1.0), "c": parameter("c", 0.0)}
     current = cast(Any, SimpleNamespace(point=SimpleNamespace(model=SimpleNamespace(by_name=known))))
-    monkeypatch.setattr(workflow, "found_values", lambda _o, _c, own: {p.name: value for p in own})
-    found = workflow._Found(current, current, steps=(step("a"), step("b"), step("c")))
-    last = workflow._as_last_fitted(cast(Any, None), found)
-    assert [s.adopted for s in last.steps] == [False, True, True]
-    assert last.steps[0].rejected_because == "superfluous once a later effect was in"
+    without = cast(Any, SimpleNamespace(point=SimpleNamespace(model=SimpleNamespace(by_name=known))))
+    gone: list[str] = []
+    monkeypatch.setattr(last_fit, "_without", lambda _o, _p, names: gone.extend(names) or without)
+    monkeypatch.setattr(last_fit, "moved_by_noise", lambda *_: 0.0)
+    monkeypatch.setattr(last_fit, "found_values", lambda _o, _c, own, _m: {p.name: value for p in own})
+    now, steps = as_last_fitted(cast(Any, None), current, [step("a"), step("b"), step("c")])
+    assert [s.adopted for s in steps] == [False, True, True]
+    assert steps[0].rejected_because == SUPERFLUOUS
+    assert gone == ["a"]
+    assert now is without, "the answer's errors and its model are those of the fit without it"
+
+
+@pytest.mark.parametrize(("low", "nothing"), [(1e-7, True), (2e-3, False)])
+def test_a_bound_that_keeps_an_estimate_from_nothing_does_not_make_it_something(low: float, nothing: bool) -> None:
+    """An inductance is never quite zero: its interval ends at the least that can be simulated."""
+    inductance: Any = SimpleNamespace(name="inductance", null=0.0, low=1e-7)
+    assert _is_nothing([(FoundValue(value=3e-3, low=low, high=9e-3, unit="H"), inductance)]) is nothing
