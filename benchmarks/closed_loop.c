@@ -44,7 +44,7 @@ static double extra_torque(const double *j, long flags, double t, double q, doub
   double torque = 0;
   if (flags & HAS_STICTION) torque -= z * stuck * j[BREAKAWAY];
   if (j[STRIBECK] != 0) torque -= z * j[STRIBECK] * exp(-fabs(v) / j[STRIBECK_SPEED]);
-  if (j[DIRECTION] != 0) torque -= 0.5 * (j[DIRECTION] * z * z + fabs(j[DIRECTION]) * z);
+  if (j[DIRECTION] * z > 0) torque -= fabs(j[DIRECTION]) * z;
   if (j[GEAR_LOSS] != 0) torque -= z * j[GEAR_LOSS] * fabs(motor);
   if (j[RIPPLE_SINE] != 0 || j[RIPPLE_COSINE] != 0)
     torque += j[RIPPLE_SINE] * sin(j[RIPPLE_CYCLES] * q) + j[RIPPLE_COSINE] * cos(j[RIPPLE_CYCLES] * q);

@@ -33,8 +33,8 @@ class FoundValue(_Part):
 class Candidate(_Part):
     """An effect that was tried.
 
-    `evidence` is what it takes off −2 log posterior, its own parameters and the places it was looked for paid for (BIC
-    and ln of the number of trials); above 0 it explains more than it costs. `misfit` is the weighted residual
+    `evidence` is what it takes off −2 log posterior, its own parameters paid for (BIC; a tone's frequency by the number
+    of tones tried); above 0 it explains more than it costs. `misfit` is the weighted residual
     that it leaves, per sample: near 1 for the right effect. `refitted` says whether all tolerance parameters were
     fitted again with it, or it was only probed.
     """

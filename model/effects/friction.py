@@ -74,7 +74,7 @@ FRICTION = (
     ),
     Effect(
         "direction_dependent_friction",
-        physics="τ = −½ (ΔT z² + |ΔT| z): friction is ΔT higher forwards, or |ΔT| backwards where ΔT is negative",
+        physics="τ = −|ΔT| z where ΔT z > 0: friction is ΔT higher forwards, or |ΔT| backwards where ΔT is negative",
         source="Armstrong-Hélouvry, Dupont, Canudas de Wit 1994, section 2.2",
         parameters=(
             EffectParameter(

@@ -95,8 +95,8 @@ def extra_torque(
         torque -= z * stuck * joint[at.BREAKAWAY]
     if joint[at.STRIBECK] != 0.0:
         torque -= z * joint[at.STRIBECK] * np.exp(-magnitude(speed) / joint[at.STRIBECK_SPEED])
-    if joint[at.DIRECTION] != 0.0:
-        torque -= 0.5 * (joint[at.DIRECTION] * z * z + magnitude(joint[at.DIRECTION]) * z)
+    if joint[at.DIRECTION].real * z.real > 0.0:
+        torque -= magnitude(joint[at.DIRECTION]) * z
     if joint[at.GEAR_LOSS] != 0.0:
         torque -= z * joint[at.GEAR_LOSS] * magnitude(through)
     if joint[at.RIPPLE_SINE] != 0.0 or joint[at.RIPPLE_COSINE] != 0.0:

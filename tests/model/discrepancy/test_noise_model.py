@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.signal import lfilter
 
 from model.discrepancy.noise_model import LEAST_DEVIATION, noise_model
 
@@ -22,6 +23,13 @@ def test_colour_costs_nothing_but_size_does() -> None:
     assert abs(described[0] - described[1]) < 250, "a red residual of the same prediction error is as likely"
     louder = noise_model([[1.1 * white], [red]]).by_joint
     assert abs(louder[0] - described[0] - 2 * 4000 * np.log(1.1)) < 20
+
+
+def test_a_description_does_not_jump_where_the_order_is_a_close_choice() -> None:
+    """From white to a little red: an order more is paid for by what it brings."""
+    white = coloured(2750, 0.0, 6)
+    described = [noise_model([[lfilter([1.0], [1.0, -pole], white)]]).description for pole in np.arange(0, 0.1, 0.001)]
+    assert np.max(np.abs(np.diff(described))) < 1.0
 
 
 def test_one_bad_reading_proves_nothing() -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import pytest
 
 from model.discrepancy.candidates import candidates
-from model.discrepancy.observation import observed
+from model.discrepancy.observation import Observation, observed
 from model.discrepancy.probing import probed
 from model.discrepancy.refitting import begun_again, judge, refitted, with_evidence
 from model.discrepancy.search import point_at, settled
@@ -15,17 +18,31 @@ DELAY = 0.015
 """s: the tolerance parameters go to the brink of instability to imitate so much."""
 
 
-def test_a_rival_without_hope_is_left_where_it_is() -> None:
+def counting(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """One for every round of simulations."""
+    rounds: list[int] = []
+    readings = Observation.readings
+
+    def counted(self: Observation, *arguments: Any, **named: Any) -> Any:
+        rounds.append(1)
+        return readings(self, *arguments, **named)
+
+    monkeypatch.setattr(Observation, "readings", counted)
+    return rounds
+
+
+def test_a_rival_without_hope_is_left_where_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     """With a cost to come to that it cannot reach, a fit takes few steps, and has no second way."""
     arm = imagined.arm().with_effect("dead_zone", (2,), {"width": 1.5})
     observation, model, unknowns = observed(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
     given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
     before = judge(observation, settled(observation, given, 4))
     (found,) = probed(observation, before.point, candidates(before.point.model, ("back_emf_error",), (2,)))
-    fitted = refitted(observation, before, found)
-    hopeless = refitted(observation, before, found, goal=1.0)
-    assert fitted is not None
-    assert hopeless is None or hopeless.judged.point.cost >= fitted.judged.point.cost
+    counted = counting(monkeypatch)
+    assert refitted(observation, before, found) is not None
+    with_time, counted[:] = len(counted), []
+    refitted(observation, before, found, goal=1.0)
+    assert 0 < len(counted) < 0.7 * with_time
 
 
 def test_a_fit_with_numbers_that_nobody_expects_is_begun_again() -> None:

@@ -116,3 +116,18 @@ def test_no_ripple_is_looked_for_where_nothing_moves() -> None:
     observation = observed(imagined.arm(), [still])[0]
     assert len(rates_tried(observation, imagined.machine(), "torque_ripple", 1)) == 0
     assert len(rates_tried(observation, imagined.machine(), "torque_ripple", 2)) > 0
+
+
+def test_the_record_that_moves_a_joint_furthest_shows_how_it_answers() -> None:
+    """The first is too short to show an answer of 1.5 s."""
+    truth = imagined.arm().with_effect("torque_ripple", (2,), RIPPLE)
+    short, long = imagined.trace(truth, 1, seconds=1.2), trace_of(truth, 20.0)
+    observation, model, unknowns = observed(imagined.arm(), [short, long])
+    point = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
+    ripple = next(p for p in proposed_tones(observation, point, (2,)) if p.candidate.name == "torque_ripple")
+    assert abs(ripple.start["joint2.torque_ripple.cycles"] - RIPPLE["cycles"]) < 1.0
+
+
+def test_a_record_too_short_to_show_an_answer_proposes_nothing() -> None:
+    observation, point = seen(imagined.arm(), imagined.arm(), seconds=1.2)
+    assert proposed_tones(observation, point, (1, 2, 3)) == []

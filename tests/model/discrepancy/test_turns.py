@@ -10,6 +10,7 @@ import pytest
 from daq.contracts.progress import Never, silent
 from model.discrepancy import last_fit, workflow
 from model.discrepancy.answer import FoundValue, Step, Where
+from model.discrepancy.case import Case
 from model.discrepancy.last_fit import SUPERFLUOUS, _is_nothing, as_last_fitted
 from model.discrepancy.ranking import Ranking
 from model.discrepancy.refitting import Judged
@@ -92,3 +93,40 @@ def test_a_bound_that_keeps_an_estimate_from_nothing_does_not_make_it_something(
     """An inductance is never quite zero: its interval ends at the least that can be simulated."""
     inductance: Any = SimpleNamespace(name="inductance", null=0.0, low=1e-7)
     assert _is_nothing([(FoundValue(value=3e-3, low=low, high=9e-3, unit="H"), inductance)]) is nothing
+
+
+class Held:
+    """Held-out traces on which the sum of squares rises so much, with that deviation."""
+
+    def __init__(self, rise: float, deviation: float = 5.0) -> None:
+        self.observation = SimpleNamespace(samples=30)
+        self.risen = rise, deviation
+
+    def rise(self, *_: Any) -> tuple[float, float]:
+        return self.risen
+
+
+@pytest.mark.parametrize(
+    ("evidence", "rise", "refused"),
+    [
+        (60.0, 9.0, False),
+        (60.0, 11.0, True),
+        (12.0, 4.0, False),
+        (12.0, 6.0, True),
+        (7.0, -2.0, False),
+        (7.0, 6.0, True),
+    ],
+)
+def test_held_out_traces_refuse_what_makes_them_worse(evidence: float, rise: float, refused: bool) -> None:
+    """By two deviations, or by one where no more than that was significant; never what makes them better."""
+    fields = dict.fromkeys(Case.__dataclass_fields__)
+    fields |= {
+        "held": Held(rise),
+        "observation": SimpleNamespace(samples=100),
+        "thresholds": Thresholds(significant=10.0),
+    }
+    case = Case(**cast(Any, fields))
+    found = SimpleNamespace(evidence=evidence, judged=SimpleNamespace(point=20.0))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Case, "_square", lambda _self, point: point)  # a fall of 5: half a third of it counts for nothing
+        assert (case.refused(cast(Any, found), cast(Any, 25.0), ((), ()), ()) is not None) == refused

@@ -7,8 +7,14 @@ import pytest
 
 from daq.contracts.errors import SpecError
 from model.discrepancy.phases import CREEP, HOLD, RAMP_START, REVERSAL, STEADY_RAMP, directions, phases_of
-from model.discrepancy.where import located
-from model.discrepancy.where_statistics import binned, chance_significance, correlation_of, significance_of_squares
+from model.discrepancy.where import _beyond, located
+from model.discrepancy.where_statistics import (
+    Correlation,
+    binned,
+    chance_significance,
+    correlation_of,
+    significance_of_squares,
+)
 from model.fitting.records import Record, noise_floor, records_of
 from model.machine_model.model import Model
 from tests.model.discrepancy.motions import PERIOD, every_phase
@@ -151,3 +157,11 @@ def test_residuals_of_other_records_are_refused(arm: Model, records: tuple[Recor
         located(arm, records, [np.zeros((5, 3))], np.ones(3))
     with pytest.raises(SpecError, match="must be positive"):
         located(arm, records, [np.zeros_like(records[0].measured)], np.zeros(3))
+
+
+def test_a_short_window_is_judged_by_its_own_length() -> None:
+    """Half as many samples reach the same mean square by chance far more often."""
+    windows, white = [slice(0, 15), slice(15, 23)], Correlation(1.0, np.append(1.0, np.zeros(100)))
+    long, short = _beyond(windows, np.array([4.0, 4.0]), white)
+    assert long == pytest.approx(significance_of_squares(np.array([4.0]), 15, white)[0])
+    assert short < long - 1.0
