@@ -90,7 +90,7 @@ class Case:
         rise, deviation = self.held.rise(*held)
         share = self.held.observation.samples / self.observation.samples
         fall = self._square(current) - self._square(found.judged.point)
-        by_chance = max(lines.worse * deviation, lines.lost * fall * share)
+        by_chance = max(lines.worse * deviation, lines.lost * fall * share, lines.significant)
         if rise > min(by_chance, max(deviation, found.evidence - lines.significant)):
             return (
                 f"the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} variances "

@@ -22,11 +22,11 @@ class Thresholds:
             tells the same then.
         least_share: share of a joint's excess that effects must explain, or they only resemble what is missing.
         worse: rise of the held-out sum of squares, in its own standard deviations, at which a step is rejected, unless
-            it is less than the share `lost` of what as many samples have brought on the fitted traces: the tolerance
-            parameters, none of them known for sure, have moved too. It is also rejected where a rise by more than its
-            deviation takes the evidence below what is significant. grown: growth of what is beyond the noise floor of
-            the held-out traces, on the effect's own joints, at which it is rejected as well; stuck joints let go by
-            chance, so not at once.
+            it is less than what is significant, or than the share `lost` of what as many samples have brought on the
+            fitted traces: the tolerance parameters, none of them known for sure, have moved too. It is also rejected
+            where a rise by more than its deviation takes the evidence below what is significant. grown: growth of what
+            is beyond the noise floor of the held-out traces, on the effect's own joints, at which it is rejected as
+            well; stuck joints let go by chance, so not at once.
         close: evidence within which rivals are fitted to their ends before they are compared.
         interesting: gain of a probe below which no candidate is worth a fit.
     """

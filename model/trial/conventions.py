@@ -56,7 +56,6 @@ TRANSLATIONS: dict[str, Translation] = {
     "coulomb_friction": _same(torque="torque"),
     "load_dependent_friction": _load_dependent,
     "stribeck_friction": _same(torque="torque", speed="speed"),
-    # In one direction only there, about a mean here: half of it is Coulomb friction, which other parameters take up.
     "direction_dependent_friction": _same(difference="torque"),
     "back_emf_error": _factor,
     "motor_inductance": _same(inductance="inductance"),

@@ -98,7 +98,7 @@ def test_a_bound_that_keeps_an_estimate_from_nothing_does_not_make_it_something(
 class Held:
     """Held-out traces on which the sum of squares rises so much, with that deviation."""
 
-    def __init__(self, rise: float, deviation: float = 5.0) -> None:
+    def __init__(self, rise: float, deviation: float) -> None:
         self.observation = SimpleNamespace(samples=30)
         self.risen = rise, deviation
 
@@ -107,21 +107,26 @@ class Held:
 
 
 @pytest.mark.parametrize(
-    ("evidence", "rise", "refused"),
+    ("evidence", "rise", "deviation", "refused"),
     [
-        (60.0, 9.0, False),
-        (60.0, 11.0, True),
-        (12.0, 4.0, False),
-        (12.0, 6.0, True),
-        (7.0, -2.0, False),
-        (7.0, 6.0, True),
+        (60.0, 13.0, 7.0, False),
+        (60.0, 15.0, 7.0, True),
+        (60.0, 9.0, 2.0, False),
+        (60.0, 11.0, 2.0, True),
+        (12.0, 4.0, 5.0, False),
+        (12.0, 6.0, 5.0, True),
+        (7.0, -2.0, 5.0, False),
+        (7.0, 6.0, 5.0, True),
     ],
 )
-def test_held_out_traces_refuse_what_makes_them_worse(evidence: float, rise: float, refused: bool) -> None:
-    """By two deviations, or by one where no more than that was significant; never what makes them better."""
+def test_held_out_traces_refuse_what_makes_them_worse(
+    evidence: float, rise: float, deviation: float, refused: bool
+) -> None:
+    """By two deviations and what is significant, or by one where little more than that was; never what makes them
+    better."""
     fields = dict.fromkeys(Case.__dataclass_fields__)
     fields |= {
-        "held": Held(rise),
+        "held": Held(rise, deviation),
         "observation": SimpleNamespace(samples=100),
         "thresholds": Thresholds(significant=10.0),
     }
