@@ -9,6 +9,7 @@ from hypothesis import settings
 
 from tests.left_running import Running, mark_this_process
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `daq` does, before numpy is loaded: two workers, two cores
 ROOT = Path(__file__).parent.parent
 SKIPS_ARE_ERRORS = os.environ.get("CI", "").lower() in ("1", "true")
 # The same examples in every run, and no test that fails because the machine was busy.
