@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from model.discrepancy.candidates import SMALL, Candidate
 from model.discrepancy.observation import Observation, step_of_derivatives
 from model.discrepancy.search import Point
+from model.discrepancy.side_by_side import side_by_side
 
 Floats = NDArray[np.float64]
 
@@ -80,12 +81,12 @@ def probed(observation: Observation, point: Point, candidates: Sequence[Candidat
     step = step_of_derivatives(point.model)
     coarse = observation.shown(point.model, point.unknowns, point.values, step)
     fine = [r.measured - e for r, e in zip(observation.records, point.residuals, strict=True)]
-    found = []
-    for candidate in candidates:
+
+    def best(candidate: Candidate) -> Probed | None:
         reference = coarse if step_of_derivatives(candidate.model) == step else fine
-        best = _best_trial(observation, point, clear, reference, candidate)
-        if best is not None:
-            found.append(best)
+        return _best_trial(observation, point, clear, reference, candidate)
+
+    found = [p for p in side_by_side(best, candidates) if p is not None]
     return sorted(found, key=lambda p: -p.gain)
 
 
