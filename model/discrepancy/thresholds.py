@@ -38,7 +38,7 @@ class Thresholds:
     margin: float = 4.0
     unexplained: float = 0.3
     unnamed: float = 0.12
-    place: float = 0.005
+    place: float = 0.001
     least_share: float = 0.8
     worse: float = 2.0
     lost: float = 0.5
