@@ -33,6 +33,7 @@ from scipy.ndimage import binary_erosion
 from scipy.signal import find_peaks, lombscargle, savgol_filter
 
 from benchmarks.figures import Figure, show
+from daq.contracts.errors import TraceError
 from daq.contracts.machine import BoardPid
 from daq.contracts.trace import Trace
 from daq.traces.reader import read_trace
@@ -343,7 +344,7 @@ class Scored:
 
 
 def _scored(folder: Path) -> list[Scored]:
-    """Cases of a folder that `daq blind` has written. Raises OSError, KeyError for any other."""
+    """Cases of a folder that `daq blind` has scored. Raises OSError for any other."""
     recorded = {row["seed"]: row for row in _rows(folder / "record.jsonl")}
     return [
         Scored(
@@ -366,8 +367,14 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--trial", type=Path, help="folder of a trial that daq blind has run")
     parser.add_argument("--quick", action="store_true", help="every fifth case")
     options = parser.parse_args(arguments)
+    if options.trial is not None and not (options.trial / "score.jsonl").is_file():
+        parser.error(f"--trial {options.trial}: no score.jsonl there; a folder that `daq blind` has scored is needed")
     for path in options.traces:
-        print(path, *(_spoken(p) for p in _ranked(path)[:5]), sep="\n  ")
+        try:
+            ranked = _ranked(path)
+        except TraceError as error:
+            parser.error(str(error))
+        print(path, *(_spoken(p) for p in ranked[:5]), sep="\n  ")
     return 0 if options.trial is None else _beside_the_diagnosis(_scored(options.trial)[:: 5 if options.quick else 1])
 
 
