@@ -14,6 +14,8 @@ WORKERS ?= -n 2 --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
+# Also with -j: `lint` and `page` both install the page's packages, into the same folder.
+.NOTPARALLEL:
 .PHONY: help serve demo page test test-all lint format types requirements bench clean distclean
 
 help: ## list these commands
@@ -61,7 +63,7 @@ format: $(FOR_DEVELOPMENT) ## format the sources and mend what ruff can mend
 types: $(FOR_DEVELOPMENT) ## make the page's types of the API anew, after a change of the API
 	@$(BIN)/python hatch_build.py types format
 
-bench: $(FOR_DEVELOPMENT) ## measure the figures of docs/benchmarks.md, shorter than there
+bench: $(FOR_DEVELOPMENT) ## measure the figures about recording of docs/benchmarks.md, shorter than there
 	@$(BIN)/python -m benchmarks main-job --quick
 
 clean: ## remove caches and what was built

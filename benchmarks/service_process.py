@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import random
 import signal
 import subprocess
@@ -14,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+
+from benchmarks.own_desk import environment_of
 
 ROBOT = "ma2000"
 ANSWER_WITHIN = 100.0
@@ -66,13 +67,11 @@ class RunningService:
 
 def serving(folder: Path, port: str, *options: str) -> subprocess.Popen[bytes]:
     """The process of `daq serve`, which may not answer yet; it keeps everything in `folder`, its log too."""
-    environment = {key: value for key, value in os.environ.items() if not key.startswith("DAQ_")}
-    environment |= {"DAQ_RUNTIME_FOLDER": str(folder / "run"), "XDG_CONFIG_HOME": str(folder / "configuration")}
     with (folder / "service.log").open("ab") as log:
         return subprocess.Popen(
             [*COMMAND, "--port", port, "serve", "--port", "0", *options],
             cwd=folder,
-            env=environment,
+            env=environment_of(folder),
             stdout=subprocess.PIPE,
             stderr=log,
         )

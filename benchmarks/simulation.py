@@ -3,8 +3,10 @@
     python -m benchmarks.simulation [--cold]
 
 One run is 2 s of the ramp step (21.6° in 0.65 s), joints 1-3, control every 20 ms, RK4 in steps of at most 1 ms. The C
-version has the same algorithm and the same effects compiled in, all of them off, as the base model has; both are
-checked to agree. Times are the best of many, on whatever machine this runs; nothing is asserted about them. Needs gcc.
+version has the same algorithm and the same effects compiled in: on are the viscous friction and the friction that goes
+with the load, for which the machine file has numbers, and all others are off; both are checked to agree. MuJoCo gets
+the same viscous friction and a Coulomb friction of its own. Times are the best of equally many, taken in turn, on
+whatever machine this runs. Needs gcc.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.figures import Figure, at_least, at_most, show
 from daq.contracts.machine import load_machine
 from model.dynamics.rod_arm import RodArm
 from model.machine_model import layout as at
@@ -51,36 +54,36 @@ Pointer = ctypes.POINTER(ctypes.c_double)
 
 
 def main() -> int:
-    """Print the tables."""
+    """The exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.simulation", description=__doc__)
     parser.add_argument("--cold", action="store_true", help="also time a first use with nothing compiled (a minute)")
     cold = parser.parse_args().cold
     model = base_model(load_machine("ma2000"))
     inputs = ramp_inputs(model.machine)
     prepared = prepare(model, inputs, Options())
+    figures = [*_one_run(model, inputs, prepared), *_scaling(model, prepared), *_first_use(cold)]
+    _step_sizes(model, inputs)
+    return show("The simulation", "python -m benchmarks simulation", figures)
+
+
+def _one_run(model: Model, inputs: RunInputs, prepared: Prepared) -> list[Figure]:
+    """One run beside C and MuJoCo, and its derivatives."""
     ours, c = _ours(model, prepared, 1), _c_runs(model, prepared, 1)
     _check_agreement(ours, c)
-    one, rival = _best_in_turn(lambda: ours(1), lambda: c(1))
+    one, rival, plant = _best_in_turn(lambda: ours(1), lambda: c(1), _mujoco_run(inputs))
     jacobian = _best(lambda: sensitivities(model, inputs, JACOBIAN), REPEATS)
     one_dual = _best(lambda: sensitivities(model, inputs, JACOBIAN[:1]), REPEATS)
-    plant = _best(_mujoco_run(inputs), 5)
-    _row("one closed-loop run, numba", one, "")
-    _row("the same in C, -O3 -march=native", rival, f"ours is {one / rival:.2f} × C (reach ≤ 1.3)")
-    _row("MuJoCo, driven from Python each control tick", plant, f"{plant / one:.1f} × ours (reach ≥ 10)")
-    _row("one parameter's sensitivity (dual numbers)", one_dual, f"{one_dual / one:.2f} runs")
-    _row(
-        "exact Jacobian, 13 parameters",
-        jacobian,
-        f"{jacobian / one:.1f} runs on {available_cores()} cores (reach ≤ 40)",
-    )
-    _scaling(model, prepared)
-    _step_sizes(model, inputs)
-    _first_use(cold)
-    return 0
+    cores = available_cores()
+    return [
+        at_most("one closed-loop run, numba", one / rival, 1.3, "× C", f"{_ms(one)}; C -O3 -march=native {_ms(rival)}"),
+        at_least("MuJoCo, driven from Python each control tick", plant / one, 10.0, "× ours", _ms(plant)),
+        Figure("one parameter's sensitivity (dual numbers)", f"{one_dual / one:.2f} runs", beside=_ms(one_dual)),
+        at_most("exact Jacobian, 13 parameters", jacobian / one, 40.0, "runs", f"{_ms(jacobian)} on {cores} cores"),
+    ]
 
 
-def _row(what: str, seconds: float, remark: str) -> None:
-    sys.stdout.write(f"{what:48s} {seconds * 1e3:9.3f} ms   {remark}\n")
+def _ms(seconds: float) -> str:
+    return f"{seconds * 1e3:.3f} ms"
 
 
 def _best(run: Callable[[], Any], repeats: int) -> float:
@@ -93,10 +96,10 @@ def _best(run: Callable[[], Any], repeats: int) -> float:
     return min(times)
 
 
-def _best_in_turn(one: Callable[[], Any], other: Callable[[], Any]) -> tuple[float, float]:
-    """Best times of two that take turns, so that both meet the same load of the machine."""
-    pairs = [(_best(one, 3), _best(other, 3)) for _ in range(REPEATS)]
-    return min(p[0] for p in pairs), min(p[1] for p in pairs)
+def _best_in_turn(*runs: Callable[[], Any]) -> list[float]:
+    """Best times of several that take turns, so that all meet the same load of the machine."""
+    turns = [[_best(run, 3) for run in runs] for _ in range(REPEATS)]
+    return [min(times) for times in zip(*turns, strict=True)]
 
 
 def _spread(model: Model, count: int) -> NDArray[np.float64]:
@@ -229,18 +232,21 @@ def _mujoco_run(inputs: RunInputs) -> Callable[[], NDArray[np.float64]]:
     return run
 
 
-def _scaling(model: Model, prepared: Prepared) -> None:
+def _scaling(model: Model, prepared: Prepared) -> list[Figure]:
+    """Many runs on every core."""
     ours, c = _ours(model, prepared, BATCH), _c_runs(model, prepared, BATCH)
     cores = available_cores()
-    times = {
-        name: [min(_best(lambda r=run, n=n: r(n), 1) for _ in range(4)) for n in (1, cores)]
-        for name, run in (("numba", ours), ("C", c))
-    }
-    for name, (single, several) in times.items():
-        remark = f"{single / several:.2f} × on {cores} cores, {several / BATCH * 1e6:.0f} µs a run"
-        _row(f"{BATCH} runs with different parameters, {name}", several, remark)
+    ways = [(name, run, n) for n in (1, cores) for name, run in (("numba", ours), ("C", c))]
+    turns = [[_best(lambda r=run, n=n: r(n), 1) for _, run, n in ways] for _ in range(4)]
+    best = {(name, n): min(taken) for (name, _, n), taken in zip(ways, zip(*turns, strict=True), strict=True)}
+    times = {name: (best[name, 1], best[name, cores]) for name in ("numba", "C")}
+    told = [
+        f"{name} {single / several:.2f} × on {cores} cores, {several / BATCH * 1e6:.0f} µs a run"
+        for name, (single, several) in times.items()
+    ]
     share = (times["numba"][0] / times["numba"][1]) / (times["C"][0] / times["C"][1])
-    sys.stdout.write(f"  scaling of ours against that of C: {share:.0%} (reach ≥ 90 %)\n")
+    name = f"{BATCH} runs with different parameters, scaling beside that of C"
+    return [at_least(name, 100 * share, 90.0, "%", "; ".join(told))]
 
 
 def _step_sizes(model: Model, inputs: RunInputs) -> None:
@@ -257,9 +263,9 @@ def _step_sizes(model: Model, inputs: RunInputs) -> None:
 
 
 _FIRST_USE = """
+import sys
 import time
 start = time.perf_counter()
-from benchmarks.simulation import JACOBIAN
 from tests.model.simulation.records import ramp_inputs
 from daq.contracts.machine import load_machine
 from model.machine_model.model import base_model
@@ -269,18 +275,19 @@ inputs = ramp_inputs(model.machine)
 loaded = time.perf_counter()
 simulate(model, inputs)
 once = time.perf_counter()
-sensitivities(model, inputs, JACOBIAN)
+sensitivities(model, inputs, tuple(sys.argv[1:]))
 print(f"{loaded - start:.2f} {once - loaded:.2f} {time.perf_counter() - once:.2f}")
 """
 
 
-def _first_use(cold: bool) -> None:
+def _first_use(cold: bool) -> list[Figure]:
     """A new process: import, first simulation, first sensitivities, with the compiled cache cold and warm."""
+    figures = []
     with tempfile.TemporaryDirectory() as folder:
         for state in ("cold", "warm") if cold else ("warm",):
             environment = {**os.environ, **({"NUMBA_CACHE_DIR": folder} if cold else {})}
             done = subprocess.run(
-                [sys.executable, "-c", _FIRST_USE],
+                [sys.executable, "-c", _FIRST_USE, *JACOBIAN],
                 env=environment,
                 capture_output=True,
                 text=True,
@@ -288,11 +295,13 @@ def _first_use(cold: bool) -> None:
                 cwd=FOLDER.parent,
             )
             loaded, once, dual = (float(x) for x in done.stdout.split()[-3:])
-            reach = 20 if state == "cold" else 1
-            sys.stdout.write(
-                f"first use, cache {state}: import {loaded:.2f} s (with the benchmark's own), "
-                f"first simulation {once:.2f} s, first sensitivities {dual:.2f} s (≤ {reach} s)\n"
-            )
+            if state == "cold":
+                figures.append(at_most("first simulation, nothing compiled", once, 20.0, "s"))
+                figures.append(at_most("first sensitivities, nothing compiled", dual, 20.0, "s"))
+            else:
+                told = f"import {loaded:.2f} s, first simulation {once:.2f} s, first sensitivities {dual:.2f} s"
+                figures.append(at_most("first use, machine code on disk", loaded + once + dual, 1.0, "s", told))
+    return figures
 
 
 if __name__ == "__main__":

@@ -5,8 +5,9 @@
 A host process samples three joints of a mock at 115200 baud through a pseudo-terminal, sends set points in every
 period, and listens on the socket of `daq stop`, all with the code of a real run. Stops come at random moments:
 from another thread of the host; from another process through that socket, as `daq stop` does once Python has started;
-and by the command itself, counted from its start. First on a clean line, then with one frame in a hundred damaged or
-lost, both ways. The moments are the mock's own record: board time, and the reading of the system's monotonic clock
+and by the command itself, counted from its start, in a folder and an environment of its own, since it would freeze a
+configured robot, too. First on a clean line, then with one frame in a hundred damaged or lost, both ways. The moments
+are the mock's own record: board time, and the reading of the system's monotonic clock
 (which all processes share) at its zero.
 """
 
@@ -29,6 +30,7 @@ from pathlib import Path
 
 from benchmarks.figures import Figure, at_most, quantile, show
 from benchmarks.mock_control import MockControl
+from benchmarks.own_desk import environment_of
 from daq.acquisition.guardian import Guardian
 from daq.acquisition.stop_socket import FOLDER_VARIABLE, StopAnswer, request_stop, stop_listener
 from daq.driver import Controller
@@ -96,14 +98,14 @@ def _stop_later(controller: Controller, after_s: float, asked: list[tuple[float,
     asked.append((at, controller.stop().acknowledged))
 
 
-def _by_thread(host: Connection, after_s: float) -> tuple[float, bool]:
+def _by_thread(host: Connection, after_s: float, _desk: Path) -> tuple[float, bool]:
     host.send(after_s)
     host.recv()
     ((at, confirmed),) = host.recv()
     return at, confirmed
 
 
-def _by_socket(host: Connection, after_s: float) -> tuple[float, bool]:
+def _by_socket(host: Connection, after_s: float, _desk: Path) -> tuple[float, bool]:
     host.send("run")
     host.recv()
     time.sleep(after_s)
@@ -113,15 +115,21 @@ def _by_socket(host: Connection, after_s: float) -> tuple[float, bool]:
     return at, len(attempts) == 1 and attempts[0].answer is not None and attempts[0].answer.confirmed
 
 
-def _by_command(host: Connection, after_s: float) -> tuple[float, bool]:
+def _by_command(host: Connection, after_s: float, desk: Path) -> tuple[float, bool]:
     host.send("run")
     host.recv()
     time.sleep(after_s)
     at = time.monotonic()
-    command = [str(Path(sys.executable).with_name("daq")), "stop"]
-    confirmed = subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0
+    code = stop_command(desk)
     host.recv()
-    return at, confirmed
+    return at, code == 0
+
+
+def stop_command(desk: Path) -> int:
+    """The exit code of `daq stop` at a desk of its own, where it finds the robots of this benchmark and no other."""
+    command = [str(Path(sys.executable).with_name("daq")), "stop"]
+    environment = environment_of(desk)
+    return subprocess.run(command, stdout=subprocess.DEVNULL, check=False, cwd=desk, env=environment).returncode
 
 
 def record_of_stop(control: MockControl, number: int) -> tuple[float, float]:
@@ -136,10 +144,10 @@ def record_of_stop(control: MockControl, number: int) -> tuple[float, float]:
     raise RuntimeError(f"stop {number} never had an effect: the mock recorded {stop}")
 
 
-def measure(url: str, repeats: int) -> tuple[dict[str, Stops], int, dict[str, int]]:
-    """Stops by thread and by socket; repetitions the host needed; lateness of the mock."""
+def measure(url: str, repeats: int, desk: Path) -> tuple[dict[str, Stops], int, dict[str, int]]:
+    """Stops by thread, socket and command (its folder: `desk`); repetitions the host needed; lateness of the mock."""
     dice = random.Random(1991)
-    ways: list[tuple[str, Callable[[Connection, float], tuple[float, bool]], int]] = [
+    ways: list[tuple[str, Callable[[Connection, float, Path], tuple[float, bool]], int]] = [
         ("by a thread", _by_thread, repeats),
         ("by `daq stop`'s socket", _by_socket, repeats),
         (WITH_START, _by_command, max(3, repeats // 10)),
@@ -154,7 +162,7 @@ def measure(url: str, repeats: int) -> tuple[dict[str, Stops], int, dict[str, in
         for where, way, times in ways:
             stops = results[where]
             for _ in range(times):
-                at, confirmed = way(host, dice.uniform(3 * PERIOD_S, 4 * PERIOD_S))
+                at, confirmed = way(host, dice.uniform(3 * PERIOD_S, 4 * PERIOD_S), desk)
                 number += 1
                 frozen, used = record_of_stop(control, number)
                 stops.frozen.append(1e3 * (frozen - at))
@@ -197,9 +205,10 @@ def main() -> int:
     repeats = 30 if given.quick else given.repeats
     figures = []
     with tempfile.TemporaryDirectory() as folder:
-        os.environ[FOLDER_VARIABLE] = folder
+        desk = Path(folder)
+        os.environ[FOLDER_VARIABLE] = environment_of(desk)[FOLDER_VARIABLE]
         for line, url in (("clean", URL), ("1 % damaged", URL + FAULTS)):
-            figures += figures_of(line, *measure(url, repeats))
+            figures += figures_of(line, *measure(url, repeats, desk))
     return show("Stop, at 115200 baud", "python -m benchmarks stop_latency", figures)
 
 

@@ -37,6 +37,7 @@ BATCH = 20_000
 POOL = 400
 """Frames of each length to choose from."""
 CONFIDENCE = 0.95
+WITHIN = "within the bound"
 
 Bytes = NDArray[np.uint8]
 Damage = Callable[[np.random.Generator, Bytes, Bytes], Bytes]
@@ -250,22 +251,33 @@ def measure(damage: Damage, frames_to_damage: int, seed: int) -> Rate:
 
 
 def main() -> int:
-    """Prints one line a kind of damage, and the sum beside the bound."""
+    """Prints a line a kind of damage and their sum beside the bound; 1 unless they are within it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--frames", type=int, default=4_000_000, help="damaged frames of each kind (default 4000000)")
     parser.add_argument("--seed", type=int, default=1, help="of the random damage (default 1)")
     options = parser.parse_args()
     print(f"{'kind of damage':30} {'damaged':>10} {'undetected':>10} {'rate':>9}   {CONFIDENCE:.0%} interval")
-    total = Rate(0, 0)
+    rates = {}
     for name, damage in DAMAGE.items():
-        rate = measure(damage, options.frames, options.seed)
-        total += rate
-        print_line(name, rate)
-    print_line("all", total)
+        rates[name] = measure(damage, options.frames, options.seed)
+        print_line(name, rates[name])
+    print_line("all", sum(rates.values(), Rate(0, 0)))
     print(f"{'bound, 2⁻¹⁶':30} {'':21} {BOUND:9.2e}")
-    within = total.interval[0] <= BOUND
-    print("within the bound" if within else "ABOVE THE BOUND")
-    return 0 if within else 1
+    told = verdict(rates)
+    print(told)
+    return 0 if told == WITHIN else 1
+
+
+def verdict(rates: dict[str, Rate]) -> str:
+    """`WITHIN` when the whole interval of all damage together lies within the bound, and no kind's lies above it.
+
+    A kind by itself may be as bad as the check is, a splice of equal length for one: its interval then holds the bound.
+    """
+    if above := [name for name, rate in rates.items() if rate.interval[0] > BOUND]:
+        return f"ABOVE THE BOUND: {', '.join(above)}"
+    if sum(rates.values(), Rate(0, 0)).interval[1] > BOUND:
+        return "NOT SHOWN to be within the bound: damage more frames"
+    return WITHIN
 
 
 def print_line(name: str, rate: Rate) -> None:

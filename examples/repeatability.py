@@ -33,6 +33,8 @@ def main() -> None:
     options.add_argument("--runs", type=int, default=5)
     options.add_argument("--folder", type=Path, default=Path("traces"))
     chosen = options.parse_args()
+    if chosen.runs < 2:
+        options.error(f"--runs {chosen.runs}: the spread of runs needs at least 2")
     chosen.folder.mkdir(parents=True, exist_ok=True)
     spec = ExperimentSpec(trajectory=Ramp(amplitude=0.15, duration=0.4), joints=(1, 2, 3), hold=0.5, name="repeat")
     with Client(chosen.url, os.environ.get("DAQ_TOKEN")) as client:
@@ -40,7 +42,7 @@ def main() -> None:
         found = [run_once(robot, spec, chosen.folder) for _ in range(chosen.runs)]
     for joint in sorted(set.intersection(*(set(one) for one in found))):
         values = [one[joint] for one in found]
-        print(f"joint {joint}: overshoot {statistics.mean(values):.2f}° ± {statistics.pstdev(values):.3f}°")
+        print(f"joint {joint}: overshoot {statistics.mean(values):.2f}° ± {statistics.stdev(values):.3f}°")
 
 
 if __name__ == "__main__":

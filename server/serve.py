@@ -19,6 +19,7 @@ from server.access.origin import is_loopback
 from server.access.stop_gate import StopGate
 from server.access.tokens import KnownTokens
 from server.app import make_app
+from server.connections import Connection
 from server.listening import listening
 from server.services import Services
 from server.steady import keep_steady
@@ -52,6 +53,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
             lifespan="on",
             timeout_graceful_shutdown=GRACE,
             timeout_keep_alive=KEEP_ALIVE,
+            http=Connection,
             ws="websockets-sansio",
             ws_per_message_deflate=False,
             ws_max_size=65536,
@@ -75,13 +77,16 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
 
 
 def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
-    """Raises SpecError where others than this computer's users would get in without a token."""
-    local = is_loopback(section.host)
+    """Raises SpecError where tokens are needed and there is none."""
+    loopback = is_loopback(section.host)
+    local = loopback and section.tokens != "always"
     if not local and all(token.revoked is not None for token in services.tokens.all()):
-        raise SpecError(
-            f"server.host {section.host}: others than this computer's users could reach the robot, and there is no "
-            "token: make one with `daq token add NAME --role operator`, or listen at 127.0.0.1"
-        )
+        why, instead = 'server.tokens is "always"', 'say "remote"'
+        if not loopback:
+            why = f"server.host {section.host}: others than this computer's users could reach the robot"
+            instead = "listen at 127.0.0.1"
+        make = "make one with `daq token add NAME --role operator`"
+        raise SpecError(f"{why}, and there is no token: {make}, or {instead}")
     known = KnownTokens(services.tokens, services.clock)
     names = tuple(name.lower() for name in section.names)
     return Gate(known, services.tickets, local, names, stop_port, services.metrics.request)

@@ -8,10 +8,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from sqlalchemy.exc import SQLAlchemyError
+
 from daq.acquisition.messages import EventHappened, Progress
 from daq.config import Settings
 from daq.config.robot_files import load_memory_map
 from daq.contracts.errors import DaqError
+from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.live import EventMessage, JobMessage
 from daq.trajectories import control_period
 from server.access.tickets import Tickets
@@ -25,7 +28,8 @@ from server.live.hub import Hub
 from server.metrics import Metrics
 from server.owner.messages import Answer, ArmReport, Opened, Report
 from server.problems import ProblemError, conflict, not_found
-from server.queue.desk import QueueDesk, QueueParts
+from server.queue.desk import QueueDesk
+from server.queue.parts import QueueParts
 from server.robot.control import ControlDesk
 from server.robot.keeper import Keeper
 from server.robot.robot import Robot, RobotPlace
@@ -163,7 +167,9 @@ class Services:
         def heard(report: Report) -> None:
             if isinstance(report, Progress):
                 queue.progressed(report.fraction, report.text)
-            elif isinstance(report, ArmReport | Opened | EventHappened):
+            elif isinstance(report, ArmReport):
+                queue.hear(report)
+            elif isinstance(report, Opened | EventHappened):
                 queue.wake()
 
         robot.listeners.append(heard)
@@ -196,12 +202,20 @@ class Services:
     def tell(
         self, robot: str, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None
     ) -> None:
-        """Something that happened: into the log, the database, and to whoever listens."""
+        """Something that happened: into the log, the database, and to whoever listens.
+
+        Raises nothing where the database fails: what has happened has happened, and whoever asked for it is told so.
+        """
         log.info("%s: %s: %s", robot, kind, text, extra={"actor": actor, "experiment": experiment})
-        event = self.events.add(robot, kind, text, self.clock.utc(), actor, experiment)
+        event: ServiceEvent | None = None
+        try:
+            event = self.events.add(robot, kind, text, self.clock.utc(), actor, experiment)
+        except Exception:  # without its row it has no number, by which pages tell events apart: the log alone has it
+            log.exception("%s: %s: could not be written", robot, kind)
         one = self._robots.get(robot)
         if one is not None:
-            one.hub.publish("events", EventMessage(event=event))
+            if event is not None:
+                one.hub.publish("events", EventMessage(event=event))
             one.hub.look()
 
     def tell_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:
@@ -218,5 +232,5 @@ class Services:
     def _take_in(self, catalogue: Catalogue) -> None:
         try:
             catalogue.bring_up_to_date()
-        except (DaqError, ProblemError, OSError) as error:
+        except (DaqError, ProblemError, OSError, SQLAlchemyError) as error:
             log.warning("catalogue: %s", error)

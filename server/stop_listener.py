@@ -10,7 +10,9 @@ import logging
 import re
 import socket
 import threading
+import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
@@ -22,7 +24,7 @@ from server.problems import MEDIA_TYPE, ProblemError, details_of, not_found
 
 ADDRESS = re.compile(r"/api/v1/robots/([a-z0-9][a-z0-9_-]{0,31})/stop")
 READ_WITHIN = 2.0
-"""s that a client may be silent."""
+"""s in which a client must have asked: nobody keeps a place by sending now and then."""
 MOST_AT_ONCE = 32
 """Connections; one more is closed at once, and the service's own door is still there."""
 LONGEST_BODY = 4096
@@ -56,11 +58,14 @@ class _Server(ThreadingHTTPServer):
         self.socket.close()
         self.socket = listener
         self._room = threading.BoundedSemaphore(MOST_AT_ONCE)
+        self._since: dict[socket.socket, float] = {}
+        """When each connection was made (s, monotonic). Entries are made and taken away by one operation each."""
         self.server_activate()
 
     def process_request(self, request: Any, client_address: Any) -> None:
         """On a thread of its own, as long as there are not too many."""
         if self._room.acquire(blocking=False):
+            self._since[request] = time.monotonic()
             super().process_request(request, client_address)
         else:
             self.shutdown_request(request)
@@ -70,7 +75,16 @@ class _Server(ThreadingHTTPServer):
         try:
             super().process_request_thread(request, client_address)
         finally:
+            self._since.pop(request, None)
             self._room.release()
+
+    def service_actions(self) -> None:
+        """Twice a second: whoever has not asked in time has asked for nothing. An answer under way is still sent."""
+        latest = time.monotonic() - READ_WITHIN
+        for request, begun in self._since.copy().items():
+            if begun < latest:
+                with suppress(OSError):  # closed by now
+                    request.shutdown(socket.SHUT_RD)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A client that goes away is no fault; anything else is in the log."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
+
+from daq.cli.context import print_table
+from model.reports.units import shown_unit, with_unit
 
 if TYPE_CHECKING:
     from model.comparison.agreement import JointAgreement, ModelAgreement
@@ -12,7 +14,6 @@ if TYPE_CHECKING:
 
 def print_agreement(models: Sequence[ModelAgreement]) -> None:
     """Root mean square and largest residual by model, kind of trace and joint, beside the noise floor."""
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(box=None, header_style="bold", title_justify="left")
@@ -25,7 +26,7 @@ def print_agreement(models: Sequence[ModelAgreement]) -> None:
         for kind, joints in (("in sample", model.in_sample), ("held out", model.held_out)):
             for one in joints or ():
                 table.add_row(model.label, kind if fitted else "all", *_figures(one))
-    Console(highlight=False, width=120).print(table)
+    print_table(table, 120)
 
 
 def agreement_data(models: Sequence[ModelAgreement]) -> list[dict[str, Any]]:
@@ -34,17 +35,10 @@ def agreement_data(models: Sequence[ModelAgreement]) -> list[dict[str, Any]]:
 
 
 def _figures(one: JointAgreement) -> tuple[str, ...]:
-    factor, unit = shown(one.unit)
+    factor, unit = shown_unit(one.unit)
+    rmse, largest, least = (with_unit(f"{v * factor:.4f}", unit) for v in (one.rmse, one.largest, one.floor))
     counts, floor = one.counts, one.floor_counts
     return (
-        str(one.joint), f"{one.rmse * factor:.4f}{unit}", "–" if counts is None else f"{counts:.2f}",
-        f"{one.largest * factor:.4f}{unit}", f"{one.floor * factor:.4f}{unit}",
+        str(one.joint), rmse, "–" if counts is None else f"{counts:.2f}", largest, least,
         "–" if floor is None else f"{floor:.2f}",
     )  # fmt: skip
-
-
-def shown(unit: str) -> tuple[float, str]:
-    """Factor and name of the unit in which people read."""
-    return {"rad": (math.degrees(1.0), "°"), "m": (1e3, " mm"), "rad/s": (math.degrees(1.0), "°/s")}.get(
-        unit, (1.0, f" {unit}")
-    )

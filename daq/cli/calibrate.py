@@ -30,19 +30,21 @@ def gain(
 ) -> None:
     """Find the actual proportional gain from errors and powers at several postures, as the source did (section 6.5)."""
     from daq.calibration import gain_experiment, gains_from_trace
-    from daq.cli.run_result import acquire
+    from daq.cli.run_result import acquire_whole
     from daq.contracts.experiment import parse_joints
     from daq.traces.reader import read_trace
 
     call = invocation(context)
     wanted = parse_joints(joints)
-    machine = call.machine
     place = folder or call.trace_folder
     if trace is None:
-        path = acquire(call, gain_experiment(wanted), machine, place, yes).trace
+        path = acquire_whole(call, gain_experiment(wanted), call.machine, place, yes).trace
     else:
         path = call.find_trace(place, trace)
-    found = [one for one in gains_from_trace(read_trace(path), machine) if one.joint in wanted]
+    measured = read_trace(path)
+    # counts and radians of a trace belong to the calibration that it was made with, whatever is configured by now
+    machine = measured.record.machine or call.machine
+    found = [one for one in gains_from_trace(measured, machine) if one.joint in wanted]
     if json:
         print_json({"trace": path, "gains": [one.as_data() for one in found]})
         return

@@ -50,13 +50,16 @@ def options(
     ] = None,
 ) -> None:
     """Options that go before the subcommand."""
+    by_default = getattr(context.get_parameter_source("server"), "name", "") == "ENVIRONMENT"
     if server is not None and port is not None:
-        raise SpecError("--port and --server: the server has the robot at its own port; give one of them")
+        if not by_default:
+            raise SpecError("--port and --server: the server has the robot at its own port; give one of them")
+        server = None
     if server is not None and context.invoked_subcommand in HERE:
-        if getattr(context.get_parameter_source("server"), "name", "") != "ENVIRONMENT":
+        if not by_default:
             raise SpecError(f"--server: `daq {context.invoked_subcommand}` has nothing to do with a server's robot")
         server = None
-    context.obj = Invocation(config_file=config_file, port_option=port, server=server)
+    context.obj = Invocation(config_file=config_file, port_option=port, server=server, server_by_default=by_default)
 
 
 def main() -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq.cli.context import JsonOption, console, invocation, print_json
+from daq.cli.context import JsonOption, console, invocation, print_json, print_table
 from daq.cli.model_input import (
     MODEL_HELP,
     EffectFileOption,
@@ -89,6 +89,7 @@ def _held_out(models: Sequence[Model], traces: Sequence[str]) -> list[str] | Non
 
 def _tell(models: Sequence[ModelAgreement], differing: Sequence[ParameterDifference], *, as_json: bool) -> None:
     from daq.cli.agreement_table import agreement_data, print_agreement
+    from model.reports.units import squared
 
     if as_json:
         print_json({
@@ -98,8 +99,9 @@ def _tell(models: Sequence[ModelAgreement], differing: Sequence[ParameterDiffere
         })  # fmt: skip
         return
     print_agreement(models)
+    unit = squared(joint.unit for model in models for trace in model.traces for joint in trace.joints)
     for label, by_kind in _errors(models).items():
-        told = ", ".join(f"{kind.replace('_', ' ')} {e:.4g} rad²" for kind, e in by_kind.items() if e is not None)
+        told = ", ".join(f"{kind.replace('_', ' ')} {e:.4g} {unit}" for kind, e in by_kind.items() if e is not None)
         print(f"{label}: mean squared error summed over the joints, {told}")
     _print_differences(differing, [model.label for model in models])
 
@@ -112,7 +114,6 @@ def _errors(models: Sequence[ModelAgreement]) -> dict[str, dict[str, float | Non
 
 
 def _print_differences(differing: Sequence[ParameterDifference], labels: Sequence[str]) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(box=None, header_style="bold")
@@ -122,4 +123,4 @@ def _print_differences(differing: Sequence[ParameterDifference], labels: Sequenc
     for d in differing:
         values = ("–" if v is None else f"{v:.5g} {d.unit}" for v in d.values)
         table.add_row(d.name, *values, "–" if d.deviations is None else f"{d.deviations:.2f}")
-    Console(highlight=False, width=120).print(table)
+    print_table(table, 120)

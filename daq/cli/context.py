@@ -13,6 +13,7 @@ import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
 
     from daq.config import Settings
     from daq.contracts.machine import Machine
@@ -23,10 +24,20 @@ YesOption = Annotated[bool, typer.Option("--yes", help="Consent to moving a real
 
 @cache
 def console() -> Console:
-    """For people: progress, questions, remarks, on standard error. Results go to standard output."""
+    """For people: progress, questions, remarks, on standard error. Results go to standard output.
+
+    Text is printed as it is: square brackets in a path or a message are no markup.
+    """
     from rich.console import Console
 
-    return Console(stderr=True, highlight=False, soft_wrap=True)
+    return Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
+
+
+def print_table(table: Table, width: int | None = None) -> None:
+    """A table of results on standard output, its text as it is."""
+    from rich.console import Console
+
+    Console(highlight=False, markup=False, width=width).print(table)
 
 
 @dataclass
@@ -37,6 +48,8 @@ class Invocation:
     port_option: str | None = None
     server: str | None = None
     """URL of a service that has the robot; None for a robot at this computer."""
+    server_by_default: bool = False
+    """Whether it is DAQ_SERVER that says so, and not the command line."""
     told: bool = field(default=False, repr=False)
 
     @cached_property

@@ -20,7 +20,7 @@ def demo(
     real_time: Annotated[bool, typer.Option("--real-time", help="In real time instead of lock-step.")] = False,
 ) -> None:
     """Start the mock controller, run the ramp step on joints 1-3, record the trace, and show what came of it."""
-    from daq.cli.run_result import acquire, print_result
+    from daq.cli.run_result import acquire_whole, print_result
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import load_machine
     from daq.traces.plot import plot_trace
@@ -31,7 +31,7 @@ def demo(
         "The mock controller stands in for the arm: 21.6° in 0.65 s on joints 1-3 (section 6.5 of the thesis)"
     )
     spec = ExperimentSpec(name="demo-ramp", notes="made by `daq demo`")
-    finished = acquire(Invocation(port_option=url), spec, load_machine("ma2000"), folder, consent=False)
+    finished = acquire_whole(Invocation(port_option=url), spec, load_machine("ma2000"), folder, consent=False)
     trace = read_trace(finished.trace)
     print_figures(trace)
     print_result(finished)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq.cli.context import JsonOption, console, print_json
+from daq.cli.context import JsonOption, console, print_json, print_table
 from daq.cli.effect_choice import patterns
 from daq.cli.model_input import MODEL_HELP, EffectFileOption, ReportOption, load_effects, read_model
 from daq.contracts.errors import SpecError
@@ -138,7 +138,6 @@ def _written(specs: tuple[ExperimentSpec, ...], folder: Path) -> list[Path]:
 
 
 def _print_gain(gain: InformationGain) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(box=None, header_style="bold")
@@ -146,5 +145,5 @@ def _print_gain(gain: InformationGain) -> None:
         table.add_column(name, justify="left" if name in ("parameter", "unit") else "right")
     for p in gain.parameters:
         table.add_row(p.name, f"{p.before:.3g}", f"{p.after:.3g}", p.unit, f"{100 * p.share:.0f} %")
-    Console(highlight=False, width=120).print(table)
+    print_table(table, 120)
     print(f"together: {gain.nats:.1f} nats of information more")

@@ -21,7 +21,9 @@ from daq.cli.model_input import (
     read_model,
     read_traces,
 )  # fmt: skip
+from daq.cli.output_file import replacing
 from daq.cli.remote.jobs import numbers_of, require_no_programs
+from daq.cli.run_result import EXIT_CODES
 from daq.contracts.carried_load import carrying
 
 if TYPE_CHECKING:
@@ -84,24 +86,33 @@ def diagnose(
 
         wanted = (numbers_of(call, traces, fitted_to), numbers_of(call, holdout or [], held))
         found = diagnose_at_server(call, begin, *wanted, options, out, report)
+        _save(found, out)
         _tell(found, out, None, as_json=json)
         return
     if acquire:
         found, fitted_to = acquired(call, begin.machine, fitted_to, folder, budget, yes, once)
     else:
         found = once(fitted_to, asker(begin.machine))
+    _save(found, out)
     page = None if report is None else _written(found, fitted_to, held, report)
     _tell(found, out, page, as_json=json)
+    if found.acquired and (outcome := found.acquired[-1].outcome) != "complete":
+        raise typer.Exit(EXIT_CODES[outcome])
+
+
+def _save(found: Diagnosis, out: Path | None) -> None:
+    """The model, where it is wanted; before anything else is made of the answer, which may fail."""
+    from model.machine_model.model_file import save_model
+
+    if out is not None:
+        with replacing(out) as part:
+            save_model(found.model_after, part)
 
 
 def _tell(found: Diagnosis, out: Path | None, page: Path | None, *, as_json: bool) -> None:
-    """The answer, the model where it is wanted, and where the page is."""
+    """The answer, and where the model and the page are."""
     from daq.cli.diagnosis_text import answer_text
 
-    if out is not None:
-        from model.machine_model.model_file import save_model
-
-        save_model(found.model_after, out)
     if as_json:
         print_json(found.model_dump(mode="json"))
     else:

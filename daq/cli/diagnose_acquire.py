@@ -27,41 +27,54 @@ def acquired(
 ) -> tuple[Diagnosis, list[Trace]]:  # fmt: skip
     """The answer after all that was asked for has been run, and the traces it rests on.
 
-    `next_to_run` says when it ends; `budget`: s of robot time. Raises what `daq run` raises, AcquisitionFailedError
-    among them.
+    `next_to_run` says when it ends; `budget`: s of robot time; `machine`: that of the model in doubt. Planned for, and
+    moved, is the configured one, within the limits that hold for it now. Raises what `daq run` raises,
+    AcquisitionFailedError among them.
     """
-    _check_same_machine(call, machine)
+    arm = call.machine
+    _check_same_machine(arm, machine)
     runs: list[Acquired] = []
     every = list(traces)
-    found = diagnose(every, asker(machine, budget))
+    found = diagnose(every, asker(arm, budget))
     while (asked := next_to_run(found, runs, budget)) is not None:
         left = time_left(runs, budget)
-        console().print(f"ask     {asked.name}, {asked.duration:.0f} s of {left:.0f} s: {asked.reason}", markup=False)
-        run, trace = _run(call, machine, asked, folder or call.trace_folder, consent)
+        console().print(f"ask     {asked.name}, {asked.duration:.0f} s of {left:.0f} s: {asked.reason}")
+        run, trace = _run(call, arm, asked, folder or call.trace_folder, consent)
         runs.append(run)
         if run.outcome == "complete":
             every.append(trace)
-            found = diagnose(every, asker(machine, time_left(runs, budget)))
+            found = diagnose(every, asker(arm, time_left(runs, budget)))
         else:
-            console().print(f"[red]{run.outcome}[/red]: no more is asked for; its trace is {run.file}")
+            console().print(f"{run.outcome}: no more is asked for; its trace is {run.file}", style="red")
     return found.model_copy(update={"acquired": tuple(runs)}), every
 
 
-def _run(
-    call: Invocation, machine: Machine, asked: NextExperiment, folder: Path, consent: bool
-) -> tuple[Acquired, Trace]:
+def _run(call: Invocation, arm: Machine, asked: NextExperiment, folder: Path, consent: bool) -> tuple[Acquired, Trace]:
     from daq.traces.reader import read_trace
 
-    finished = acquire(call, asked.spec, machine, folder, consent)
+    finished = acquire(call, asked.spec, arm, folder, consent)
     trace = read_trace(finished.trace)
     return as_run(asked, trace, finished.trace, finished.outcome), trace
 
 
-def _check_same_machine(call: Invocation, machine: Machine) -> None:
-    """Raises SpecError when the port's arm is another machine than the traces'."""
-    configured = call.machine
-    if configured.name != machine.name:
+def _check_same_machine(arm: Machine, machine: Machine) -> None:
+    """Raises SpecError when the configured arm is another machine than the traces', or reads its joints otherwise."""
+    if arm.name != machine.name:
         raise SpecError(
-            f"--acquire: the traces were made on {machine.name}, the configured robot is {configured.name}; "
+            f"--acquire: the traces were made on {machine.name}, the configured robot is {arm.name}; "
             "configure the one that the traces are of"
         )
+    here, there = _readings(arm), _readings(machine)
+    if differing := sorted(joint for joint in here | there if here.get(joint) != there.get(joint)):
+        raise SpecError(
+            f"--acquire: the configured {arm.name} has another sensor than in the traces on joint "
+            f"{', '.join(map(str, differing))}; record new traces, or configure the machine file of these"
+        )
+
+
+def _readings(machine: Machine) -> dict[int, tuple[object, ...] | None]:
+    """By joint what makes an angle of its sensor's counts; None for a joint without a sensor."""
+    return {
+        number: None if s is None else (s.bits, s.range.value, s.at_zero.value, s.direction, s.measures)
+        for number, s in enumerate((joint.sensor for joint in machine.joints), start=1)
+    }

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
+
+from model.reports.units import shown_unit
 
 if TYPE_CHECKING:
     from model.discrepancy.answer import Candidate, Diagnosis, FoundValue, NextExperiment, SignalError, Step
@@ -20,7 +21,6 @@ VERDICTS = {
     "ambiguous": "AMBIGUOUS",
     "unknown-effect": "UNKNOWN EFFECT",
 }
-UNITS = {"rad": (math.degrees(1.0), "°"), "m": (1e3, "mm"), "rad/s": (math.degrees(1.0), "°/s"), "m/s": (1e3, "mm/s")}
 
 
 def answer_text(found: Diagnosis) -> str:
@@ -97,7 +97,7 @@ def _shown(step: Step) -> list[str]:
 
 
 def _error(e: SignalError) -> str:
-    factor, unit = UNITS.get(e.unit, (1.0, e.unit))
+    factor, unit = shown_unit(e.unit)
     return f"joint {e.joint}  {e.before * factor:8.4f} → {e.after * factor:8.4f} {unit}  ({e.floor * factor:.4f})"
 
 

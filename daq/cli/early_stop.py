@@ -13,11 +13,6 @@ def ask() -> None:
     _asked = request_stop()
 
 
-def asked() -> list[StopAttempt]:
-    """The answers to the early stop; none where none was asked for."""
-    return [] if _asked is None else _asked
-
-
 def attempts() -> list[StopAttempt]:
     """The answers to the early stop; asks now when there was none (`daq --config … stop`)."""
     return request_stop() if _asked is None else _asked

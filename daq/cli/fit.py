@@ -22,6 +22,7 @@ from daq.cli.model_input import (
     read_model,
     read_traces,
 )
+from daq.cli.output_file import replacing
 from daq.cli.parameter_table import print_parameters
 from daq.cli.remote.jobs import numbers_of, require_no_programs
 from daq.contracts.errors import SpecError
@@ -80,6 +81,8 @@ def fit(
     from model.fitting.options import FitOptions
     from model.simulation.simulate import Options
 
+    if torques and (method != "least_squares" or starts > 1 or seed or open_loop):
+        raise SpecError("--torques: --method, --starts, --seed and --open-loop are of a fit of motion; leave them out")
     call = invocation(context)
     require_no_programs(effect_file, call)
     load_effects(effect_file)
@@ -98,7 +101,7 @@ def fit(
             raise SpecError("--torques: is computed here, not by a service; fetch the traces, then leave --server out")
         wanted = (numbers_of(call, traces, fitted_to), numbers_of(call, holdout or [], held))
         done = fit_at_server(call, begin, *wanted, options, out, report)
-        done.save(out)
+        _save(done, out, quiet=json)
         _tell(done, done.models, out, as_json=json)
         return
     if torques:
@@ -108,17 +111,25 @@ def fit(
         return
     with shown_progress("fitting") as tell:
         found = run_fit(begin, fitted_to, options, lambda f, text: tell(0.9 * f, text))
+        _save(found, out, quiet=json)
         comparison = compare(
             [("before", begin), ("fitted", found.model)], [*fitted_to, *held], [t.record.trace_id for t in held],
             options=Options(loop=loop or "closed"), progress=lambda f, text: tell(0.9 + 0.1 * f, text),
         )  # fmt: skip
-    found.save(out)
     _tell(found, comparison.models, out, as_json=json)
     if report is not None:
         from model.reports.fit_report import fit_report
         from model.reports.page import write_report
 
         console().print(f"report: {write_report(fit_report(found, comparison), report)}")
+
+
+def _save(found: FitResult, out: Path, *, quiet: bool) -> None:
+    """The model, and where it is; before anything else is made of it, which may fail."""
+    with replacing(out) as part:
+        found.save(part)
+    if not quiet:
+        console().print(f"model {found.model.identity}: {out}")
 
 
 def _beginning(
@@ -143,7 +154,6 @@ def _tell(found: FitResult, agreement: Sequence[ModelAgreement], out: Path, *, a
         _print_json(found, agreement, out)
     else:
         _print(found, agreement)
-        console().print(f"model {found.model.identity}: {out}")
 
 
 def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path) -> None:

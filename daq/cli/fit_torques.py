@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq.cli.context import console, print_json
+from daq.cli.context import console, print_json, print_table
+from daq.cli.output_file import replacing
 from daq.cli.parameter_table import print_parameters
 
 if TYPE_CHECKING:
@@ -31,7 +32,8 @@ def fit_recorded_torques(
 
     with shown_progress("fitting torques") as tell:
         found = fit_torques(begin, traces, held_out, options, progress=tell)
-    save_model(found.model, out)
+    with replacing(out) as part:
+        save_model(found.model, part)
     if as_json:
         print_json(found.model_dump(mode="json", exclude={"model"}) | {"model": found.model.identity, "file": out})
     else:
@@ -47,7 +49,6 @@ def fit_recorded_torques(
 
 
 def _print(found: TorqueFit) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     print_parameters(found.parameters)
@@ -57,6 +58,6 @@ def _print(found: TorqueFit) -> None:
     for one in found.errors:
         rms = ", ".join(f"{left:.3f} of {torque:.3f}" for left, torque in zip(one.rms, one.torque, strict=True))
         errors.add_row(one.trace, "held out" if one.held_out else "in sample", f"{100 * one.share:.1f} %", rms)
-    Console(highlight=False, width=120).print(errors)
+    print_table(errors, 120)
     print(f"left of the torque, all together: in sample {100 * found.in_sample:.1f} %", end="")
     print("" if found.held_out is None else f", held out {100 * found.held_out:.1f} %")

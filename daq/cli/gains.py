@@ -12,6 +12,7 @@ from daq.cli.quantities import parse_gains
 from daq.cli.robot import connected
 from daq.contracts.errors import SafetyError
 from daq.contracts.limp import limp_line, require_no_jump
+from firmware_protocol.requests import SetGains
 
 app = typer.Typer(add_completion=False, help="Show or set the controller's PID gains.", no_args_is_help=True)
 
@@ -43,6 +44,8 @@ def set_gains(
 ) -> None:
     """Write gains and read them back. Refused for a joint off its set point, which would jump there."""
     wanted = parse_gains(gains)
+    for joint, gain in wanted.items():
+        SetGains(joint, *gain)  # raises outside its range: all or nothing is written
     call = invocation(context)
     if call.server is not None:
         from daq.cli.remote.control import set_gains_at_server

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from daq.cli.context import Invocation
+from daq.cli.output_file import check_folder
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, load_machine, shipped_machines
 
@@ -23,9 +24,11 @@ TraceFolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (
 
 
 def _page(path: Path | None) -> Path | None:
-    """Refuses another kind of file before anything is computed."""
-    if path is not None and path.suffix != ".html":
-        raise SpecError(f"report {path}: is written as .html")
+    """Refuses another kind of file, and one that cannot be made, before anything is computed."""
+    if path is not None:
+        if path.suffix != ".html":
+            raise SpecError(f"report {path}: is written as .html")
+        check_folder(path, "report")
     return path
 
 
@@ -35,9 +38,11 @@ ReportOption = Annotated[
 
 
 def _model_file(path: Path | None) -> Path | None:
-    """Refuses another kind of file before anything is computed."""
-    if path is not None and path.suffix != ".json":
-        raise SpecError(f"--out {path}: a model is written as .json")
+    """Refuses another kind of file, and one that cannot be made, before anything is computed."""
+    if path is not None:
+        if path.suffix != ".json":
+            raise SpecError(f"--out {path}: a model is written as .json")
+        check_folder(path, "--out")
     return path
 
 
@@ -108,9 +113,33 @@ def read_traces(call: Invocation, folder: Path | None, names: Sequence[str]) -> 
 def machine_of(traces: Sequence[Trace], call: Invocation) -> Machine:
     """The machine that the traces were made on; the configured one where they do not say.
 
-    Raises SpecError when they were made on different ones.
+    Limits may differ: the last trace's are taken. Raises SpecError when the machines differ otherwise.
     """
-    machines = {t.record.machine.name: t.record.machine for t in traces if t.record.machine is not None}
-    if len(machines) > 1:
-        raise SpecError(f"the traces were made on different machines: {', '.join(machines)}; one at a time")
-    return next(iter(machines.values()), None) or call.machine
+    machines = [t.record.machine for t in traces if t.record.machine is not None]
+    names = list(dict.fromkeys(machine.name for machine in machines))
+    if len(names) > 1:
+        raise SpecError(f"the traces were made on different machines: {', '.join(names)}; one at a time")
+    for machine in machines[1:]:
+        if place := _difference(_described(machines[0]), _described(machine)):
+            raise SpecError(
+                f"the traces were made on different machines that are both called {machine.name}: {place} differs; "
+                "one at a time, or name the machine or model to use"
+            )
+    return machines[-1] if machines else call.machine
+
+
+def _described(machine: Machine) -> dict[str, Any]:
+    """What a machine file says of the machine: not what people call it, nor where it may go."""
+    return machine.model_dump(exclude={"title", "notes", "limits", "rest_posture"})
+
+
+def _difference(one: Any, other: Any, place: str = "") -> str:
+    """Where two descriptions first differ, such as `joints.2.link.mass.value`; empty where they agree. The sources of
+    numbers are words, and may differ."""
+    if isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other):
+        one, other = dict(enumerate(one, start=1)), dict(enumerate(other, start=1))
+    if isinstance(one, dict) and isinstance(other, dict):
+        keys = [key for key in one | other if key != "source"]
+        found = (_difference(one.get(key), other.get(key), f"{place}.{key}".lstrip(".")) for key in keys)
+        return next((where for where in found if where), "")
+    return "" if one == other else place

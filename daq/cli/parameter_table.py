@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from daq.cli.context import print_table
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -13,7 +15,6 @@ if TYPE_CHECKING:
 
 def print_parameters(parameters: Sequence[FittedParameter]) -> None:
     """One line a parameter; no number where the data give none."""
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(box=None, header_style="bold")
@@ -22,7 +23,7 @@ def print_parameters(parameters: Sequence[FittedParameter]) -> None:
         table.add_column(name, justify="right" if side == "right" else "left", overflow="fold")
     for p in parameters:
         table.add_row(*_row(p))
-    Console(highlight=False, width=140).print(table)
+    print_table(table, 140)
 
 
 def _row(p: FittedParameter) -> tuple[str, ...]:

@@ -45,6 +45,17 @@ def carry_out(
     return finished
 
 
+def acquire_whole(call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Path, consent: bool) -> Finished:
+    """As `acquire`, for what is made of whole runs alone: an incomplete one is an AcquisitionFailedError, too."""
+    finished = acquire(call, spec, machine, folder, consent)
+    if finished.outcome != "complete":
+        why = f"{finished.outcome}: {finished.reason}" if finished.reason else finished.outcome
+        raise AcquisitionFailedError(
+            f"{why}; the run is not complete, so its trace is not used", EXIT_CODES[finished.outcome]
+        )
+    return finished
+
+
 def acquire(call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Path, consent: bool) -> Finished:
     """Runs `spec` in an acquisition process, or at the server, showing its progress; Ctrl-C freezes the arm.
 
@@ -115,7 +126,7 @@ class ShownRun:
 
         if kind not in self._quiet:
             line = escape(f"{kind.replace('_', ' ')}: {message}")
-            self._bar.console.print(f"[dim]{time:8.2f} s[/dim]  {line}", soft_wrap=True)
+            self._bar.console.print(f"[dim]{time:8.2f} s[/dim]  {line}", soft_wrap=True, markup=True)
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq.cli.context import JsonOption, console, invocation, print_json
+from daq.cli.csv_output import check_csv, write_csv
 from daq.cli.model_input import (
     MODEL_HELP,
     EffectFileOption,
@@ -20,6 +21,7 @@ from daq.cli.model_input import (
     read_model,
     read_traces,
 )  # fmt: skip
+from daq.cli.output_file import check_folder
 from daq.contracts.errors import SpecError
 
 if TYPE_CHECKING:
@@ -66,6 +68,10 @@ def simulate(
     found = read_traces(call, folder, traces)
     if output is not None and len(found) != 1:
         raise SpecError(f"--output {output}: is for one trace, {len(found)} are named")
+    if output is not None:
+        check_folder(output, "--output")
+        if output.suffix == ".csv":
+            check_csv(output)
     chosen = read_model(model)
     options = Options(loop="open" if open_loop else "closed", quantise=not no_rounding)
     with shown_progress("simulating") as tell:
@@ -111,9 +117,7 @@ def _simulated(model: Model, trace: Trace, options: Options) -> Trace:
 
 def _written(trace: Trace, path: Path) -> Path:
     if path.suffix == ".csv":
-        from daq.traces.csv_table import export_csv
-
-        return export_csv(trace, path)
+        return write_csv(trace, path)
     if path.suffix == ".mcap":
         from daq.traces.store import write_trace
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 import typer
@@ -29,8 +30,8 @@ def stop(context: typer.Context, json: JsonOption = False) -> None:
     from daq.cli import early_stop
 
     call = invocation(context)
-    asked = early_stop.attempts() if call.server is None else early_stop.asked()
-    answers = [_answered(attempt) for attempt in asked]
+    here = call.server is None or call.server_by_default
+    answers = [_answered(attempt) for attempt in early_stop.attempts()] if here else []
     if call.server is None:
         answers += _stop_configured(call, {answer.port for answer in answers})
     else:
@@ -58,11 +59,27 @@ def _stop_configured(call: Invocation, reached: set[str]) -> list[StopAnswer]:
         name = "robot" if call.port_option else call.settings.robot.name
     except DaqError as error:
         return [_undelivered("configured robot", "", str(error))]
-    if url is None or url.startswith("mock://") or url in reached:
+    if url is None or url.startswith("mock://") or _device(url) in map(_device, reached):
         return []
     from daq.acquisition.port_stop import stop_at_port
 
     return [stop_at_port(name, url)]
+
+
+def _device(url: str) -> object:
+    """What a port's URL is about, however it is written; the text itself where it is no URL."""
+    from daq.transport.url import SerialPort, TcpPort, TransportError, parse_port_url
+
+    try:
+        port = parse_port_url(url)
+    except TransportError:
+        return url
+    match port:
+        case SerialPort(device):
+            return os.path.realpath(device)
+        case TcpPort(host, number):
+            return host.lower(), number
+    return url
 
 
 def _answered(attempt: StopAttempt) -> StopAnswer:

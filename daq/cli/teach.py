@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from daq.contracts.sample import SampleRow
     from daq.teaching.controller_arm import ControllerArm
     from daq.teaching.jog import JogCommand
+    from daq.teaching.program import Program
+    from daq.teaching.program_plan import PlannedInstruction
+
+Made = TypeVar("Made")
 
 app = typer.Typer(
     add_completion=False,
@@ -30,8 +34,11 @@ app = typer.Typer(
 
 
 @contextmanager
-def _owned(call: Invocation, consent: bool) -> Iterator[OwnedRobot]:
-    """The robot, held by this process. Where a real arm waits for consent and a person can be asked, asks."""
+def _owned(call: Invocation, consent: bool, prepare: Callable[[OwnedRobot], Made]) -> Iterator[tuple[OwnedRobot, Made]]:
+    """The robot, held by this process. Where a real arm waits for consent and a person can be asked, asks.
+
+    `prepare` looks and checks before anything moves: what it refuses leaves set points and gains as they were.
+    """
     from daq.acquisition.owned import owned_robot
     from daq.config.robot_files import load_memory_map
     from daq.runner import Consent, MissingConsentError
@@ -44,8 +51,13 @@ def _owned(call: Invocation, consent: bool) -> Iterator[OwnedRobot]:
             if not agreed(call.port):
                 raise
             owned = held.enter_context(owned_robot(robot, call.port, memory_map, Consent(True)))
-        require_drive(owned.controller.gains())
-        yield owned
+        try:
+            require_drive(owned.controller.gains())
+            prepared = prepare(owned)
+        except (SafetyError, SpecError):
+            held.close()  # without the error, which would freeze the arm
+            raise
+        yield owned, prepared
 
 
 def _arm(robot: OwnedRobot, machine: Machine) -> ControllerArm:
@@ -65,10 +77,12 @@ def jog(
     from daq.cli.keyboard import keys
     from daq.cli.pendant import HELP, Pendant, StatusLine, require_jog_speed
     from daq.teaching import jog as jog_arm
-    from daq.teaching.program import Absolute, Program, save_program
+    from daq.teaching.program import Absolute, Program, require_program_file, save_program
 
     call = invocation(context)
     machine = call.machine
+    if program is not None:
+        require_program_file(program)
     pendant = Pendant(machine, require_jog_speed(parse_angle(speed, "speed")))
     kept: list[Absolute] = []
     line = StatusLine()
@@ -83,8 +97,7 @@ def jog(
 
             jog_at_server(call, pendant, keep, yes, line)
             return
-        with keys() as keyboard, _owned(call, yes) as robot:
-            arm = _arm(robot, machine)
+        with keys() as keyboard, _owned(call, yes, lambda robot: _arm(robot, machine)) as (robot, arm):
             line.tell(HELP)
 
             def commands(row: SampleRow) -> JogCommand | None:
@@ -148,24 +161,26 @@ def run_file(
     _perform(invocation(context), load_program(file), yes)
 
 
-def _perform(call: Invocation, program: object, consent: bool) -> None:
+def _perform(call: Invocation, program: Program, consent: bool) -> None:
     from daq.teaching.performer import FollowingPerformer
-    from daq.teaching.program import Program
     from daq.teaching.program_plan import check_program, plan_program, run_program
 
-    assert isinstance(program, Program)
     if call.server is not None:
         from daq.cli.remote.teach import perform_at_server
 
         perform_at_server(call, program, consent)
         return
     machine = call.settings.machine()
-    with _owned(call, consent) as robot:
+
+    def checked(robot: OwnedRobot) -> list[PlannedInstruction]:
         here = _arm(robot, machine).next_sample()
         planned = plan_program(program, machine, here.set_point)
         against = check_program(planned, machine, machine.limits)
         if against:
             raise SafetyError(f"program refused: {against[0]}; nothing moved")
+        return planned
+
+    with _owned(call, consent, checked) as (robot, planned):
         tell = console().print
         performer = FollowingPerformer(robot.controller, robot.control, machine, machine.limits, robot.ended, tell)
         run_program(planned, machine, performer, tell)
@@ -187,6 +202,7 @@ def lead(
 
     from daq.contracts.experiment import parse_joints
     from daq.teaching import RecordedPath, lead_by_nose
+    from daq.teaching.recording import save_path
 
     if seconds is None and not sys.stdin.isatty():
         raise SpecError("lead: give --seconds, or a terminal in which Enter ends it")
@@ -195,10 +211,7 @@ def lead(
     call = invocation(context)
 
     def keep(path: RecordedPath) -> None:
-        try:
-            output.write_text(path.model_dump_json(indent=1) + "\n", "utf-8")
-        except OSError as error:
-            raise SpecError(f"{output}: cannot be written: {error.strerror}") from error
+        save_path(path, output)
         print(f"{output}: {path.duration:.2f} s on joints {', '.join(map(str, path.joints))}")
 
     if call.server is not None:
@@ -207,7 +220,7 @@ def lead(
         lead_at_server(call, parse_joints(joints), seconds, keep, yes)
         return
     machine = call.settings.machine()
-    with _owned(call, yes) as robot:
+    with _owned(call, yes, lambda robot: _arm(robot, machine)) as (robot, arm):
         begun = robot.controller.clock.now()
 
         def ended() -> bool:
@@ -216,7 +229,7 @@ def lead(
             return bool(select.select([sys.stdin], [], [], 0)[0])
 
         console().print("recording: lead the arm" + ("; Enter ends it" if seconds is None else f" for {seconds:g} s"))
-        lead_by_nose(_arm(robot, machine), machine, machine.limits, parse_joints(joints), ended, keep)
+        lead_by_nose(arm, machine, machine.limits, parse_joints(joints), ended, keep)
 
 
 @app.command()

@@ -58,7 +58,7 @@ def thesis(
 
 def _recorded(seed: int, folder: Path | None) -> Trace:
     """The ramp of section 6.5 on a mock of its own."""
-    from daq.cli.run_result import acquire
+    from daq.cli.run_result import acquire_whole
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import load_machine
     from daq.traces.reader import read_trace
@@ -66,5 +66,5 @@ def _recorded(seed: int, folder: Path | None) -> Trace:
     spec = ExperimentSpec(name="thesis-ramp", notes="made by `daq thesis`")
     call = Invocation(port_option=f"mock://?seed={seed}&lock_step=1")
     with TemporaryDirectory() as temporary:
-        finished = acquire(call, spec, load_machine("ma2000"), folder or Path(temporary), consent=False)
+        finished = acquire_whole(call, spec, load_machine("ma2000"), folder or Path(temporary), consent=False)
         return read_trace(finished.trace)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq.cli.context import Invocation, JsonOption, console, invocation, print_json
+from daq.cli.context import Invocation, JsonOption, console, invocation, print_json, print_table
 from daq.contracts.errors import SpecError, TraceError
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOpti
         print(f"no traces in {place}")
         return
     from rich.table import Table
+    from rich.text import Text
 
     table = Table(box=None, header_style="bold")
     for title in ("number", "recorded (UTC)", "what", "joints", "samples", "s", "outcome"):
@@ -62,11 +63,9 @@ def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOpti
             joints_text(one.joints),
             "?" if one.samples is None else str(one.samples),
             "?" if one.duration is None else f"{one.duration:.2f}",
-            f"[green]{ended}[/green]" if ended == "complete" else f"[bold red]{ended}[/bold red]",
+            Text(ended, "green" if ended == "complete" else "bold red"),
         )
-    from rich.console import Console
-
-    Console(highlight=False).print(table)
+    print_table(table)
 
 
 def _summaries(call: Invocation, folder: Path | None) -> tuple[Sequence[TraceSummary], str]:
@@ -119,7 +118,6 @@ def show(
 
 def print_figures(trace: Trace) -> None:
     """The figures of every joint that moved, as a table on standard output."""
-    from rich.console import Console
     from rich.table import Table
 
     from daq.traces.summary import joint_figures
@@ -144,7 +142,7 @@ def print_figures(trace: Trace) -> None:
         cells = (one.start, one.end, one.overshoot)
         table.add_row(str(one.joint), *(_angle(value, one.unit) for value in cells), rise,
                       _angle(one.largest_error, one.unit), _angle(one.final_error, one.unit), drive)  # fmt: skip
-    Console(highlight=False).print(table)
+    print_table(table)
 
 
 def _angle(value: float | None, unit: str) -> str:
@@ -180,11 +178,11 @@ def export(
     folder: FolderOption = None,
 ) -> None:
     """Write a trace as plain CSV, with a TOML file for what columns cannot say."""
-    from daq.traces.csv_table import export_csv
+    from daq.cli.csv_output import write_csv
     from daq.traces.reader import read_trace
 
     path = _path(context, trace, folder)
-    print(export_csv(read_trace(path), output or path.with_suffix(".csv")))
+    print(write_csv(read_trace(path), output or path.with_suffix(".csv")))
 
 
 @app.command("import")

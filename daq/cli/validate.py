@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq.cli.context import JsonOption, console, invocation, print_json
+from daq.cli.context import JsonOption, console, invocation, print_json, print_table
 from daq.cli.effect_choice import patterns
 from daq.cli.model_input import (
     MODEL_HELP,
@@ -24,6 +24,7 @@ from daq.cli.remote.jobs import numbers_of, require_no_programs
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from daq.contracts.machine import Machine
     from model.validation.criterion import Fidelity
     from model.validation.variation import TimeDomain
 
@@ -70,7 +71,7 @@ def validate(
 
         numbers = numbers_of(call, traces, found)
         done = validate_at_server(call, chosen, model, numbers, patterns(parameters), output, damping_ratio, report)
-        _tell(done.fidelity, done.three_sigma, done.time_domain, as_json=json)
+        _tell(done.fidelity, done.three_sigma, done.time_domain, chosen.machine, as_json=json)
         return
     names = names_to_validate(chosen, patterns(parameters))
     with shown_progress("validating") as tell:
@@ -83,16 +84,18 @@ def validate(
             tell(0.7 + 0.3 * number / len(found), f"variation with time: {trace.record.trace_id}")
             in_time.append(vary_in_time(chosen, trace, names))
     three = in_convention(fidelity, chosen, "three_sigma")
-    _tell(fidelity, three, in_time, as_json=json)
+    _tell(fidelity, three, in_time, chosen.machine, as_json=json)
     if report is not None:
         from model.reports.page import write_report
         from model.reports.validation_report import validation_report
 
-        page = validation_report(model_label(model), (fidelity, three), in_time)
+        page = validation_report(model_label(model), (fidelity, three), in_time, chosen.machine)
         console().print(f"report: {write_report(page, report)}")
 
 
-def _tell(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], *, as_json: bool) -> None:
+def _tell(
+    fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], machine: Machine, *, as_json: bool
+) -> None:
     if as_json:
         print_json({
             "fidelity": fidelity.model_dump(mode="json"),
@@ -100,11 +103,10 @@ def _tell(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], *,
             "time_domain": [one.model_dump(mode="json") for one in in_time],
         })  # fmt: skip
     else:
-        _print(fidelity, three, in_time)
+        _print(fidelity, three, in_time, machine)
 
 
-def _print(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain]) -> None:
-    from rich.console import Console
+def _print(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], machine: Machine) -> None:
     from rich.table import Table
 
     table = Table(box=None, header_style="bold")
@@ -117,8 +119,7 @@ def _print(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain]) -
         table.add_row(
             p.name, f"{p.value:.5g}", f"{down} / {up}", needed, f"{p.expected:.3g}", f"{p.contribution:.4f}", p.unit
         )
-    shown = Console(highlight=False, width=140)
-    shown.print(table)
+    print_table(table, 140)
     verdict = "no more than" if fidelity.explains else "more than"
     print(
         f"\nΣλ² = {fidelity.sum_of_contributions:.4f} (τ′ = â/(3√2), the source's), "
@@ -128,12 +129,13 @@ def _print(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain]) -
         print(f"  {note}")
     for one in in_time:
         print(f"\n{one.trace}, variation with time (accelerations smoothed over {1e3 * one.smoothing:.0f} ms):")
-        _print_in_time(one)
+        _print_in_time(one, machine)
 
 
-def _print_in_time(one: TimeDomain) -> None:
-    from rich.console import Console
+def _print_in_time(one: TimeDomain, machine: Machine) -> None:
     from rich.table import Table
+
+    from model.reports.units import joint_unit
 
     table = Table(box=None, header_style="bold")
     for name in ("parameter", "σ of α(t)", "τ′", "beyond noise", "explains, constant", "varying", "goes with"):
@@ -144,11 +146,12 @@ def _print_in_time(one: TimeDomain) -> None:
             v.name, f"{v.deviation:.3g}", f"{v.expected:.3g}", f"{100 * v.significant:.0f} %",
             f"{100 * v.alone_constant:.0f} %", f"{100 * v.alone_varying:.0f} %", ", ".join(strongest),
         )  # fmt: skip
-    Console(highlight=False, width=160).print(table)
+    print_table(table, 160)
     for j in one.joints:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in j.against if c.significant][:3]
+        unit = f"{joint_unit(machine, j.joint)}/s²"
         print(
-            f"  joint {j.joint}: acceleration residual rms {j.rms:.3g} rad/s² (noise {j.noise:.3g})"
+            f"  joint {j.joint}: acceleration residual rms {j.rms:.3g} {unit} (noise {j.noise:.3g})"
             + (f", goes with {', '.join(strongest)}" if strongest else "")
         )
     for note in one.notes:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
-from daq.client.connection import Connection
+from daq.client.connection import Connection, Request
 from daq.client.robot import Robot
 from daq.contracts.errors import SpecError
 from daq.contracts.service.robot import RobotSummary
@@ -52,9 +52,10 @@ class Client:
         """Version, storage, watchers."""
         return self._connection.get(SystemStatus, "system")
 
-    def robots(self) -> Sequence[RobotSummary]:
-        """The robots of the service."""
-        return self._connection.get(tuple[RobotSummary, ...], "robots")
+    def robots(self, *, within: float | None = None) -> Sequence[RobotSummary]:
+        """The robots of the service; with `within` (s for the answer) asked for once."""
+        request = Request("GET", "robots", repeatable=within is None, within=within)
+        return self._connection.ask(tuple[RobotSummary, ...], request)
 
     def robot(self, name: str | None = None) -> Robot:
         """One of them, by name; without one, the only one there is. Raises SpecError when there are more."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -29,6 +30,8 @@ LONGEST_PAUSE = 5.0
 """s of `Retry-After` that are waited for; a service that asks for more is told about."""
 PART = 65536
 """Bytes written at once of a file that comes."""
+TOKEN = re.compile(r"[!-~]+")
+"""What a header can carry."""
 T = TypeVar("T")
 Query = Mapping[str, Any]
 
@@ -36,7 +39,7 @@ Query = Mapping[str, Any]
 @dataclass(frozen=True)
 class Request:
     """One request. `path` is below the API's; `repeatable` says that sending it twice does what sending it once does;
-    `patience` is in s, beyond ANSWER_WITHIN."""
+    `patience` is in s, beyond ANSWER_WITHIN; `within` (s) takes the place of both."""
 
     method: str
     path: str
@@ -46,6 +49,7 @@ class Request:
     headers: Mapping[str, str] = field(default_factory=dict)
     repeatable: bool = False
     patience: float = 0.0
+    within: float | None = None
 
 
 class Connection:
@@ -61,6 +65,8 @@ class Connection:
     ) -> None:
         """`transport` and `pause` are for whoever stands in for the network and its time. Raises SpecError."""
         self.url = parse_url(url)
+        if token is not None and TOKEN.fullmatch(token) is None:
+            raise SpecError("token: only ASCII characters without spaces are allowed; `daq token add` shows one")
         self.token = token
         self._pause = pause
         self._http = httpx.Client(
@@ -112,7 +118,7 @@ class Connection:
         part = target.with_name(f".{target.name}.download")
         try:
             with self._http.stream("GET", path) as response:
-                if response.is_error:
+                if not response.is_success:  # a redirection, such as a proxy's, is no file
                     response.read()
                     raise ServiceError(_problem(response))
                 with part.open("wb") as stream:
@@ -145,6 +151,7 @@ class Connection:
 
     def _send(self, request: Request) -> httpx.Response:
         content, headers = request.content, dict(request.headers)
+        within = ANSWER_WITHIN + request.patience if request.within is None else request.within
         if request.body is not None:
             content = request.body.model_dump_json(exclude_none=True).encode()
             headers["Content-Type"] = "application/json"
@@ -154,7 +161,7 @@ class Connection:
             content=content,
             params=dict(request.query),
             headers=headers,
-            timeout=httpx.Timeout(ANSWER_WITHIN + request.patience, connect=CONNECT_WITHIN),
+            timeout=httpx.Timeout(within, connect=min(within, CONNECT_WITHIN)),
         )
 
 

@@ -73,9 +73,9 @@ class Experiments:
             if until is not None and clock() >= until:
                 raise TimeoutError(f"experiment {experiment} is {found.state} after {seconds:g} s")
 
-    def cancel(self, experiment: str) -> Experiment:
-        """Takes back what waits; stops the arm where it runs, which needs a reset then."""
-        return self._connection.ask(Experiment, Request("POST", f"{self._path}/{experiment}/cancel"))
+    def cancel(self, experiment: str, *, within: float | None = None) -> Experiment:
+        """Takes back what waits; stops the arm where it runs, which needs a reset then. `within`: s for the answer."""
+        return self._connection.ask(Experiment, Request("POST", f"{self._path}/{experiment}/cancel", within=within))
 
     def set_priority(self, experiment: str, priority: int) -> Experiment:
         """Of one that waits; higher goes first."""
@@ -107,9 +107,10 @@ class Queue:
         body = QueueResume(moves_real_arm=moves_real_arm)
         return self._connection.ask(QueueStatus, Request("POST", f"{self._path}/resume", body))
 
-    def attend(self) -> QueueStatus:
-        """The operator's word to be there, for a minute more."""
-        return self._connection.ask(QueueStatus, Request("POST", f"{self._path}/attend", repeatable=True))
+    def attend(self, *, within: float | None = None) -> QueueStatus:
+        """The operator's word to be there, for a minute more; with `within` (s for the answer) said once."""
+        request = Request("POST", f"{self._path}/attend", repeatable=within is None, within=within)
+        return self._connection.ask(QueueStatus, request)
 
 
 class Schedules:

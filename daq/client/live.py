@@ -6,13 +6,14 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
+from urllib.request import getproxies, proxy_bypass
 
 import httpx
 from pydantic import TypeAdapter, ValidationError
-from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidURI
+from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidProxy, InvalidURI
 from websockets.sync.client import ClientConnection, connect
 
-from daq.client.connection import API, CONNECT_WITHIN, Connection
+from daq.client.connection import API, CONNECT_WITHIN, Connection, is_loopback
 from daq.client.errors import ServiceNotReachedError
 from daq.contracts.service.live import LiveFrame, LiveMessage, LiveRequest, SampleRate, Topic
 
@@ -34,10 +35,10 @@ class LiveStream:
             self._socket: ClientConnection = self._closed_last.enter_context(
                 connect(
                     self._url, additional_headers=headers, open_timeout=CONNECT_WITHIN, close_timeout=CLOSE_WITHIN,
-                    max_size=LARGEST_FRAME, compression=None, proxy=None,
+                    max_size=LARGEST_FRAME, compression=None, proxy=proxy_to(connection.url),
                 )
             )  # fmt: skip
-        except (OSError, InvalidHandshake, InvalidURI, TimeoutError) as error:
+        except (OSError, InvalidHandshake, InvalidProxy, InvalidURI, TimeoutError) as error:
             raise ServiceNotReachedError(f"{self._url}: no stream: {error or 'no answer in time'}") from error
 
     def __enter__(self) -> Self:
@@ -104,6 +105,16 @@ def open_stream(
     stream = LiveStream(connection, robot)
     stream.subscribe(*topics, rate=rate, history=history)
     return stream
+
+
+def proxy_to(url: str) -> str | None:
+    """The proxy that the environment names for the service's requests: the stream goes the same way."""
+    address = httpx.URL(url)
+    if is_loopback(url) or proxy_bypass(address.host):
+        return None
+    named = getproxies()
+    proxy = named.get(address.scheme) or named.get("all")
+    return proxy if proxy is None or "://" in proxy else f"http://{proxy}"
 
 
 def _websocket(url: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from daq.client import stopping
 from daq.client.connection import Connection, Request
 from daq.client.control import HeldControl
-from daq.client.experiments import Experiments, Queue, Schedules
+from daq.client.experiments import Experiments, Queue, Schedules, new_key
 from daq.client.jobs import Jobs, Models
 from daq.client.live import LiveStream, open_stream
 from daq.client.traces import Traces
@@ -92,8 +92,9 @@ class Robot:
 
     def calibrate_gain(self, joints: Sequence[int] = (1, 2, 3)) -> Experiment:
         """Queues the experiment that shows the actual proportional gains (`traces.gains` tells them afterwards)."""
+        path, headers = f"{self._path}/calibrations/gain", {"Idempotency-Key": new_key()}
         body = CalibrationRequest(joints=tuple(joints))
-        return self._connection.ask(Experiment, Request("POST", f"{self._path}/calibrations/gain", body))
+        return self._connection.ask(Experiment, Request("POST", path, body, headers=headers, repeatable=True))
 
     def live(self, *topics: Topic, rate: SampleRate | None = None, history: float | None = None) -> LiveStream:
         """A stream of what happens: samples, robot, link, queue, jobs, events, teaching."""

@@ -20,6 +20,10 @@ ANSWER_WITHIN = 3.0
 """s for one door: the service itself answers within 1.1 s, whatever the link does."""
 
 
+class NoSuchRobot(StopResult):
+    """The service has answered, and has no robot of this name."""
+
+
 def stop_addresses(url: str, stop_url: str | None = None) -> list[str]:
     """Where a stop can be asked for: at the service, and at its stop listener, which is `stop_url` or, where the
     service's address says its port, the port after that."""
@@ -50,7 +54,12 @@ def stop(addresses: Sequence[str], robot_path: str, token: str | None) -> StopRe
                 break
     finally:
         pool.shutdown(wait=False)
-    return max(answers, key=lambda answer: (answer.confirmed, answer.delivered, answer.seconds > 0))
+    return max(answers, key=_tells)
+
+
+def _tells(answer: StopResult) -> tuple[bool, bool, bool, bool]:
+    """How much an answer says."""
+    return answer.confirmed, answer.delivered, answer.seconds > 0, isinstance(answer, NoSuchRobot)
 
 
 def _ask(url: str, headers: dict[str, str]) -> StopResult:
@@ -63,11 +72,12 @@ def _ask(url: str, headers: dict[str, str]) -> StopResult:
         if response.is_success:
             return StopResult.model_validate_json(response.content, extra="ignore")
         problem = ProblemDetails.model_validate_json(response.content)
-        return _undelivered(f"{problem.detail}; {problem.advice}".strip("; "))
+        why = f"{problem.detail}; {problem.advice}".strip("; ")
+        return _undelivered(why, NoSuchRobot if problem.status == 404 else StopResult)
     except ValidationError:
         return _undelivered(f"{url}: answers {response.status_code}, but is no such service")
 
 
-def _undelivered(why: str) -> StopResult:
+def _undelivered(why: str, kind: type[StopResult] = StopResult) -> StopResult:
     text = f"stop NOT DELIVERED: {why}. Use the emergency stop."
-    return StopResult(delivered=False, confirmed=False, seconds=0.0, note=why, text=text)
+    return kind(delivered=False, confirmed=False, seconds=0.0, note=why, text=text)

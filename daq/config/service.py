@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
@@ -17,6 +17,9 @@ class ServiceSettings(BaseModel):
 
     host: Annotated[str, Field(min_length=1, max_length=253)] = "127.0.0.1"
     """Address to listen at. Anything but loopback needs tokens (`daq token add`)."""
+    tokens: Literal["remote", "always"] = "remote"
+    """Who needs one: who is no user of this computer, or everybody. A proxy on this computer may make strangers look
+    like its users: `always` behind one."""
     port: Annotated[int, Field(ge=0, le=65535)] = DEFAULT_PORT
     """0: any free one, which is told."""
     stop_port: Annotated[int, Field(ge=0, le=65535)] | None = None

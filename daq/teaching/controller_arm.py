@@ -5,32 +5,57 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
+from daq.contracts.errors import SafetyError
 from daq.contracts.experiment import Gain
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
 from daq.driver import Controller, ControllerRestartedError, NoSampleError
 from daq.link import LinkError, RequestRefusedError
 from daq.runner import ArmControl, StoppedError
+from daq.runner.preparation import PERIOD_TOLERANCE
 from daq.runner.rows import RowMaker
 from daq.safety import Event
 from daq.teaching import halting
 from daq.teaching.arm import TeachingError
+from daq.trajectories import control_period
+
+
+def require_period(controller: Controller, machine: Machine) -> None:
+    """Raises SafetyError for a controller with another period than the machine file's, as a run does: speeds are
+    counted in set points a period."""
+    planned = control_period(machine)
+    if abs(controller.period_s - planned) > PERIOD_TOLERANCE * planned:
+        raise SafetyError(
+            f"{controller.link.url} has a control period of {controller.period_s * 1e3:g} ms, the machine file "
+            f"{machine.name} says {planned * 1e3:g} ms: speeds would be wrong; correct controller.period there"
+        )
 
 
 class ControllerArm:
     """A `TeachableArm` over the driver, in the states of `ArmControl` like every run.
 
-    ended: says why somebody outside wants the end; None while nobody does
+    ended:        says why somebody outside wants the end; None while nobody does
+    every_period: True delivers each period once, in order; False the newest, which a slow line can do
+
+    Raises SafetyError for a controller of another period than the machine file's.
     """
 
     def __init__(
-        self, controller: Controller, control: ArmControl, machine: Machine, ended: Callable[[], str | None]
+        self,
+        controller: Controller,
+        control: ArmControl,
+        machine: Machine,
+        ended: Callable[[], str | None],
+        *,
+        every_period: bool = True,
     ) -> None:
+        require_period(controller, machine)
         self.joints = tuple(range(1, len(machine.joints) + 1))
         self.lateness = 0.0
         self._controller = controller
         self._control = control
         self._ended = ended
+        self._every_period = every_period
         self._rows = RowMaker(machine, self.joints, controller.period_s)
         self._last: int | None = None
 
@@ -46,10 +71,10 @@ class ControllerArm:
             self._step(Event.DISARM)
 
     def next_sample(self) -> SampleRow:
-        """The next control period; none is left out."""
+        """The next control period; none is left out, unless only the newest are wanted."""
         self._require_going_on()
         try:
-            snapshot = self._controller.next_snapshot(self._last, self.joints)
+            snapshot = self._controller.next_snapshot(self._last if self._every_period else None, self.joints)
         except (LinkError, NoSampleError) as error:
             raise halting.tripped(self._control, str(error), Event.LINK_LOST) from error
         except ControllerRestartedError as error:

@@ -18,7 +18,8 @@ from daq.trajectories import control_period
 from firmware_protocol.units import counts_to_posture
 
 STILL_WITHIN = 8
-"""ADC counts of error up to which the gains of a led joint come back: an assumption, a pull of half a degree."""
+"""ADC counts of error up to which the gains of a led joint come back: an assumption, a pull of half a degree. No led
+joint may have moved by more in that time either: set points that follow it leave no error to be seen."""
 STILL_FOR = 0.2
 """Time (s) for which it must be so without a break: an assumption. A hand that turns round is still for a moment."""
 SHORTEST = 2
@@ -124,13 +125,17 @@ def _restore(arm: TeachableArm, machine: Machine, guards: RestGuards, limp: dict
     joints = tuple(limp)
     period = control_period(machine)
     sent: dict[int, int] = {}
-    still = 0
+    calm: list[SampleRow] = []
     for _ in range(round(PATIENCE / period)):
         row = arm.next_sample()
         _require_calm(arm, guards, row)
-        calm = bool(sent) and arm.lateness <= OLDEST_TO_ACT_ON and _at_rest(arm, machine, row, sent)
-        still = still + 1 if calm else 0
-        if still * period >= STILL_FOR:
+        if not (sent and arm.lateness <= OLDEST_TO_ACT_ON and _at_rest(arm, machine, row, sent)):
+            calm.clear()
+        elif calm and not _where_it_was(arm, machine, calm[0], row, joints):
+            calm = [row]
+        else:
+            calm.append(row)
+        if len(calm) * period >= STILL_FOR:
             for joint in joints:
                 arm.set_gains(joint, *limp[joint])
                 del limp[joint]
@@ -147,6 +152,15 @@ def _at_rest(arm: TeachableArm, machine: Machine, row: SampleRow, sent: Mapping[
         own = machine.calibration(joint)
         taken = abs(own.posture_to_rad(sent[joint]) - set_point) < abs(own.rad_per_posture_unit) / 2
         if not taken or abs((set_point - position) / own.rad_per_count) > STILL_WITHIN:
+            return False
+    return True
+
+
+def _where_it_was(
+    arm: TeachableArm, machine: Machine, before: SampleRow, now: SampleRow, joints: tuple[int, ...]
+) -> bool:
+    for joint, was, position in zip(arm.joints, before.position, now.position, strict=True):
+        if joint in joints and abs((position - was) / machine.calibration(joint).rad_per_count) > STILL_WITHIN:
             return False
     return True
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
@@ -11,8 +12,9 @@ from daq.contracts.trace import EventKind
 from daq.driver import EVERY_JOINT, Controller
 from daq.runner import ArmControl, StoppedError
 from daq.runner.follower import Follower
-from daq.safety import Event
+from daq.safety import Event, RunningGuards
 from daq.teaching import halting
+from daq.teaching.controller_arm import ControllerArm
 from daq.trajectories import Plan
 
 
@@ -50,35 +52,48 @@ class FollowingPerformer:
             controller, control, machine, limits, EVERY_JOINT, _Teller(tell), ended, every_period=False
         )
         self._ended = ended
+        self._arm = ControllerArm(controller, control, machine, ended, every_period=False)
+        self._guarded = partial(RunningGuards, machine, limits, self._arm.joints)
+        self._guards = self._guarded(moving=self._arm.joints)
+        """While nothing is sent. Joints that were moved last may still be on the way to their set points."""
         self._step(Event.ARM)
 
     def follow(self, plan: Plan) -> None:
         """Plays a plan to its end. Raises StoppedError or TeachingError when it does not get there; the arm is frozen
-        then."""
+        then. A board that has restarted since is noticed before anything is sent: its set points are others."""
+        self.observe(1)
         self._step(Event.START)
         ending = self._follower.follow(plan, lambda _index: None)
         if ending.kind == "stopped":
             raise halting.stopped(self._control, ending.cause)
         if ending.kind != "finished":
             raise halting.tripped(self._control, ending.cause)
+        self._guards = self._guarded(moving=plan.moving)
         self._step(Event.FINISHED)
 
     def observe(self, periods: int) -> None:
-        """Lets so many control periods pass. Raises StoppedError when somebody wants the end, also in between."""
+        """Lets so many control periods pass, watched. Raises StoppedError when somebody wants the end, also in between,
+        and TeachingError for a fault, a restart or a lost link; the arm is frozen then."""
         for _ in range(periods):
-            self._follower.observe(1)
-            self._require_going_on()
+            verdict = self._guards.check(self._arm.next_sample(), {})
+            if verdict.stop is not None:
+                raise self._arm.stopped(verdict.stop)
+            if verdict.trips:
+                raise self._arm.tripped("; ".join(verdict.trips))
+        self._require_going_on()
 
     def input_is_on(self, line: int) -> bool:
         """State of a process input."""
         return bool(self._controller.process().inputs >> line & 1)
 
     def set_output(self, line: int, *, on: bool) -> None:
-        """Switches a process output."""
+        """Switches a process output; raises StoppedError, and switches nothing, when the arm has been stopped."""
+        self._require_going_on()
         self._controller.write_outputs(1 << line, on << line)
 
     def set_gripper(self, *, closed: bool) -> None:
-        """Switches the gripper."""
+        """Switches the gripper; raises StoppedError, and switches nothing, when the arm has been stopped."""
+        self._require_going_on()
         self._controller.set_gripper(closed=closed)
 
     def finish(self) -> None:

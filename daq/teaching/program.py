@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import re
 import tomllib
 from pathlib import Path
 from typing import Annotated, Literal
@@ -11,8 +11,12 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import Angle, Duration, JointNumber
+from daq.teaching.files import write_whole
 from daq.teaching.recording import FASTEST_RATE, RecordedPath
 from daq.trajectories import MOVE_SPEED
+
+NAME = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}"
+"""Of a program, as a regular expression."""
 
 Speed = Annotated[FiniteFloat, Field(gt=0, le=3)]
 Line = Annotated[int, Field(ge=0, le=7)]
@@ -87,7 +91,7 @@ class Program(_Part):
     """Instructions for one machine."""
 
     version: Literal[1] = 1
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
+    name: Annotated[str, Field(pattern=f"^{NAME}$")]
     machine: str = "ma2000"
     notes: str = ""
     instructions: Annotated[tuple[Instruction, ...], Field(min_length=1, max_length=10000)]
@@ -122,10 +126,13 @@ def load_program(path: Path) -> Program:
 
 def save_program(program: Program, path: Path) -> None:
     """Writes the program as JSON, whole or not at all. Raises SpecError with one line."""
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_text(program_text(program), "utf-8")
-        os.replace(part, path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise SpecError(f"{path}: cannot be written: {error}") from error
+    write_whole(path, program_text(program))
+
+
+def require_program_file(path: Path) -> None:
+    """Raises SpecError where a program could not be saved as `path`, whose stem is its name: before there is one."""
+    if re.fullmatch(NAME, path.stem) is None:
+        rule = "a name has 1 to 64 letters, digits, _ . or -, and begins with a letter or digit"
+        raise SpecError(f"program {path.stem!r}: {rule}")
+    if not path.absolute().parent.is_dir():
+        raise SpecError(f"program {path}: its folder does not exist")

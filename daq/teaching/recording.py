@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path as FilePath
 from typing import Annotated, Self
 
 import numpy as np
@@ -9,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import Angle, ExperimentSpec, JointNumber, Path
+from daq.teaching.files import write_whole
 
 FASTEST_RATE = 10.0
 """Highest factor by which a path may be played faster than it was led: limits decide earlier."""
@@ -76,3 +78,8 @@ def playback(path: RecordedPath, rate: float = 1.0, name: str | None = None) -> 
         raise SpecError(f"rate of {rate}: must be above 0 and at most {FASTEST_RATE:g}")
     times = tuple(time / rate for time in path.times)
     return ExperimentSpec(trajectory=Path(times=times, positions=path.positions), joints=path.joints, name=name)
+
+
+def save_path(path: RecordedPath, file: FilePath) -> None:
+    """Writes a path as JSON, whole or not at all. Raises SpecError with one line."""
+    write_whole(file, path.model_dump_json(indent=1) + "\n")

@@ -9,6 +9,7 @@ from model.comparison.compare import Comparison
 from model.comparison.difference import ParameterDifference
 from model.reports.motion import ROLES, agreement_table, motion_section
 from model.reports.page import Cell, Report, Section, Table, cells, listed, spoken
+from model.reports.units import squared
 
 
 def comparison_report(found: Comparison, differences: Sequence[ParameterDifference] = ()) -> Report:
@@ -36,7 +37,7 @@ def _title(labels: Sequence[str]) -> str:
 def _answer(models: Sequence[ModelAgreement]) -> str:
     ranked = sorted(models, key=total_error)
     best = ranked[0]
-    text = f"{best.label}: mean squared error {total_error(best):.4g} rad² summed over the joints"
+    text = f"{best.label}: mean squared error {total_error(best):.4g} {_unit(best)} summed over the joints"
     if len(ranked) == 1:
         return f"{text}."
     others = ", ".join(f"{m.label} {total_error(m) / total_error(best):.3g} times" for m in ranked[1:])
@@ -44,9 +45,13 @@ def _answer(models: Sequence[ModelAgreement]) -> str:
 
 
 def total_error(model: ModelAgreement) -> float:
-    """Held-out traces count alone where there are any; rad²."""
+    """Held-out traces count alone where there are any; the square of the joints' unit."""
     held = model.mean_squared_error("held_out")
     return held if held is not None else model.mean_squared_error("in_sample") or 0.0
+
+
+def _unit(model: ModelAgreement) -> str:
+    return squared(joint.unit for trace in model.traces for joint in trace.joints)
 
 
 def _squared_errors(models: Sequence[ModelAgreement]) -> Table:
@@ -59,7 +64,7 @@ def _squared_errors(models: Sequence[ModelAgreement]) -> Table:
         ))  # fmt: skip
     return Table(
         ("trace", "", *(m.label for m in models)), tuple(rows),
-        "Mean squared error summed over the joints, rad² (equation 4.70 of the source).",
+        f"Mean squared error summed over the joints, {_unit(models[0])} (equation 4.70 of the source).",
     )  # fmt: skip
 
 

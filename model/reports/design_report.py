@@ -13,8 +13,9 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import NoController
 from model.design.information import InformationGain, ParameterGain
 from model.machine_model.model import Model
-from model.reports.figures import COLOURS, QUIET, drawn, panels, shown_unit, thinned
+from model.reports.figures import COLOURS, QUIET, drawn, panels, thinned
 from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, cells, listed, spoken
+from model.reports.units import joint_unit, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -123,7 +124,7 @@ def _experiment(one: PlannedExperiment, model: Model) -> tuple[Text | Picture, .
         axes = panels(figure, 1, 1)[0][0]
         units = set()
         for joint in machine.modelled_joints:
-            factor, unit = shown_unit("rad" if machine.joint(joint).kind == "revolute" else "m")
+            factor, unit = shown_unit(joint_unit(machine, joint))
             units.add(unit)
             signal = one.set_points[:, joint - 1] * factor
             time, wanted = thinned(np.asarray(period * np.arange(len(signal)), dtype=np.float64), signal)

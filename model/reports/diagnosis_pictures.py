@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
 from model.discrepancy.answer import Candidate, Dependence, Phase, PhaseCell, RemainingShape, SignalError, Where
 from model.discrepancy.where_statistics import chance_significance
-from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels, shown_unit
+from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels
 from model.reports.page import Picture
+from model.reports.units import shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -174,26 +175,27 @@ def error_picture(fit: Sequence[SignalError], held: Sequence[SignalError]) -> Pi
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     groups = [("fitted to", fit)] + ([("held out", held)] if held else [])
+    units = {shown_unit(e.unit)[1] for e in (*fit, *held)}
 
     def draw(figure: Figure) -> None:
         axes = panels(figure, 1, len(groups), sharex=True, sharey=True)[0]
         for place, (name, errors) in zip(axes, groups, strict=True):
             for row, e in enumerate(reversed(errors)):
-                factor, unit = shown_unit(e.unit)
+                factor = shown_unit(e.unit)[0]
                 colour = COLOURS[(e.joint - 1) % len(COLOURS)]
                 before, after, floor = (factor * v for v in (e.before, e.after, e.floor))
                 place.plot([before, after], [row, row], color=colour, lw=1.6, solid_capstyle="butt", alpha=0.55)
                 place.plot([before], [row], "o", mfc="none", color=colour, ms=5.5)
                 place.plot([after], [row], "o", color=colour, ms=5.5)
                 place.plot([floor], [row], "|", color=INK, ms=13, mew=1.2)
-            place.set_yticks(range(len(errors)), [f"joint {e.joint}" for e in reversed(errors)])
+            place.set_yticks(range(len(errors)), [_row_name(e, units) for e in reversed(errors)])
             place.set_ylim(-0.6, len(errors) - 0.4)
             place.set_xscale("log")
             place.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
             place.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             place.xaxis.set_minor_locator(NullLocator())
             place.set_title(name)
-            place.set_xlabel(f"rms error / {unit}")
+            place.set_xlabel(f"rms error / {', '.join(units) if len(units) == 1 else 'unit of the joint'}")
             place.grid(visible=False, axis="y")
         marks = (("before", "o", "none"), ("after", "o", INK), ("noise floor", "|", INK))
         handles = [Line2D([], [], marker=m, mfc=fill, color=INK, ls="", ms=5.5, label=name) for name, m, fill in marks]
@@ -201,6 +203,11 @@ def error_picture(fit: Sequence[SignalError], held: Sequence[SignalError]) -> Pi
 
     caption = "Root mean square of measured − simulated before the step (ring) and after it (dot); the bar is noise."
     return Picture(drawn(draw, 0.85 + 0.24 * len(fit)), caption)
+
+
+def _row_name(e: SignalError, units: Collection[str]) -> str:
+    """A joint, with its unit where the axis is of several."""
+    return f"joint {e.joint}" if len(units) == 1 else f"joint {e.joint} / {shown_unit(e.unit)[1]}"
 
 
 def remaining_picture(shapes: Sequence[RemainingShape]) -> Picture:
@@ -222,7 +229,8 @@ def remaining_picture(shapes: Sequence[RemainingShape]) -> Picture:
                 place.errorbar(x, y, e, fmt="o-", ms=3, lw=1.0, color=COLOURS[(one.joint - 1) % len(COLOURS)])
             place.set_title(f"joint {one.joint}: explains {100 * one.explained:.0f} %", fontsize=7.4)
             place.set_xlabel(QUANTITIES[one.against] + ("" if unit == "1" else f" / {unit}"))
-        axes[0].set_ylabel(f"torque / {shown[0].torque_unit}")
+            if place is axes[0] or one.torque_unit != shown[0].torque_unit:
+                place.set_ylabel(f"{'force' if one.torque_unit == 'N' else 'torque'} / {one.torque_unit}")
 
     caption = (
         "The torque at a joint that would leave what is left, in bins of what it goes with, with one standard "

@@ -15,9 +15,9 @@ from model.reports.diagnosis_pictures import (
     map_picture,
     remaining_picture,
 )
-from model.reports.figures import shown_unit
 from model.reports.motion import motion_section
 from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, cells, html, listed, spoken
+from model.reports.units import shown_unit, with_unit
 
 VERDICTS = {
     "nothing-significant": "nothing significant: the model explains these traces within their noise",
@@ -175,8 +175,7 @@ def _errors(step: Step) -> Table:
 
 def _error_row(kind: str, e: SignalError) -> tuple[Cell, ...]:
     factor, unit = shown_unit(e.unit)
-    gap = "" if unit.startswith("°") else " "
-    sizes = (f"{v * factor:.4g}{gap}{unit}" for v in (e.before, e.after, e.floor))
+    sizes = (with_unit(f"{v * factor:.4g}", unit) for v in (e.before, e.after, e.floor))
     return (Cell(kind), *cells(str(e.joint), *sizes, _gone(e)))
 
 

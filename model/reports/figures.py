@@ -67,13 +67,6 @@ def thinned(time: Floats, *signals: Floats, most: int = 1500) -> tuple[Floats, .
     return (time[::stride], *(s[::stride] for s in signals))
 
 
-def shown_unit(unit: str) -> tuple[float, str]:
-    """Factor and name of the unit in which people read: degrees, millimetres."""
-    known = {"rad": (180 / np.pi, "°"), "m": (1e3, "mm"), "rad/s": (180 / np.pi, "°/s"), "m/s": (1e3, "mm/s")}
-    factor, name = known.get(unit, (1.0, unit))
-    return float(factor), name
-
-
 def panels(figure: Figure, rows: int, columns: int, **options: Any) -> Any:
     """Axes (rows, columns), never squeezed."""
     return figure.subplots(rows, columns, squeeze=False, **options)

@@ -15,10 +15,10 @@ from model.reports.figures import (
     baseline,
     drawn,
     panels,
-    shown_unit,
     thinned,
 )  # fmt: skip
 from model.reports.page import Cell, Picture, Section, Table, cells
+from model.reports.units import shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,14 +38,17 @@ def motion_section(signals: Sequence[TraceSignals], labels: Sequence[str], most:
 def _picture(one: TraceSignals, labels: Sequence[str]) -> Picture:
     bands = -(-len(one.joints) // ABREAST)
 
+    alike = len(set(one.units)) == 1
+
     def draw(figure: Figure) -> None:
         columns = min(ABREAST, len(one.joints))
         axes = panels(figure, 2 * bands, columns, sharex=True, height_ratios=[1.5, 1.0] * bands)
         for column, joint in enumerate(one.joints):
             band, place = divmod(column, ABREAST)
-            _joint(axes[2 * band][place], axes[2 * band + 1][place], one, column, joint, labels, first=column == 0)
+            first = column == 0 or not alike
+            _joint(axes[2 * band][place], axes[2 * band + 1][place], one, column, joint, labels, first=first)
         widest = max(float(abs(one.measured - s).max()) for s in one.simulated) * shown_unit(one.units[0])[0]
-        if len(set(one.units)) == 1:
+        if alike:
             for row in axes[1::2].flat:
                 row.set_ylim(-1.08 * widest, 1.08 * widest)
         handles, names = axes[0][0].get_legend_handles_labels()

@@ -9,6 +9,7 @@ import numpy as np
 
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels, thinned
 from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, Tone, cells, listed
+from model.reports.units import joint_unit, squared
 from model.validation.criterion import Curve, Fidelity
 from model.validation.variation import TimeDomain, Variation
 
@@ -16,26 +17,34 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from daq.contracts.machine import Machine
+
 CURVES_ABREAST = 4
 VARIATIONS_SHOWN = 8
 """In time, those that explain most of what is left."""
 
 
-def validation_report(label: str, found: tuple[Fidelity, Fidelity], in_time: Sequence[TimeDomain]) -> Report:
-    """The page of a validation; `found` in the source's convention of τ′ and in that of three standard deviations."""
+def validation_report(
+    label: str, found: tuple[Fidelity, Fidelity], in_time: Sequence[TimeDomain], machine: Machine
+) -> Report:
+    """The page of a validation; `found` in the source's convention of τ′ and in that of three standard deviations.
+
+    machine: of the model; it tells the units of its joints.
+    """
     source, three = found
     sections = [
         Section("What would have to move", (_distortion_table(source, three), _contribution_picture(source, three))),
         *([Section("How the error grows", (_curves(source),))] if source.curves else []),
-        *(_in_time(one) for one in in_time),
+        *(_in_time(one, machine) for one in in_time),
     ]
     if source.notes:
         sections.append(Section("Remarks", (Points(source.notes),)))
     joints = ", ".join(f"joint {j}: {e:.3g}" for j, e in zip(source.outputs, source.error_by_joint, strict=True))
+    unit = squared(joint_unit(machine, joint) for joint in source.outputs)
     facts = (
         ("model", f"{label}, {source.model}"),
         ("traces", listed(source.traces)),
-        ("squared error", f"{source.error:.4g} rad² ({joints})"),
+        ("squared error", f"{source.error:.4g} {unit} ({joints})"),
         ("Σλ²", f"{source.sum_of_contributions:.4f} with τ′ = â/(3√2), {three.sum_of_contributions:.4f} with τ′ = â/3"),
         ("damping ratio", f"{source.damping_ratio:g}, of the associate system"),
     )
@@ -139,7 +148,7 @@ def _short(name: str) -> str:
     return name if len(name) < 22 else f"{head}.\n{tail}"
 
 
-def _in_time(one: TimeDomain) -> Section:
+def _in_time(one: TimeDomain, machine: Machine) -> Section:
     shown = sorted(one.parameters, key=lambda v: -v.alone_varying)[:VARIATIONS_SHOWN]
     blocks: list[Text | Table | Picture | Points] = [
         Text(
@@ -147,7 +156,7 @@ def _in_time(one: TimeDomain) -> Section:
             "noise says which term is wrong, when, and what it goes with."
         ),
         _variation_table(one),
-        _residual_picture(one),
+        _residual_picture(one, machine),
         _variation_picture(one, shown),
     ]
     if one.notes:
@@ -174,9 +183,12 @@ def _variation_table(one: TimeDomain) -> Table:
     )
 
 
-def _residual_picture(one: TimeDomain) -> Picture:
+def _residual_picture(one: TimeDomain, machine: Machine) -> Picture:
+    units = [f"{joint_unit(machine, j.joint)}/s²" for j in one.joints]
+    alike = len(set(units)) == 1
+
     def draw(figure: Figure) -> None:
-        axes = panels(figure, 1, len(one.joints), sharey=True)[0]
+        axes = panels(figure, 1, len(one.joints), sharey=alike)[0]
         for place, joint in enumerate(one.joints):
             time, values = thinned(np.array(one.time), _numbers(joint.values))
             axes[place].axhspan(-2 * joint.noise, 2 * joint.noise, color=QUIET, alpha=0.16, lw=0)
@@ -184,7 +196,8 @@ def _residual_picture(one: TimeDomain) -> Picture:
             axes[place].plot(time, values, color=COLOURS[(joint.joint - 1) % len(COLOURS)], lw=0.9)
             axes[place].set_title(f"joint {joint.joint}")
             axes[place].set_xlabel("time / s")
-        axes[0].set_ylabel("measured − expected / rad/s²")
+            if place == 0 or not alike:
+                axes[place].set_ylabel(f"measured − expected / {units[place]}")
 
     told = [
         f"joint {j.joint}: {', '.join(f'{c.regressor} of joint {c.joint} ({c.value:+.2f})' for c in strong)}"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.fitting.choice import chosen_unknowns
@@ -26,7 +26,7 @@ from model.fitting.whitening import fitted_whitener, white
 from model.identifiability.report import IdentifiabilityReport, judged
 from model.machine_model.model import Lineage, Model
 from model.torque_space.problem import TorqueProblem
-from model.torque_space.recorded_motion import CUTOFF, recorded_motion
+from model.torque_space.recorded_motion import CUTOFF, RecordedMotion, recorded_motion
 
 Floats = NDArray[np.float64]
 
@@ -98,7 +98,8 @@ def fit_torques(
     records_of([*traces, *held_out], model.machine, "position")
     unknowns = chosen_unknowns(model, options)
     progress(0.0, "low-passing the records")
-    records = tuple(recorded_motion(model, t, cutoff) for t in traces)
+    records = tuple(_recorded(model, t, cutoff) for t in traces)
+    judged_by = [_recorded(model, t, cutoff) for t in held_out]
     problem = TorqueProblem(model, records, unknowns, np.ones(model.joint_count))
     begin = np.array([u.start for u in unknowns])
     scale = _left(problem, begin)
@@ -111,8 +112,10 @@ def fit_torques(
     parameters, report = _judged(problem, found.values, options)
     fitted = model.with_values({u.name: float(v) for u, v in zip(unknowns, found.values, strict=True)})
     names = tuple(t.record.trace_id for t in traces)
-    errors = [_error(problem, found.values, t, model, cutoff, held=False) for t in traces]
-    errors += [_error(problem, found.values, t, model, cutoff, held=True) for t in held_out]
+    errors = [_error(problem, found.values, n, r, held=False) for n, r in zip(names, records, strict=True)]
+    errors += [
+        _error(problem, found.values, t.record.trace_id, r, held=True) for t, r in zip(held_out, judged_by, strict=True)
+    ]
     own = [u.name for u in unknowns]
     lineage = Lineage(parent=model.identity, traces=names, fit={"fitted": own, "known": list(report.known)})
     progress(1.0, "done")
@@ -122,6 +125,14 @@ def fit_torques(
         in_sample=_share(errors[: len(traces)]), held_out=_share(errors[len(traces) :]) if held_out else None,
         cutoff=cutoff, evaluations=found.evaluations, converged=found.converged,
     )  # fmt: skip
+
+
+def _recorded(model: Model, trace: Trace, cutoff: float) -> RecordedMotion:
+    """The motion of a trace with its torque. Raises TraceError where there is none, which nothing can be a share of."""
+    record = recorded_motion(model, trace, cutoff)
+    if not record.torque[record.kept].any():
+        raise TraceError(f"trace {trace.record.trace_id}: its drive is 0 throughout, so it has no torque to fit to")
+    return record
 
 
 def _left(problem: TorqueProblem, values: Floats) -> Floats:
@@ -161,15 +172,14 @@ def _judged(
 
 
 def _error(
-    problem: TorqueProblem, values: Floats, trace: Trace, model: Model, cutoff: float, *, held: bool
+    problem: TorqueProblem, values: Floats, trace: str, record: RecordedMotion, *, held: bool
 ) -> tuple[TorqueError, float, float]:
     """The error of one trace, and the sums of squares of residual and torque."""
-    record = recorded_motion(model, trace, cutoff)
     left = problem.with_records([record]).evaluate(values, derivatives=False)[0].residual
     torque = record.torque[record.kept]
     squares, whole = float((left**2).sum()), float((torque**2).sum())
     error = TorqueError(
-        trace=trace.record.trace_id, held_out=held, rms=_rms(left), torque=_rms(torque),
+        trace=trace, held_out=held, rms=_rms(left), torque=_rms(torque),
         share=float(np.sqrt(squares / whole)),
     )  # fmt: skip
     return error, squares, whole

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from starlette.requests import HTTPConnection
 
@@ -12,10 +12,14 @@ from server.problems import ProblemError
 
 @dataclass(frozen=True)
 class Caller:
-    """A person or program. `name` is their token's; `local` where no tokens are configured."""
+    """A person or program. `name` is their token's; `local` for a user of this computer, who needs none.
+
+    token: the hash of the token that let them in; None where none was needed
+    """
 
     name: str
     role: Role
+    token: str | None = field(default=None, compare=False, repr=False)
 
     @property
     def may_operate(self) -> bool:
@@ -24,7 +28,7 @@ class Caller:
 
 
 LOCAL = Caller("local", "operator")
-"""Whoever reaches a service on loopback that has no tokens: a user of this computer."""
+"""Whoever reaches a service on loopback without a token and without a proxy: a user of this computer."""
 
 
 def caller_of(connection: HTTPConnection) -> Caller | None:

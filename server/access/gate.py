@@ -7,7 +7,8 @@ import logging
 import re
 import secrets
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from urllib.parse import parse_qs
 
@@ -20,7 +21,7 @@ from server import logs
 from server.access.caller import LOCAL, Caller, token_needed
 from server.access.headers import secure
 from server.access.limits import LARGEST_BODY, Buckets, counted
-from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_known_name
+from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_known_name, is_this_computers_user
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
 from server.problems import ProblemError, response
@@ -30,6 +31,8 @@ STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
 UPLOADS = re.compile(r"/api/v1/robots/[^/]+/(traces|models)")
 """Addresses whose POST takes a file, and counts its bytes itself."""
 NOT_ALLOWED = 1008
+LOOK_EVERY = 1.0
+"""s between two looks at whether the token of whoever holds a WebSocket has been revoked."""
 log = logging.getLogger("server.access")
 
 
@@ -37,7 +40,7 @@ log = logging.getLogger("server.access")
 class Gate:
     """Decides who a caller is and whether a request goes on.
 
-    open_on_loopback: whether whoever reaches this service without a token is an operator: it listens at loopback alone
+    open_on_loopback: whether this computer's users are operators without a token: the service listens at loopback alone
     stop_port:        of the stop listener, which the page may ask for a stop, too
     observed:         called with method, status and seconds of every request
     """
@@ -66,6 +69,7 @@ class Gate:
     async def _http(self, app: ASGIApp, scope: Scope, receive: Receive, send: Send) -> None:
         begun = time.perf_counter()
         state = scope.setdefault("state", {})
+        state["arrived"] = time.monotonic()
         state["request_id"] = request_id = secrets.token_hex(8)
         logs.request_id.set(request_id)
         status = 500
@@ -103,7 +107,28 @@ class Gate:
             log.warning("refused a WebSocket: %s", problem.detail)
             await WebSocketClose(NOT_ALLOWED, problem.detail)(scope, receive, send)
             return
-        await app(scope, receive, send)
+        caller = state["caller"]
+        if caller is None or caller.token is None:
+            await app(scope, receive, send)
+        elif not await self._while_let_in(caller, app(scope, receive, send)):
+            log.info("closed a WebSocket: the token of %s was revoked", caller.name)
+            with suppress(TimeoutError):  # of a client that reads nothing: its connection ends when this returns
+                async with asyncio.timeout(LOOK_EVERY):
+                    await WebSocketClose(NOT_ALLOWED, "this token was revoked")(scope, receive, send)
+
+    async def _while_let_in(self, caller: Caller, serving: Awaitable[None]) -> bool:
+        """Serves until the end, or until the caller's token is revoked: False then."""
+        task = asyncio.ensure_future(serving)
+        try:
+            while not (await asyncio.wait({task}, timeout=LOOK_EVERY))[0]:
+                if not await self.tokens.still_let_in(caller):
+                    return False
+            task.result()
+            return True
+        finally:
+            if not task.done():
+                task.cancel()
+                await asyncio.gather(task, return_exceptions=True)
 
     async def _admit(self, scope: Scope) -> Caller | None:
         """Who calls. Raises a 401, 403, 413 or 429."""
@@ -140,11 +165,11 @@ class Gate:
             ticket = parse_qs(scope["query_string"].decode("latin-1")).get("ticket")
             if ticket:
                 caller = self.tickets.take(ticket[0])
-                if caller is None:
-                    line = "this ticket was used, or is too old"
+                if caller is None or not await self.tokens.still_let_in(caller):
+                    line = "this ticket was used, is too old, or its token was revoked"
                     raise ProblemError(401, "ticket-unknown", line, "ask for a new one")
                 return caller
-        return LOCAL if self.open_on_loopback else None
+        return LOCAL if self.open_on_loopback and is_this_computers_user(headers) else None
 
     def _count(self, caller: Caller | None, scope: Scope) -> None:
         address = scope["client"][0] if scope.get("client") else ""

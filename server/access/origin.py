@@ -14,6 +14,8 @@ from urllib.parse import urlsplit
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 NAME = re.compile(r"[a-z0-9.-]+|\[[0-9a-f:.]+\]")
 LOOPBACK_NAMES = ("localhost", "localhost.localdomain")
+HANDED_ON = ("forwarded", "via", "x-real-ip")
+"""Headers of a proxy, and each that begins with X-Forwarded-."""
 
 
 def is_loopback(host: str) -> bool:
@@ -48,6 +50,13 @@ def is_known_name(host_header: str, names: Collection[str], *, loopback_only: bo
     except ValueError:
         return False
     return True
+
+
+def is_this_computers_user(headers: Mapping[str, str]) -> bool:
+    """Whether a request that came over loopback is from this computer: it asks for a loopback name, and no proxy says
+    that it has handed it on. `headers` by name in small letters."""
+    proxied = any(name in HANDED_ON or name.startswith("x-forwarded-") for name in headers)
+    return is_loopback(name_of(headers.get("host", ""))) and not proxied
 
 
 def beside(host_header: str, port: int) -> str | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from urllib.parse import urlsplit
 
 from server.access.caller import LOCAL, Caller
-from server.access.origin import is_known_name, name_of
+from server.access.origin import is_known_name, is_this_computers_user, name_of
 from server.access.tokens import KnownTokens
 from server.problems import ProblemError
 
@@ -32,7 +32,7 @@ class StopGate:
             raise ProblemError(403, "other-origin", line, "use the page that this service serves")
         kind, _, token = headers.get("authorization", "").partition(" ")
         if not token or kind.lower() != "bearer":
-            if self.open_on_loopback:
+            if self.open_on_loopback and is_this_computers_user(headers):
                 return LOCAL
             advice = "send the header Authorization: Bearer TOKEN; `daq token add` makes one"
             raise ProblemError(401, "token-needed", "this service needs a token", advice)

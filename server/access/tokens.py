@@ -5,6 +5,7 @@ They have 256 random bits, so a plain hash is enough: there is nothing to guess,
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import secrets
 import threading
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from sqlalchemy import select
+from sqlalchemy.exc import SQLAlchemyError
 
 from daq.contracts.errors import SpecError
 from daq.contracts.service.queue import Role
@@ -76,7 +78,7 @@ class TokenStore:
         """Whose token this is; None for one that is not known, or revoked."""
         with self._store.reading() as session:
             row = session.scalar(select(TokenRow).filter_by(digest=digest, revoked=None))
-            return None if row is None else Caller(row.name, _role(row.role))
+            return None if row is None else Caller(row.name, _role(row.role), digest)
 
 
 class KnownTokens:
@@ -90,15 +92,32 @@ class KnownTokens:
 
     def remembered(self, token: str) -> tuple[bool, Caller | None]:
         """Whether it was looked up lately, and whose it is."""
+        return self._remembered(digest_of(token))
+
+    def look_up(self, token: str) -> Caller | None:
+        """Whose it is, from the database."""
+        return self._look_up(digest_of(token))
+
+    async def still_let_in(self, caller: Caller) -> bool:
+        """Whether the token that let somebody in does so still. From the event loop."""
+        if caller.token is None:
+            return True
+        known, found = self._remembered(caller.token)
+        if not known:
+            try:
+                found = await asyncio.to_thread(self._look_up, caller.token)
+            except SQLAlchemyError:  # asked again soon: nobody loses sight of the arm because a disk is busy
+                return True
+        return found == caller
+
+    def _remembered(self, digest: str) -> tuple[bool, Caller | None]:
         with self._lock:
-            found = self._known.get(digest_of(token))
+            found = self._known.get(digest)
         if found is None or found[1] <= self._clock.monotonic():
             return False, None
         return True, found[0]
 
-    def look_up(self, token: str) -> Caller | None:
-        """Whose it is, from the database."""
-        digest = digest_of(token)
+    def _look_up(self, digest: str) -> Caller | None:
         caller = self._tokens.caller(digest)
         with self._lock:
             if len(self._known) >= MOST_REMEMBERED:

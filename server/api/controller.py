@@ -20,7 +20,7 @@ OutputNumber = Annotated[int, Path(ge=0, le=7)]
 @router.get("/gains")
 def get_gains(one: RobotPart, _: Viewer) -> JointGains:
     """P, I, D of every joint as the controller has them now."""
-    return JointGains.model_validate(answer_of(one.robot.ask(ReadGains)).data)
+    return JointGains.model_validate(answer_of(one.robot, ReadGains).data)
 
 
 @router.put("/gains")
@@ -33,7 +33,7 @@ def set_gains(
     for joint in request.gains:
         if joint > count:
             raise SpecError(f"gains.{joint}: {one.robot.machine.name} has joints 1 to {count}")
-    gains = JointGains.model_validate(answer_of(one.robot.ask(WriteGains, gains=request.gains)).data)
+    gains = JointGains.model_validate(answer_of(one.robot, WriteGains, gains=request.gains).data)
     told = ", ".join(f"joint {joint}: {'/'.join(map(str, gain))}" for joint, gain in sorted(request.gains.items()))
     found.tell(one.robot.name, "gains", f"gains set: {told}", actor=who.name)
     return gains
@@ -42,7 +42,7 @@ def set_gains(
 @router.get("/process")
 def get_process(one: RobotPart, _: Viewer) -> ProcessState:
     """Process inputs and outputs, and the gripper."""
-    return _process(answer_of(one.robot.ask(ReadProcess)))
+    return _process(answer_of(one.robot, ReadProcess))
 
 
 @router.put("/process/outputs/{output}")
@@ -51,14 +51,14 @@ def set_output(
 ) -> ProcessState:
     """Switches one process output, 0 to 7."""
     one.require_motion(lease)
-    return _process(answer_of(one.robot.ask(WriteOutput, output=output, on=request.on)))
+    return _process(answer_of(one.robot, WriteOutput, output=output, on=request.on))
 
 
 @router.put("/gripper")
 def set_gripper(request: GripperRequest, one: RobotPart, _: Operator, lease: LeaseHeader = None) -> ProcessState:
     """Closes or opens the gripper."""
     one.require_motion(lease)
-    return _process(answer_of(one.robot.ask(MoveGripper, closed=request.closed)))
+    return _process(answer_of(one.robot, MoveGripper, closed=request.closed))
 
 
 def _process(answer: Answer) -> ProcessState:

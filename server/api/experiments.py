@@ -24,7 +24,7 @@ from daq.trajectories import Plan, plan, start_angles
 from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
-from server.queue.length import LONGEST, longest_length
+from server.queue.length import LONGEST, least_length
 from server.queue.room import require_room
 from server.services import RobotServices
 
@@ -123,7 +123,7 @@ def cancel_experiment(experiment: Identity, one: RobotPart, who: Operator) -> Ex
 
 def _planned(one: RobotServices, spec: ExperimentSpec) -> Plan:
     """Raises SpecError, and a 422 for what is too long to be planned."""
-    length = longest_length(spec)
+    length = least_length(spec)
     if length > LONGEST:
         line = f"spec: takes {length / 3600:.1f} h, allowed are {LONGEST / 3600:g} h"
         raise ProblemError(422, "beyond-limits", line, "make a schedule of shorter ones")

@@ -80,7 +80,7 @@ def change_schedule(
     schedule: Identity, change: ScheduleChange, one: RobotPart, found: ServicesPart, who: Operator
 ) -> Schedule:
     """Switches a schedule on or off."""
-    changed = found.schedules.switch(one.robot.name, schedule, active=change.active)
+    changed = found.schedules.switch(one.robot.name, schedule, active=change.active, now=found.clock.utc())
     state = "on" if change.active else "off"
     found.tell(one.robot.name, "schedule", f"schedule {schedule} switched {state}", actor=who.name)
     one.queue.wake()

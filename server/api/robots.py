@@ -77,7 +77,7 @@ def reset_robot(
 ) -> Done:
     """Ends a stop or a fault. Nothing moves; the queue stays paused until it is resumed."""
     one.control.require_free_of_others(lease)
-    text = str(answer_of(one.robot.ask(Reset, here=request.here)).data["text"])
+    text = str(answer_of(one.robot, Reset, here=request.here).data["text"])
     found.tell(one.robot.name, "reset", text, actor=who.name)
     return Done(text=text)
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
 from importlib.metadata import version
 from pathlib import Path
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
-from sqlalchemy import func, select, text
+from sqlalchemy import func, select
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import SQLAlchemyError
 
 from daq.contracts.service.system import Health, Me, StorageStatus, SystemStatus
 from daq.traces.room import RESERVE
+from server.access.caller import caller_of
 from server.api.parts import ServicesPart, Viewer
 from server.problems import PROBLEMS
 from server.services import Services
@@ -22,6 +24,7 @@ from server.store.tables import TraceRow
 plain = APIRouter(tags=["system"])
 router = APIRouter(tags=["system"], responses=PROBLEMS)
 VERSION = version("ma2000-daq")
+NOT_WELL = "not well: a token is needed to be told more"
 
 
 @plain.get("/healthz")
@@ -31,9 +34,14 @@ async def healthz() -> Health:
 
 
 @plain.get("/readyz", responses={503: {"model": Health}})
-def readyz(found: ServicesPart, response: Response) -> Health:
-    """200 while experiments can be taken: database and traces' folder can be written. A robot need not be there."""
+def readyz(request: Request, found: ServicesPart, response: Response) -> Health:
+    """200 while experiments can be taken: database and traces' folder can be written. A robot need not be there.
+
+    What is wrong is told to whoever may see the robot.
+    """
     problems = _checks(found)
+    if caller_of(request) is None:
+        problems = {name: problem and NOT_WELL for name, problem in problems.items()}
     if any(problems[name] for name in ("database", "traces")):
         response.status_code = 503
         return Health(status="not ready", version=VERSION, checks=problems)
@@ -56,8 +64,7 @@ async def get_me(who: Viewer) -> Me:
 def get_system(found: ServicesPart, _: Viewer) -> SystemStatus:
     """The service: version, storage, watchers."""
     folder = found.settings.traces.folder.absolute()
-    url = make_url(found.store.url)
-    file = Path(url.database) if url.get_backend_name() == "sqlite" and url.database else None
+    file = _database_file(found)
     with found.store.reading() as session:
         count = session.scalar(select(func.count()).select_from(TraceRow)) or 0
     return SystemStatus(
@@ -68,7 +75,7 @@ def get_system(found: ServicesPart, _: Viewer) -> SystemStatus:
             traces_free=shutil.disk_usage(folder).free,
             traces_reserve=RESERVE,
             traces=count,
-            database=url.get_backend_name(),
+            database=make_url(found.store.url).get_backend_name(),
             database_size=file.stat().st_size if file is not None and file.is_file() else None,
         ),
         live_clients=sum(one.hub.clients for one in found.robots()),
@@ -81,12 +88,15 @@ def get_system(found: ServicesPart, _: Viewer) -> SystemStatus:
 
 def _checks(found: Services) -> dict[str, str]:
     checks = {"database": "", "traces": ""}
+    file = _database_file(found)
     try:
-        with found.store.reading() as session:
-            session.execute(text("SELECT 1"))
-    except SQLAlchemyError as error:
+        if file is not None:
+            _require_writable(file.parent)
+        found.store.require_writable()
+    except (SQLAlchemyError, OSError) as error:
         checks["database"] = " ".join(str(error).split())[:200]
     try:
+        _require_writable(found.settings.traces.folder)
         free = shutil.disk_usage(found.settings.traces.folder).free
         if free < RESERVE:
             checks["traces"] = f"{free / 1e6:.0f} MB are free, {RESERVE / 1e6:.0f} MB stay free"
@@ -95,3 +105,14 @@ def _checks(found: Services) -> dict[str, str]:
     for one in found.robots():
         checks[f"robot {one.robot.name}"] = one.robot.problem if one.robot.identity is None else ""
     return checks
+
+
+def _require_writable(folder: Path) -> None:
+    """Raises OSError. Nobody sees the file, which has no name."""
+    with tempfile.TemporaryFile(dir=folder) as probe:
+        probe.write(b"written")
+
+
+def _database_file(found: Services) -> Path | None:
+    url = make_url(found.store.url)
+    return Path(url.database) if url.get_backend_name() == "sqlite" and url.database else None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Request, Response
 
 from daq.calibration import gain_experiment, gains_from_trace
 from daq.contracts.errors import SpecError
@@ -18,10 +20,20 @@ from daq.contracts.service.teaching import (
 from daq.teaching import Program
 from daq.teaching.program import Absolute, Instruction, Relative
 from daq.traces.reader import read_trace
-from server.api.parts import Identity, LeaseHeader, Operator, RobotPart, Viewer
+from server.api.experiments import submit_experiment
+from server.api.parts import IdempotencyKey, Identity, LeaseHeader, Operator, RobotPart, ServicesPart, Viewer
 from server.problems import PROBLEMS
 
 router = APIRouter(prefix="/robots/{robot}", tags=["teaching"], responses=PROBLEMS)
+
+
+async def _arrived(request: Request) -> float:
+    """When the request came (s, monotonic): before it waited for anything."""
+    arrived: float = request.state.arrived
+    return arrived
+
+
+Arrived = Annotated[float, Depends(_arrived)]
 
 
 @router.get("/teaching")
@@ -31,10 +43,12 @@ def get_teaching(one: RobotPart, _: Viewer) -> TeachingStatus:
 
 
 @router.post("/teaching/jog")
-def jog_robot(request: JogRequest, one: RobotPart, _: Operator, lease: LeaseHeader = None) -> TeachingStatus:
+def jog_robot(
+    request: JogRequest, one: RobotPart, _: Operator, arrived: Arrived, lease: LeaseHeader = None
+) -> TeachingStatus:
     """Drives joints for 0.3 s at most: whoever holds the key repeats this, ten times a second or so."""
     one.require_motion(lease)
-    one.teaching.jog(dict(request.velocities))
+    one.teaching.jog(dict(request.velocities), arrived)
     return one.teaching.status()
 
 
@@ -77,12 +91,21 @@ def finish_teaching(one: RobotPart, _: Operator, lease: LeaseHeader = None) -> T
     return one.teaching.status()
 
 
-@router.post("/calibrations/gain", status_code=201)
-def calibrate_gain(request: CalibrationRequest, one: RobotPart, who: Operator) -> Experiment:
-    """Queues the experiment that shows the actual proportional gain; GET …/traces/{trace}/gain tells it afterwards."""
+@router.post("/calibrations/gain", status_code=201, response_model=Experiment, responses={200: {"model": Experiment}})
+def calibrate_gain(
+    request: CalibrationRequest,
+    one: RobotPart,
+    found: ServicesPart,
+    who: Operator,
+    response: Response,
+    idempotency_key: IdempotencyKey = None,
+) -> Experiment:
+    """Queues the experiment that shows the actual proportional gain; GET …/traces/{trace}/gain tells it afterwards.
+
+    It is checked as any other, and the same Idempotency-Key gives the same experiment (200).
+    """
     spec = gain_experiment(tuple(sorted(set(request.joints))))
-    experiment, _ = one.queue.submit(ExperimentRequest(spec=spec), who.name, None)
-    return experiment
+    return submit_experiment(ExperimentRequest(spec=spec), one, found, who, response, idempotency_key)
 
 
 @router.get("/traces/{trace}/gain")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from contextlib import closing
+from datetime import UTC, datetime
 from pathlib import Path
 
 from alembic.script import ScriptDirectory
@@ -39,6 +40,19 @@ def revision_of(database: Path) -> str | None:
     except sqlite3.Error as error:
         raise BackupError(f"database {database.name}: is damaged: {error}") from error
     return None if row is None else str(row[0])
+
+
+def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:
+    """The queue of `robot` is paused when a service begins with this database; one that is paused keeps its reason.
+    Raises BackupError."""
+    since = now.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")  # as SQLAlchemy writes it
+    line = "INSERT INTO queues (robot, paused, reason, since) VALUES (?, 1, ?, ?) ON CONFLICT (robot) DO UPDATE"
+    changes = "SET paused = 1, reason = excluded.reason, since = excluded.since WHERE NOT paused"
+    try:
+        with closing(sqlite3.connect(database)) as connection, connection:
+            connection.execute(f"{line} {changes}", (robot, reason, since))
+    except sqlite3.Error as error:
+        raise BackupError(f"database {database.name}: its queue cannot be paused: {error}") from error
 
 
 def require_known(revision: str | None) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from daq.traces import disk
 from daq.traces.layout import PART_SUFFIX, SUFFIX
-from server.backup.database import require_known, revision_of
+from server.backup.database import hold_queue, require_known, revision_of
 from server.backup.manifest import Entry, Manifest, Progress, check, opened, pieces, verify
 from server.backup.places import DATABASE, BackupError, Places
 from server.backup.write import RESERVE
@@ -53,7 +53,7 @@ def restore(archive: Path, places: Places, now: datetime, progress: Progress, *,
             names = ", ".join(str(path) for path in there[:3]) + (", …" if len(there) > 3 else "")
             line = f"{len(there)} files or folders are there already ({names})"
             raise BackupError(f"{line}: with --overwrite they are put aside; nothing was changed")
-        staged = _Staged(archive, places)
+        staged = _Staged(archive, places, now)
         try:
             staged.write(manifest, lambda f, text: progress(CHECK_SHARE + (WRITE_SHARE - CHECK_SHARE) * f, text))
             aside = _put_aside(there, now)
@@ -76,8 +76,9 @@ def occupied(places: Places) -> list[Path]:
 class _Staged:
     """Files on their way: beside their places, on the same disk, so that moving them in is renaming."""
 
-    def __init__(self, archive: Path, places: Places) -> None:
+    def __init__(self, archive: Path, places: Places, now: datetime) -> None:
         self._archive = archive
+        self._now = now
         self._places = places
         self._moves: list[tuple[Path, Path]] = []
         self._folders = {folder / STAGING for folder in (places.database.parent, places.traces, places.service)}
@@ -96,6 +97,9 @@ class _Staged:
                 done += entry.size
         if revision_of(self._staged(DATABASE)) != manifest.revision:
             raise BackupError(f"{self._archive}: its database is not the one that its list tells of")
+        if manifest.revision is not None:
+            line = "restored from a backup: look at the arm, then resume the queue"
+            hold_queue(self._staged(DATABASE), manifest.robot, line, self._now)
 
     def move_in(self) -> None:
         """Every file to its place, and the names to the disk."""

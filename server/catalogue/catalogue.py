@@ -63,11 +63,16 @@ class Catalogue:
             return taken
 
     def remove(self, identity: str) -> Path:
-        """Takes a trace away for good; where its file was. Raises a 404, and a 409 when something refers to it."""
-        path = self.path_of(identity)
-        with self._lock:
-            self._traces.remove(self._robot, identity)
+        """Takes a trace away for good, also one whose file is gone already; where its file was. Raises a 404, a 409
+        when something refers to it, and OSError where the file cannot be taken away: nothing has changed then."""
+        path = self.folder / self._traces.file_of(self._robot, identity)
+
+        def take_away() -> None:
             path.unlink(missing_ok=True)
+            disk.sync_folder(self.folder)
+
+        with self._lock:
+            self._traces.remove(self._robot, identity, take_away)
         return path
 
     def path_of(self, identity: str) -> Path:
@@ -75,7 +80,8 @@ class Catalogue:
         name = self._traces.file_of(self._robot, identity)
         path = self.folder / name
         if not path.is_file():
-            raise not_found(f"file for trace {identity!r} any more", "it was taken out of the folder of traces")
+            advice = "it was taken out of the folder of traces: upload it again, or delete it"
+            raise not_found(f"file for trace {identity!r} any more", advice)
         return path
 
     def _take_in(self, path: Path) -> bool:
@@ -113,7 +119,8 @@ class Catalogue:
                     operator=summary.operator,
                     experiment=self._experiments.of_trace(summary.trace_id),
                     notes=summary.notes,
-                )
+                ),
+                lambda file: (self.folder / file).is_file(),
             )
         except ProblemError as error:
             log.warning("not in the catalogue: %s: %s", path, error)

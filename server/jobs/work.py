@@ -144,7 +144,7 @@ class _Worker:
             three_sigma=three.model_copy(update={"curves": ()}),
             time_domain=tuple(thinned_variation(one) for one in in_time),
         )
-        report = validation_report(self._name(request.model), (fidelity, three), in_time)
+        report = validation_report(self._name(request.model), (fidelity, three), in_time, model.machine)
         return self._done(ValidationJobResult(id=self._job, data=data), report, of_validation(fidelity))
 
     def compare(self, request: CompareRequest) -> Ended:

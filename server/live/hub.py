@@ -39,7 +39,7 @@ log = logging.getLogger("server.live")
 
 @dataclass(eq=False)
 class Client:
-    """One WebSocket."""
+    """One WebSocket; or an answer that waits for news, which is nobody who `watches`."""
 
     outbox: Outbox
     name: str
@@ -47,6 +47,7 @@ class Client:
     every: int = 1
     """Every how manieth sample it gets."""
     something: asyncio.Event = field(default_factory=asyncio.Event)
+    watches: bool = True
 
 
 class Hub:
@@ -95,7 +96,7 @@ class Hub:
     @property
     def clients(self) -> int:
         """How many watch."""
-        return len(self._clients)
+        return sum(client.watches for client in self._clients)
 
     def join(self, client: Client) -> None:
         """From now on it hears what it has asked for."""
@@ -108,7 +109,7 @@ class Hub:
     @contextmanager
     def listening(self, topics: set[Topic]) -> Iterator[asyncio.Event]:
         """An event that is set whenever there is news of these topics: for whoever waits without a WebSocket."""
-        client = Client(Outbox(self._clock.monotonic()), "waiting", topics)
+        client = Client(Outbox(self._clock.monotonic()), "waiting", topics, watches=False)
         self.join(client)
         try:
             yield client.something

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from contextlib import suppress
 
 from fastapi import WebSocket, WebSocketDisconnect
 from fastapi.concurrency import run_in_threadpool
@@ -18,6 +19,8 @@ from server.problems import ProblemError, field_of
 from server.services import RobotServices
 
 BASE_RATE = 50
+WAITING_MESSAGES = 64
+"""Messages of a client that may wait to be carried out: what holds a key sends ten a second (an assumption)."""
 TOO_SLOW = 1013
 """Close code: try again later."""
 GOING_AWAY = 1001
@@ -25,6 +28,8 @@ LOOK_EVERY = 1.0
 """s between two looks at whether a client that takes nothing is to be dropped."""
 ADVICE = "docs/service.md tells what this socket takes"
 log = logging.getLogger("server.live")
+Heard = tuple[str | None, float]
+"""A message's text, None where it is bytes, and when it arrived (s, monotonic)."""
 
 
 async def stream(socket: WebSocket, one: RobotServices, who: Caller) -> None:
@@ -32,10 +37,13 @@ async def stream(socket: WebSocket, one: RobotServices, who: Caller) -> None:
     await socket.accept()
     client = Client(Outbox(one.robot.clock.monotonic()), who.name)
     one.hub.join(client)
+    heard: asyncio.Queue[Heard] = asyncio.Queue(WAITING_MESSAGES)
+    dropping = asyncio.create_task(_drop_if_hopeless(one, client))
     tasks = [
+        dropping,
         asyncio.create_task(_send(socket, one, client)),
-        asyncio.create_task(_receive(socket, one, client, who)),
-        asyncio.create_task(_drop_if_hopeless(one, client)),
+        asyncio.create_task(_receive(socket, one, client, heard)),
+        asyncio.create_task(_carry_out(one, client, who, heard)),
     ]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -48,12 +56,13 @@ async def stream(socket: WebSocket, one: RobotServices, who: Caller) -> None:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-    if tasks[2] in done:
+    if dropping in done:
         one.hub.dropped += 1
         log.warning("live client %s took nothing for too long and was dropped", client.name)
-        # Whoever reads nothing would not take the close either: the server's own time limit ends the connection.
-        async with asyncio.timeout(LOOK_EVERY):
-            await socket.close(TOO_SLOW, "this client read too slowly")
+        # Whoever reads nothing would not take the close either: the server ends the connection when this returns.
+        with suppress(TimeoutError, WebSocketDisconnect):
+            async with asyncio.timeout(LOOK_EVERY):
+                await socket.close(TOO_SLOW, "this client read too slowly")
 
 
 async def _send(socket: WebSocket, one: RobotServices, client: Client) -> None:
@@ -71,17 +80,27 @@ async def _send(socket: WebSocket, one: RobotServices, client: Client) -> None:
         await socket.send_text(head + ",".join(messages) + "]}")
 
 
-async def _receive(socket: WebSocket, one: RobotServices, client: Client, who: Caller) -> None:
+async def _receive(socket: WebSocket, one: RobotServices, client: Client, heard: asyncio.Queue[Heard]) -> None:
+    """Waits for nothing but the client: the moment of a message is that of its arrival, whatever the one before it
+    waits for."""
     while True:
         message = await socket.receive()
         if message["type"] == "websocket.disconnect":
             return
-        text = message.get("text")
+        try:
+            heard.put_nowait((message.get("text"), one.robot.clock.monotonic()))
+        except asyncio.QueueFull:
+            _refuse(one, client, f"{WAITING_MESSAGES} messages wait already: this one is left out", "send fewer")
+
+
+async def _carry_out(one: RobotServices, client: Client, who: Caller, heard: asyncio.Queue[Heard]) -> None:
+    while True:
+        text, said = await heard.get()
         if text is None:
             _refuse(one, client, "a message is text, not bytes", ADVICE)
             continue
         try:
-            await _take(LiveRequest.model_validate_json(text), one, client, who)
+            await _take(LiveRequest.model_validate_json(text), one, client, who, said)
         except ValidationError as error:
             first = error.errors()[0]
             where = field_of(first["loc"]) if first["loc"] else "message"
@@ -92,7 +111,7 @@ async def _receive(socket: WebSocket, one: RobotServices, client: Client, who: C
             _refuse(one, client, str(error), "")
 
 
-async def _take(request: LiveRequest, one: RobotServices, client: Client, who: Caller) -> None:
+async def _take(request: LiveRequest, one: RobotServices, client: Client, who: Caller, said: float) -> None:
     now = one.robot.clock.monotonic()
     if request.rate is not None:
         client.every = BASE_RATE // request.rate
@@ -107,18 +126,18 @@ async def _take(request: LiveRequest, one: RobotServices, client: Client, who: C
     if client.outbox:
         client.something.set()
     if request.jog is not None:
-        await run_in_threadpool(_jog, request.jog, one, who)
+        await run_in_threadpool(_jog, request.jog, one, who, said)
 
 
 def _past(one: RobotServices, begin: float, points: int) -> str:
     return one.hub.history.since(begin, points).model_dump_json()
 
 
-def _jog(command: JogCommand, one: RobotServices, who: Caller) -> None:
+def _jog(command: JogCommand, one: RobotServices, who: Caller, said: float) -> None:
     if not who.may_operate:
         raise ProblemError(403, "operator-needed", f"{who.name} may look only", "ask for the role operator")
     one.require_motion(command.lease)
-    one.teaching.jog(dict(command.velocities))
+    one.teaching.jog(dict(command.velocities), said)
 
 
 def _refuse(one: RobotServices, client: Client, detail: str, advice: str) -> None:

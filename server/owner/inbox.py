@@ -5,6 +5,7 @@ An order that ends what runs takes effect at once, through the guardian, whateve
 
 from __future__ import annotations
 
+import math
 import os
 import queue
 import threading
@@ -38,20 +39,22 @@ LONGEST_ORDER = 256 << 20
 class Inbox:
     """Reads orders until the service closes its end, or says `close`.
 
-    busy:    a long order waits or runs: the loss of the service is then a reason to freeze
     closing: the service wants the port back, or is gone
     finish:  the teaching under way is to end in good order
     """
 
     def __init__(self, descriptor: int) -> None:
-        self.busy = threading.Event()
         self.closing = threading.Event()
         self.finish = threading.Event()
         self.guardian_end, self._to_guardian = os.pipe()
         self._input = os.fdopen(descriptor, "rb", closefd=False)
         self._waiting: queue.Queue[Long | Quick | None] = queue.Queue()
-        self._drive: JogDrive | None = None
         self._lock = threading.Lock()
+        self._drive: JogDrive | None = None
+        self._said = -math.inf
+        """When the newest jog command was said."""
+        self._long = 0
+        """Long orders that wait or run: while there are any, the loss of the service is a reason to freeze."""
         self._thread = threading.Thread(target=self._read_all, name="inbox", daemon=True)
 
     def first(self) -> Open:
@@ -77,13 +80,14 @@ class Inbox:
 
     def drive(self) -> JogDrive | None:
         """The newest jog command, once."""
-        command, self._drive = self._drive, None
+        with self._lock:
+            command, self._drive = self._drive, None
         return command
 
     def done(self) -> None:
-        """The long order has been carried out."""
+        """A long order has been carried out, or refused."""
         with self._lock:
-            self.busy.clear()
+            self._long -= 1
 
     def _read_all(self) -> None:
         told = False
@@ -107,26 +111,29 @@ class Inbox:
             case Finish():
                 self.finish.set()
             case JogDrive():
-                self._drive = order
+                with self._lock:
+                    if order.said >= self._said:  # one that a newer one has overtaken drives nothing
+                        self._drive, self._said = order, order.said
             case Open() | Close():
                 raise SpecError("owner: this robot is open already")
             case RunExperiment() | JogBegin() | RunProgram() | LeadBegin():
                 with self._lock:
-                    self._drive = None
-                    self.finish.clear()
-                    self.busy.set()
+                    if not self._long:  # else that word, and that command, are for what still goes on
+                        self._drive = None
+                        self.finish.clear()
+                    self._long += 1
                 self._waiting.put(order)
             case _:
                 self._waiting.put(order)
 
     def _end_what_runs(self, said: bytes) -> None:
         with self._lock:
-            if self.busy.is_set():
+            if self._long:
                 os.write(self._to_guardian, said)
 
     def _leave(self, told: bool) -> None:
         """The guardian takes the end of its pipe as the loss of whoever started the work."""
         if told:
             self._end_what_runs(b"stop\n")
-        elif self.busy.is_set():
+        elif self._long:
             os.close(self._to_guardian)

@@ -24,7 +24,6 @@ EXIT_CODES = {"complete": 0, "fault": 5, "interrupted": 5, "stopped": 6}
 
 def run(desk: Desk, order: RunExperiment) -> Answer:
     """An experiment, as `daq run` does it."""
-    desk.activity = "experiment"
     result = run_experiment(
         Arrangement(
             desk.controller,
@@ -54,7 +53,6 @@ def run(desk: Desk, order: RunExperiment) -> Answer:
 def jog_until_finished(desk: Desk, order: JogBegin) -> Answer:
     """Jogging: the newest command drives the arm, for 0.3 s at most."""
     _require_ready(desk)
-    desk.activity = "jog"
     newest: JogCommand | None = None
 
     def commands(_row: SampleRow) -> JogCommand | None:
@@ -78,7 +76,6 @@ def perform(desk: Desk, order: RunProgram) -> Answer:
     against = check_program(planned, desk.machine, desk.limits)
     if against:
         raise SafetyError(f"program refused: {against[0]}; nothing moved")
-    desk.activity = "program"
     with desk.control.frozen_on_error():
         performer = FollowingPerformer(desk.controller, desk.control, desk.machine, desk.limits, desk.ended, desk.say)
         run_program(planned, desk.machine, performer, desk.say)
@@ -89,7 +86,6 @@ def perform(desk: Desk, order: RunProgram) -> Answer:
 def lead(desk: Desk, order: LeadBegin) -> Answer:
     """Joints led by hand until finished; the recorded path comes back, also of one that was stopped."""
     _require_ready(desk)
-    desk.activity = "lead"
     kept: dict[str, object] = {}
 
     def keep(path: RecordedPath) -> None:
@@ -129,6 +125,7 @@ def _between_samples(desk: Desk) -> None:
     if isinstance(order, Quick):
         desk.speaker.ended(answered_quickly(desk, order))
     else:
+        desk.inbox.done()
         line = f"the arm is busy ({desk.activity}): end that first"
         desk.speaker.ended(Answer(number=order.number, problem=line, exit_code=SafetyError.exit_code))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
@@ -13,6 +13,9 @@ from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.service.robot import Activity, ArmState, ControlPeriod
 from daq.teaching import Program
+
+WAITS_AT_MOST = 2.0
+"""s after which a quick order is not carried out any more: less than its asker waits for the answer (an assumption)."""
 
 
 class _Message(BaseModel):
@@ -41,9 +44,17 @@ class _Request(_Message):
     number: int
 
 
+class _QuickRequest(_Request):
+    """`asked` is the monotonic clock (s) of this computer when it was asked for. One that has waited longer than
+    WAITS_AT_MOST is refused: its asker may have given up, and the arm may be another's by now."""
+
+    asked: float
+
+
 class RunExperiment(_Request):
     """Runs an experiment; answered when its trace is closed."""
 
+    activity: ClassVar[Activity] = "experiment"
     kind: Literal["run"] = "run"
     spec: ExperimentSpec
     trace_id: str
@@ -51,8 +62,9 @@ class RunExperiment(_Request):
 
 
 class JogBegin(_Request):
-    """Jogging until `JogEnd`; answered at its end."""
+    """Jogging until `Finish`; answered at its end."""
 
+    activity: ClassVar[Activity] = "jog"
     kind: Literal["jog_begin"] = "jog_begin"
 
 
@@ -66,15 +78,17 @@ class JogDrive(_Message):
 
 
 class RunProgram(_Request):
-    """Carries out a taught program; answered at its end."""
+    """Carries out a taught program, or the one instruction of a step; answered at its end."""
 
     kind: Literal["program"] = "program"
+    activity: Literal["program", "step"] = "program"
     program: Program
 
 
 class LeadBegin(_Request):
     """Joints are led by hand until `Finish`; answered with the recorded path."""
 
+    activity: ClassVar[Activity] = "lead"
     kind: Literal["lead_begin"] = "lead_begin"
     joints: tuple[int, ...]
 
@@ -91,26 +105,26 @@ class HaltRun(_Message):
     kind: Literal["halt"] = "halt"
 
 
-class ReadGains(_Request):
+class ReadGains(_QuickRequest):
     """P, I, D of all joints."""
 
     kind: Literal["read_gains"] = "read_gains"
 
 
-class WriteGains(_Request):
+class WriteGains(_QuickRequest):
     """Refused for a joint that would jump to its set point."""
 
     kind: Literal["write_gains"] = "write_gains"
     gains: dict[int, Gain]
 
 
-class ReadProcess(_Request):
+class ReadProcess(_QuickRequest):
     """Process inputs, outputs, gripper."""
 
     kind: Literal["read_process"] = "read_process"
 
 
-class WriteOutput(_Request):
+class WriteOutput(_QuickRequest):
     """One process output, 0 to 7."""
 
     kind: Literal["write_output"] = "write_output"
@@ -118,14 +132,14 @@ class WriteOutput(_Request):
     on: bool
 
 
-class MoveGripper(_Request):
+class MoveGripper(_QuickRequest):
     """Closes or opens the gripper."""
 
     kind: Literal["gripper"] = "gripper"
     closed: bool
 
 
-class Reset(_Request):
+class Reset(_QuickRequest):
     """The explicit end of a stop."""
 
     kind: Literal["reset"] = "reset"

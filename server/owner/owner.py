@@ -82,6 +82,8 @@ def _carry_out(desk: Desk, order: Long | Quick) -> None:
     try:
         if _is_away(desk):
             raise ReachError(_being_tried(desk))
+        desk.activity = order.activity
+        desk.tell_arm()  # at once: what cannot be done meanwhile is refused by the service
         answer = _moved(desk, order)
     except DaqError as error:
         answer = Answer(number=order.number, problem=str(error), exit_code=error.exit_code)

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
-from daq.contracts.errors import DaqError, SafetyError
+import time
+
+from daq.contracts.errors import DaqError, ReachError, SafetyError
 from daq.contracts.limp import limp_line, require_no_jump
 from daq.safety import Event, State
 from server.owner.desk import Desk
-from server.owner.messages import MoveGripper, Quick, ReadGains, ReadProcess, Reset, WriteGains, WriteOutput
+from server.owner.messages import (
+    WAITS_AT_MOST,
+    MoveGripper,
+    Quick,
+    ReadGains,
+    ReadProcess,
+    Reset,
+    WriteGains,
+    WriteOutput,
+)
 
 BITS = 8
 _WHILE_TEACHING = (ReadProcess, WriteOutput, MoveGripper, ReadGains)
@@ -20,6 +31,10 @@ class NotFrozenError(DaqError):
 
 def carry_out(desk: Desk, order: Quick) -> dict[str, object]:
     """The answer's data. Raises DaqError; nothing has changed then, except where its line says so."""
+    waited = time.monotonic() - order.asked
+    if waited > WAITS_AT_MOST:
+        line = f"{order.kind}: the robot's process came to it after {waited:.1f} s, {WAITS_AT_MOST:g} s are allowed"
+        raise ReachError(f"{line}; nothing was done")
     if desk.activity != "none" and not isinstance(order, _WHILE_TEACHING):
         raise SafetyError(f"not while the arm is busy ({desk.activity}): wait for its end, or stop it")
     match order:

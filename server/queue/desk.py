@@ -4,42 +4,28 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
-from typing import Protocol
 
 from daq.contracts.errors import DaqError
 from daq.contracts.service.experiments import Experiment, ExperimentRequest
 from daq.contracts.service.queue import QueueStatus
-from server.clock import Clock
-from server.owner.messages import Answer, HaltRun, RunExperiment
+from server.owner.messages import Answer, ArmReport, HaltRun, RunExperiment
 from server.problems import ProblemError, conflict
+from server.queue.due_runs import DueRuns
 from server.queue.endings import Ending, ending_of
 from server.queue.order import next_due
-from server.queue.readiness import Circumstances, what_is_missing
-from server.queue.room import require_room
+from server.queue.parts import QueueParts
+from server.queue.readiness import Circumstances, what_is_missing, why_held
 from server.queue.states import Event, IllegalEventError, advance
-from server.robot.control import ControlDesk
-from server.robot.robot import Robot
-from server.store.experiments import ExperimentStore
-from server.store.queues import QueueState, QueueStore
-from server.store.schedules import ScheduleStore
+from server.store.queues import QueueState
 
 LOOK_EVERY = 1.0
 """s between two looks for what has become due: the wall clock may be set meanwhile."""
 ATTENDANCE = 60.0
 """s for which an operator's word to be there holds: an assumption."""
 log = logging.getLogger("server.queue")
-
-
-class Told(Protocol):
-    """Who is told what the queue does."""
-
-    def __call__(self, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
-        """One thing that happened."""
-        ...
 
 
 @dataclass
@@ -54,21 +40,12 @@ class Running:
 
 
 @dataclass(frozen=True)
-class QueueParts:
-    """What the queue works with."""
+class Ended:
+    """An experiment whose end is to be written."""
 
-    robot: Robot
-    control: ControlDesk
-    experiments: ExperimentStore
-    schedules: ScheduleStore
-    queues: QueueStore
-    clock: Clock
-    told: Told
-    recorded: Callable[[Answer], None]
-    """Called with the answer of every run that left a trace."""
-    unfinished: Callable[[], None]
-    """Called after a run whose trace could not be closed: what was written of it is there."""
-    unattended: bool
+    id: str
+    ending: Ending
+    at: datetime
 
 
 class QueueDesk:
@@ -83,9 +60,15 @@ class QueueDesk:
         self._attended_until: float | None = None
         self._running: Running | None = None
         self._waiting_for = ""
-        self._hindered: dict[str, type[Exception]] = {}
-        """Schedules whose run is due and cannot be submitted, and what has been said about it."""
+        self._noticed = ""
+        """Why the queue is to be held: a stop or a fault that was heard of, and that nobody has answered for yet."""
+        self._written = True
+        """Whether the database knows the state."""
+        self._ended: Ended | None = None
+        """What ran last, where the database could not be told of its end: nothing else begins until it is."""
+        self._runs = DueRuns(parts)
         self._state = self._state_at_start()
+        self._runs.leave_out_missed()
         self._worker = threading.Thread(target=self._work, name="queue", daemon=True)
 
     def start(self) -> None:
@@ -130,21 +113,30 @@ class QueueDesk:
 
     def resume(self, by: str, *, moves_real_arm: bool) -> None:
         """The operator's word that the queue may move the arm. Raises a 409 while the arm is stopped or at fault."""
-        arm = self._parts.robot.arm
-        if arm is not None and arm.arm in ("stopped", "fault"):
-            line = f"the arm is {arm.arm}: {arm.cause}"
-            raise conflict("arm-stopped", line, "look at the arm, reset it, then resume the queue")
         with self._lock:
+            self._noticed = ""  # what came before; a stop that is heard of from now on holds the queue again
+            arm = self._parts.robot.arm
+            if arm is not None and (held := why_held(arm)):
+                self._noticed = held
+                line = f"the arm is {arm.arm}: {arm.cause}"
+                raise conflict("arm-stopped", line, "look at the arm, reset it, then resume the queue")
+            state = QueueState(False, f"resumed by {by}", self._parts.clock.utc())
+            self._parts.queues.set(self._parts.robot.name, state)  # first: what is not written stays paused
+            self._state, self._written = state, True
             self._consent = self._consent or moves_real_arm
-            self._set_state(QueueState(False, f"resumed by {by}", self._parts.clock.utc()))
             self._attended_until = self._parts.clock.monotonic() + ATTENDANCE
         self._parts.told("queue", "resumed", actor=by)
         self.wake()
 
     def attend(self) -> None:
-        """An operator says to be there, for a minute more."""
-        with self._lock:
-            self._attended_until = self._parts.clock.monotonic() + ATTENDANCE
+        """An operator says to be there, for a minute more. No lock: the event loop calls this, and may not wait."""
+        self._attended_until = self._parts.clock.monotonic() + ATTENDANCE
+        self.wake()
+
+    def hear(self, arm: ArmReport) -> None:
+        """What the arm's owner says: a stop or a fault holds the queue, whatever waits in it. Must not wait."""
+        if held := why_held(arm):
+            self._noticed = held
         self.wake()
 
     def wake(self) -> None:
@@ -210,13 +202,17 @@ class QueueDesk:
         """Pauses, under the lock; False where it is paused already, and keeps its first reason unless it is `anew`."""
         if self._state.paused and not anew:
             return False
-        self._set_state(QueueState(True, reason, self._parts.clock.utc()))
-        self._attended_until = None
+        self._state, self._written = QueueState(True, reason, self._parts.clock.utc()), False
+        try:
+            self._write_state()
+        except Exception:  # it is paused, whatever the disk says, and is written as soon as that is possible
+            log.exception("queue: paused: %s: not written yet", reason)
         return True
 
-    def _set_state(self, state: QueueState) -> None:
-        self._parts.queues.set(self._parts.robot.name, state)
-        self._state = state
+    def _write_state(self) -> None:
+        if not self._written:
+            self._parts.queues.set(self._parts.robot.name, self._state)
+            self._written = True
 
     def _needs_attendance(self) -> bool:
         identity = self._parts.robot.identity
@@ -229,7 +225,8 @@ class QueueDesk:
                     return
             self._changed.clear()
             try:
-                self._submit_scheduled()
+                self._settle()
+                self._runs.submit()
                 experiment = self._take()
                 if experiment is not None:
                     self._carry_out(experiment)
@@ -240,39 +237,14 @@ class QueueDesk:
                 self._waiting_for = "the queue met a fault of this program: see the log"
             self._changed.wait(LOOK_EVERY)
 
-    def _submit_scheduled(self) -> None:
-        """A run that cannot be submitted stays due, and is tried again; it holds up no other, and not the queue."""
-        now = self._parts.clock.utc()
-        for identity in self._parts.schedules.due(self._parts.robot.name, now):
-            try:
-                self._submit_run(identity, now)
-                self._hindered.pop(identity, None)
-            except Exception as error:
-                if self._hindered.get(identity) is type(error):
-                    continue  # it has been said
-                self._hindered[identity] = type(error)
-                log.exception("schedule %s", identity)
-                why = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: see the log"
-                self._parts.told("schedule", f"schedule {identity}: its run waits: {why}")
-
-    def _submit_run(self, identity: str, now: datetime) -> None:
-        parts = self._parts
-        name = parts.robot.name
-        schedule = parts.schedules.get(name, identity)
-        if parts.experiments.page(name, ("queued", "running"), identity, None, 1).items:
-            parts.schedules.leave_out(name, identity, now)
-            parts.told("schedule", f"schedule {identity}: the run before still waits; this one is left out")
-            return
-        require_room(parts.robot.place.folder)
-        made, _ = parts.experiments.submit(
-            name,
-            ExperimentRequest(spec=schedule.spec, priority=schedule.priority),
-            now,
-            f"schedule {identity}",
-            schedule=identity,
-            also=lambda session: parts.schedules.count_run(session, name, identity, now),
-        )
-        parts.told("experiment", f"queued by schedule {identity}", experiment=made.id)
+    def _settle(self) -> None:
+        """A stop that was heard of holds the queue, and what could not be written is written before anything begins."""
+        with self._lock:
+            if (reason := self._noticed) and not self._closing:
+                self._noticed = ""  # only now: one that is heard of in this moment stays
+                self.pause(reason)
+            self._write_state()
+            self._write_end()
 
     def _take(self) -> Experiment | None:
         """The next experiment, with the control of the robot; None when none may begin now."""
@@ -310,11 +282,16 @@ class QueueDesk:
         return self._attended_until is not None and self._parts.clock.monotonic() < self._attended_until
 
     def _carry_out(self, experiment: Experiment) -> None:
+        """From its begin to its end, whatever fails meanwhile: then a person looks before the next one."""
         parts = self._parts
-        parts.robot.experiment = experiment.id
-        parts.told("experiment", "started", experiment=experiment.id)
         try:
+            parts.robot.experiment = experiment.id
+            parts.told("experiment", "started", experiment=experiment.id)
             ending = self._run(experiment)
+        except Exception as error:
+            log.exception("experiment %s", experiment.id)
+            why = str(error) if isinstance(error, DaqError) else f"{type(error).__name__}: see the log"
+            ending = Ending(Event.LOST, why)
         finally:
             parts.robot.experiment = None
             parts.control.give_back_for_queue()
@@ -322,40 +299,59 @@ class QueueDesk:
             ending = self._as_wished(ending, self._running)
             state = advance("running", ending.event)
             why = f"experiment {experiment.id} ended as {state} ({ending.reason}): look at the arm, then resume"
+            held = ending.holds_queue and self._hold(why)  # whoever hears of the end finds the queue paused
+            self._ended = Ended(experiment.id, ending, parts.clock.utc())
             try:
-                held = ending.holds_queue and self._hold(why)  # whoever hears of the end finds the queue paused
-                parts.experiments.end(
-                    parts.robot.name, experiment.id, ending.event, parts.clock.utc(), ending.reason, ending.outcome
-                )
+                self._write_end()
+            except Exception:
+                log.exception("experiment %s: its end as %s is not written yet", experiment.id, state)
+                held = self._hold(why) or held
             finally:
                 self._running = None
-        what = "completed" if ending.event is Event.COMPLETED else state
-        parts.told("experiment", f"{what}: {ending.reason}".rstrip(": "), experiment=experiment.id)
         if held:
             parts.told("queue", f"paused: {why}")
 
-    def _run(self, experiment: Experiment) -> Ending:
-        parts = self._parts
+    def _write_end(self) -> None:
+        """Of what ran last, under the lock. Raises what the database does; the end is kept then."""
+        ended, parts = self._ended, self._parts
+        if ended is None:
+            return
+        ending, state = ended.ending, advance("running", ended.ending.event)
         try:
-            with self._lock:
-                running = self._running
-                assert running is not None
-                if running.cancelled_by is not None:
-                    return Ending(Event.STOPPED, "cancelled before it moved")
-                answer = running.answer = parts.robot.ask(
-                    RunExperiment,
-                    spec=experiment.spec,
-                    trace_id=parts.experiments.trace_number(experiment.id),
-                    moves_real_arm=self._consent,
-                )
-            found = self._await(answer)
-        except DaqError as error:
-            return Ending(Event.LOST, str(error))
+            parts.experiments.end(parts.robot.name, ended.id, ending.event, ended.at, ending.reason, ending.outcome)
+        except (IllegalEventError, ProblemError):
+            log.exception("experiment %s", ended.id)  # it has an end, or is gone: nothing is left to be written
+        self._ended = None
+        what = "completed" if ending.event is Event.COMPLETED else state
+        parts.told("experiment", f"{what}: {ending.reason}".rstrip(": "), experiment=ended.id)
+        if ending.untaken:
+            parts.unfinished()  # the database can be written again, and finds the trace in its folder
+
+    def _run(self, experiment: Experiment) -> Ending:
+        """How it ended. Raises whatever keeps it from being begun, or loses it."""
+        parts = self._parts
+        with self._lock:
+            running = self._running
+            assert running is not None
+            if running.cancelled_by is not None:
+                return Ending(Event.STOPPED, "cancelled before it moved")
+            answer = running.answer = parts.robot.ask(
+                RunExperiment,
+                spec=experiment.spec,
+                trace_id=parts.experiments.trace_number(experiment.id),
+                moves_real_arm=self._consent,
+            )
+        found = self._await(answer)
         ending = ending_of(found)
-        if found.finished is not None:
-            parts.recorded(found)
-        elif ending.event is not Event.REFUSED:
-            parts.unfinished()
+        try:
+            if found.finished is not None:
+                parts.recorded(found)
+            elif ending.event is not Event.REFUSED:
+                parts.unfinished()
+        except Exception:
+            log.exception("experiment %s: its trace", experiment.id)
+            line = "its trace is not in the catalogue: see the log"
+            return replace(ending, reason=f"{ending.reason}; {line}".removeprefix("; "), untaken=True)
         return ending
 
     def _await(self, answer: Future[Answer]) -> Answer:
@@ -375,7 +371,7 @@ class QueueDesk:
         if ending.event is not Event.STOPPED:
             return ending
         if self._closing:
-            return Ending(Event.LOST, "the service was shut down while this ran", ending.outcome)
+            return replace(ending, event=Event.LOST, reason="the service was shut down while this ran")
         if running is not None and running.cancelled_by is not None:
-            return Ending(Event.STOPPED, f"cancelled by {running.cancelled_by}", ending.outcome)
+            return replace(ending, reason=f"cancelled by {running.cancelled_by}")
         return ending

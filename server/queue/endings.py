@@ -21,16 +21,20 @@ _OF_OUTCOME: dict[Outcome, Event] = {
 
 @dataclass(frozen=True)
 class Ending:
-    """How an experiment ended. `holds_queue`: a person looks at the arm before the next one runs."""
+    """How an experiment ended. `holds_queue`: a person looks at the arm before the next one runs.
+
+    untaken: its trace could not be taken into the catalogue
+    """
 
     event: Event
     reason: str
     outcome: Outcome | None = None
+    untaken: bool = False
 
     @property
     def holds_queue(self) -> bool:
-        """All but a plan carried out, and a plan refused before anything moved."""
-        return self.event not in (Event.COMPLETED, Event.REFUSED)
+        """All but a plan carried out, its trace being known, and a plan refused before anything moved."""
+        return self.untaken or self.event not in (Event.COMPLETED, Event.REFUSED)
 
 
 def ending_of(answer: Answer) -> Ending:

@@ -1,4 +1,4 @@
-"""How long an experiment takes, before it is planned: what is too long to be planned is refused by this alone. Pure."""
+"""How long an experiment takes at least, before it is planned: what is far too long never gets there. Pure."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ LONGEST = 4 * 3600.0
 """s of one experiment: 720 000 control periods, a trace of some 300 MB. A choice; a schedule makes longer studies."""
 
 
-def longest_length(spec: ExperimentSpec) -> float:
-    """s that the record takes, the slow ways back between repeats left out."""
-    return spec.settle + spec.repeats * _of(spec.trajectory) + spec.hold
+def least_length(spec: ExperimentSpec) -> float:
+    """s that the record takes, the slow ways back between repeats left out: the planner refuses what they make longer
+    than 4 h, and fills no memory until then."""
+    return spec.repeats * (spec.settle + _of(spec.trajectory) + spec.hold)
 
 
 def _of(trajectory: Trajectory) -> float:

@@ -21,8 +21,3 @@ def next_due(waiting: Iterable[Waiting], now: datetime) -> Waiting | None:
     """The one to be run: the highest priority that is due, then the first submitted; None when none is due."""
     due = [one for one in waiting if one.at is None or one.at <= now]
     return min(due, key=lambda one: (-one.priority, one.sequence), default=None)
-
-
-def next_moment(waiting: Iterable[Waiting]) -> datetime | None:
-    """When the next of those that wait for a moment becomes due; None when none does."""
-    return min((one.at for one in waiting if one.at is not None), default=None)

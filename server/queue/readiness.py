@@ -28,19 +28,21 @@ class Missing:
     pause: str = ""
 
 
+def why_held(arm: ArmReport) -> str:
+    """Why the queue waits for a person after a stop or a fault of the arm; empty in every other state."""
+    if arm.arm not in ("stopped", "fault"):
+        return ""
+    return f"the arm is {arm.arm} ({arm.cause}): look at it, reset it, then resume the queue"
+
+
 def what_is_missing(now: Circumstances) -> Missing | None:
     """The first thing that is missing; None when an experiment may begin."""
     if now.identity is None or now.arm is None:
         return Missing(f"the robot is not connected. {now.connection_problem}".strip())
-    state, cause = now.arm.arm, now.arm.cause
+    state, held = now.arm.arm, why_held(now.arm)
     found = [
         (now.arm.link == "lost" or state == "disconnected", Missing("the link to the robot is lost")),
-        (
-            state in ("stopped", "fault"),
-            Missing(
-                f"the arm is {state}", f"the arm is {state} ({cause}): look at it, reset it, then resume the queue"
-            ),
-        ),
+        (held != "", Missing(f"the arm is {state}", held)),
         (now.arm.activity != "none", Missing(f"the arm is busy: {now.arm.activity}")),
         (
             not now.identity.simulated and not now.consent,

@@ -3,6 +3,7 @@ and a desk that keeps them under a lock."""
 
 from __future__ import annotations
 
+import logging
 import secrets
 import threading
 from collections.abc import Callable
@@ -17,6 +18,7 @@ LEASE_TIME = 10.0
 """s that a lease holds without a heartbeat: an assumption, longer than a page takes to load again."""
 HEARTBEAT_EVERY = 3.0
 """s between heartbeats that clients are asked for: two may be lost."""
+log = logging.getLogger("server.robot")
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class ControlDesk:
             self._changed.notify_all()
             told = self._told(self._lease, now)
         if silent is not None:  # it lapsed in this very moment, and nobody has said so yet
-            self._lapsed(silent.name)
+            self._say_lapsed(silent.name)
         return told
 
     def renew(self, secret: str) -> ControlLease:
@@ -97,11 +99,13 @@ class ControlDesk:
                 raise conflict("control-held", f"{self._lease.name} has the control", "wait until it is given back")
 
     def take_for_queue(self, experiment: str) -> bool:
-        """The queue's own control, for one experiment; False while a client has it."""
+        """The queue's own control, for one experiment; False while a client has it, or has gone silent in this moment:
+        what it was moving is told to hold first."""
         with self._changed:
-            if self._lease is not None and self._lease.holds(self._clock.monotonic()):
+            if self._lease is not None:
+                self._changed.notify_all()
                 return False
-            self._lease, self._queue = None, experiment
+            self._queue = experiment
             return True
 
     def give_back_for_queue(self) -> None:
@@ -159,7 +163,14 @@ class ControlDesk:
                     continue
                 assert lease is not None
                 self._lease = None
-            self._lapsed(lease.name)
+            self._say_lapsed(lease.name)
+
+    def _say_lapsed(self, name: str) -> None:
+        """Whoever hears of it may fail; the control goes on, and the next lapse is noticed too."""
+        try:
+            self._lapsed(name)
+        except Exception:
+            log.exception("the control of %s has lapsed", name)
 
 
 def _same(one: str, other: str | None) -> bool:

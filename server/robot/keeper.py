@@ -35,7 +35,7 @@ class Keeper:
         """From now on it is to be connected. Raises ReachError when it cannot be reached now; it is tried again."""
         with self._changed:
             self._wanted = True
-        self._robot.connect(anew=True)
+        self._robot.connect(anew=True, wanted=self._is_wanted)
         self._wake()
 
     def disconnect(self) -> bool:
@@ -55,6 +55,9 @@ class Keeper:
         if self._thread.is_alive():
             self._thread.join(patience)
 
+    def _is_wanted(self) -> bool:
+        return self._wanted
+
     def _wake(self) -> None:
         with self._changed:
             self._changed.notify_all()
@@ -73,7 +76,7 @@ class Keeper:
                 if self._changed.wait_for(lambda: self._closing or not self._wanted, next(delays)):
                     continue
             try:
-                self._robot.connect()
+                self._robot.connect(wanted=self._is_wanted)
             except DaqError as error:
                 log.warning("robot %s: %s", self._robot.name, error)
             except Exception:  # whatever it is, it is tried again: nobody else would

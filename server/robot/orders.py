@@ -1,21 +1,31 @@
-"""Waiting for the answer to an order."""
+"""Quick orders: carried out by the robot's owner between two samples, while nobody else needs them all."""
 
 from __future__ import annotations
 
-from concurrent.futures import Future
+from collections.abc import Callable
+from typing import Any
 
 from daq.contracts.errors import ReachError
 from server.owner.messages import Answer
-from server.problems import of_exit_code
-from server.robot.robot import ANSWER_WITHIN
+from server.problems import ProblemError, conflict, of_exit_code
+from server.robot.robot import ANSWER_WITHIN, Robot
 
 
-def answer_of(asked: Future[Answer], within: float = ANSWER_WITHIN) -> Answer:
-    """The answer. Raises the problem that it tells of, or ReachError when none comes in time."""
+def answer_of(robot: Robot, order: Callable[..., Any], **fields: object) -> Answer:
+    """The owner's answer. Raises a 409 at once while an experiment, a program or a lead goes on, a 429 when too many
+    wait already, the problem that the answer tells of, or ReachError when none comes in time."""
+    activity = "experiment" if robot.experiment is not None else robot.arm.activity if robot.arm else "none"
+    if activity not in ("none", "jog"):
+        raise conflict("arm-busy", f"the arm is busy: {activity}", "wait for its end, or stop it")
+    if not robot.room_for_orders.acquire(blocking=False):
+        line = f"as many gains, signals and resets are asked for as may wait: robot {robot.name} does not answer"
+        raise ProblemError(429, "too-many", line, "ask less often", (), {"Retry-After": "1"})
     try:
-        answer = asked.result(within)
+        answer = robot.ask(order, asked=robot.clock.monotonic(), **fields).result(ANSWER_WITHIN)
     except TimeoutError:
-        raise ReachError(f"the robot's process did not answer within {within:g} s") from None
+        raise ReachError(f"the robot's process did not answer within {ANSWER_WITHIN:g} s") from None
+    finally:
+        robot.room_for_orders.release()
     if answer.problem:
         raise of_exit_code(answer.exit_code, answer.problem)
     return answer

@@ -41,6 +41,8 @@ OPEN_WITHIN = 60.0
 """s for a process to start, and a mock with its physics engine, on a busy computer."""
 ANSWER_WITHIN = 5.0
 """s for an order that moves nothing."""
+ORDERS_AT_ONCE = 8
+"""Quick orders that may wait for their answers: a robot that is silent holds up no more of the service's threads."""
 log = logging.getLogger("server.robot")
 T = TypeVar("T")
 
@@ -77,6 +79,7 @@ class Robot:
         self.disconnected: list[Callable[[str], None]] = []
         self.experiment: str | None = None
         """The experiment of the queue that runs now."""
+        self.room_for_orders = threading.BoundedSemaphore(ORDERS_AT_ONCE)
         self._lock = threading.RLock()
         self._owner: OwnerProcess | None = None
         self._opened: Future[RobotIdentity] | None = None
@@ -136,13 +139,17 @@ class Robot:
         owner = self._owner
         return None if owner is None else owner.pid
 
-    def connect(self, *, anew: bool = False) -> RobotIdentity:
+    def connect(self, *, anew: bool = False, wanted: Callable[[], bool] = lambda: True) -> RobotIdentity:
         """Connects, or waits for a connection that is being made. Moves nothing. Raises ReachError, SpecError.
 
         Unless it is wanted `anew`, by somebody who knows what is at its port, it is what was there before or nothing.
+        `wanted` is asked once more where nothing can come between it and the beginning: a `disconnect` either comes
+        before, and it is not wanted any more, or after, and ends what has begun.
         """
         with self._lock:
             if self._owner is None:
+                if not wanted():
+                    raise ReachError(f"robot {self.name} was disconnected meanwhile")
                 self._terminal = None if anew else self._terminal
                 self.require_same_place()
                 self._begin()
@@ -166,7 +173,8 @@ class Robot:
 
     def disconnect(self, patience: float = 4.0) -> bool:
         """Gives the port back; what runs is stopped first. True when that is done within `patience` s."""
-        owner = self._owner
+        with self._lock:  # an attempt may just be starting its process
+            owner = self._owner
         return True if owner is None else owner.close(patience)
 
     def ask(self, kind: Callable[..., Any], **fields: object) -> Future[Answer]:

@@ -59,7 +59,11 @@ class StopDesk:
 
     def _ask(self) -> StopAnswer:
         name, url = self._robot.name, self._robot.place.url
-        attempts = request_stop(name, self._robot.owner_pid)
+        try:
+            attempts = request_stop(name, self._robot.owner_pid)
+        except OSError as error:  # no file is left for a socket, say
+            text = f"the process that owns the port cannot be asked: {error.strerror or error}"
+            return StopAnswer(robot=name, port=url, delivered=False, confirmed=False, text=text)
         if attempts:
             silent = "the process that owns the port did not answer"
             answers = [

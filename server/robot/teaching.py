@@ -7,19 +7,25 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any
+from typing import Any, Literal
 
-from daq.contracts.errors import ReachError, SpecError
+from daq.contracts.errors import SpecError
 from daq.contracts.service.robot import Activity
 from daq.contracts.service.teaching import TaughtPath, TeachingLine, TeachingStatus
 from daq.teaching import Program
-from daq.teaching.jog import top_speed
+from daq.teaching.jog import DEAD_MAN, top_speed
+from daq.teaching.lead import PATIENCE
 from server.owner.messages import Answer, Finish, HaltRun, JogBegin, JogDrive, LeadBegin, Report, RunProgram, Told
-from server.problems import conflict
+from server.problems import ProblemError, conflict
 from server.robot.robot import ANSWER_WITHIN, Robot
 
 LINES = 50
 """Lines for whoever teaches that are kept."""
+LEAD_ENDS_WITHIN = PATIENCE + ANSWER_WITHIN
+"""s: the arm may take PATIENCE to come to rest before its gains are given back."""
+IF_A_LEAD_GOES_ON = (
+    "HOLD THE ARM: led joints have no drive, and a stop does not hold them; reset it here, then set gains"
+)
 
 
 class TeachingDesk:
@@ -40,21 +46,23 @@ class TeachingDesk:
         self._path: TaughtPath | None = None
         robot.listeners.append(self._heard)
 
-    def jog(self, velocities: dict[int, float]) -> None:
-        """The newest command of whoever holds the key. Raises a 409 when the arm will not, SpecError for a joint that
-        is not there or too fast."""
+    def jog(self, velocities: dict[int, float], said: float) -> None:
+        """The newest command of whoever holds the key, and when it arrived here (s, monotonic). One that was held up
+        on its way for longer than it may drive the arm begins nothing. Raises a 409 when the arm will not, SpecError
+        for a joint that is not there or too fast."""
         self._require_possible(velocities)
         self._require_not_stopped()
-        said = self._robot.clock.monotonic()
         with self._changed:
+            if self._robot.clock.monotonic() - said > DEAD_MAN:
+                return
             if self._under_way is None or self._under_way[0] != "jog":
                 self._begin("jog", JogBegin)
             self._robot.tell(JogDrive(velocities=velocities, said=said))
 
-    def perform(self, program: Program, activity: Activity = "program") -> None:
+    def perform(self, program: Program, activity: Literal["program", "step"] = "program") -> None:
         """Begins a taught program. Raises a 409 while something else is taught."""
         with self._changed:
-            self._begin(activity, RunProgram, program=program)
+            self._begin(activity, RunProgram, program=program, activity=activity)
 
     def lead(self, joints: tuple[int, ...]) -> None:
         """Begins leading by hand. Raises a 409 while something else is taught."""
@@ -62,14 +70,18 @@ class TeachingDesk:
             self._begin("lead", LeadBegin, joints=joints)
 
     def finish(self) -> None:
-        """Ends jogging or leading in good order, and waits for the end. A program goes on to its own."""
+        """Ends jogging or leading in good order, and waits for the end. A program goes on to its own. Raises a 503 when
+        the end does not come."""
         with self._changed:
             under_way = self._under_way
             if under_way is None or under_way[0] not in ("jog", "lead"):
                 return
             self._robot.tell(Finish())
-            if not self._changed.wait_for(lambda: self._under_way is not under_way, ANSWER_WITHIN):
-                raise ReachError(f"{under_way[0]} did not end within {ANSWER_WITHIN:g} s: stop the robot")
+            leading = under_way[0] == "lead"
+            within = LEAD_ENDS_WITHIN if leading else ANSWER_WITHIN
+            if not self._changed.wait_for(lambda: self._under_way is not under_way, within):
+                line = f"{under_way[0]} did not end within {within:g} s"
+                raise ProblemError(503, "not-reached", line, IF_A_LEAD_GOES_ON if leading else "stop the robot")
 
     def hold(self) -> None:
         """Whoever had the control is gone: jogging and leading end in good order, a program by a stop. No waiting."""
@@ -89,7 +101,7 @@ class TeachingDesk:
                 path=self._path,
             )
 
-    def _begin(self, activity: Activity, order: Callable[..., Any], **fields: object) -> None:
+    def _begin(self, activity: Activity, order: Callable[..., Any], /, **fields: object) -> None:
         if self._under_way is not None and self._under_way[0] == "jog":
             self.finish()
         if self._under_way is not None:
@@ -98,6 +110,7 @@ class TeachingDesk:
         self._require_not_stopped()
         asked = self._robot.ask(order, **fields)
         self._result = self._problem = ""
+        self._path = None
         self._under_way = (activity, asked)
         asked.add_done_callback(lambda future: self._ended(activity, future))
 

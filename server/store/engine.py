@@ -13,7 +13,7 @@ from typing import Any
 
 from alembic import command
 from alembic.config import Config
-from sqlalchemy import Engine, create_engine, event
+from sqlalchemy import Engine, create_engine, event, text
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session, sessionmaker
@@ -79,6 +79,11 @@ class Store:
             with self._writers.begin() as session:
                 yield session
             self.changes += 1
+
+    def require_writable(self) -> None:
+        """Raises OperationalError where nothing could be written: the writer's lock is taken, and given back."""
+        with self._writing, self._writers() as session:
+            session.execute(text("SELECT 1"))
 
     def close(self) -> None:
         """Closes all connections."""

@@ -56,10 +56,12 @@ class ScheduleStore:
         query = select(ScheduleRow).where(ScheduleRow.robot == robot)
         return newest_first(self._store, query, ScheduleRow.sequence, cursor, limit, _schedule)
 
-    def switch(self, robot: str, identity: str, *, active: bool) -> Schedule:
-        """On or off. Raises a 404."""
+    def switch(self, robot: str, identity: str, *, active: bool, now: datetime) -> Schedule:
+        """On or off; a run that was due while it was off is left out. Raises a 404."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
+            if active and not row.active:
+                _leave_out_missed(row, now)
             row.active = active
             session.flush()
             return _schedule(row)
@@ -75,6 +77,12 @@ class ScheduleStore:
             rows = session.execute(select(ScheduleRow.id, ScheduleRow.next).filter_by(robot=robot, active=True))
             return [identity for identity, moment in rows if is_due(moment, now)]
 
+    def leave_out_missed(self, robot: str, now: datetime) -> list[str]:
+        """Runs that were due up to now are not made up for, and do not count as made. Those schedules."""
+        with self._store.writing() as session:
+            rows = session.scalars(select(ScheduleRow).filter_by(robot=robot, active=True))
+            return [row.id for row in rows if _leave_out_missed(row, now)]
+
     def leave_out(self, robot: str, identity: str, now: datetime) -> None:
         """The run that is due counts as made, though it is not. Raises a 404."""
         with self._store.writing() as session:
@@ -86,6 +94,14 @@ class ScheduleStore:
         assert row.next is not None
         row.submitted_runs += 1
         row.next = following(Plan(row.starts, row.every, row.count), row.submitted_runs, row.next, now)
+
+
+def _leave_out_missed(row: ScheduleRow, now: datetime) -> bool:
+    """Moves a run that is due on to the first after `now`; False where none is due."""
+    if row.next is None or not is_due(row.next, now):
+        return False
+    row.next = following(Plan(row.starts, row.every, row.count), row.submitted_runs, row.next, now)
+    return True
 
 
 def _schedule(row: ScheduleRow) -> Schedule:

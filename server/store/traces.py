@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -61,15 +61,23 @@ class TraceStore:
         self._store = store
         self.page = Remembered(store, self._page)
 
-    def insert(self, new: NewTrace) -> None:
-        """A new trace. Raises a 409 when another file with this number is there."""
+    def insert(self, new: NewTrace, is_there: Callable[[str], bool] = lambda _file: True) -> None:
+        """A new trace, or the file of one that has none any more, which keeps its tags and notes. Raises a 409 when
+        another file with this number `is_there`."""
+        columns = {**new.__dict__, "joints": list(new.joints), "missing": False}
         with self._store.writing() as session:
-            found = session.get(TraceRow, new.id)
-            if found is not None:
-                line = f"trace {new.id} is in the catalogue already, as {found.file}"
+            row = session.get(TraceRow, new.id)
+            tags: tuple[str, ...] = ()
+            if row is None:
+                row = TraceRow(**columns, searched="")
+            elif row.robot == new.robot and (row.file == new.file or not is_there(row.file)):
+                tags = _tags(session, [row.id]).get(row.id, ())
+                for name in columns.keys() - {"notes", "experiment"}:
+                    setattr(row, name, columns[name])
+            else:
+                line = f"trace {new.id} is in the catalogue already, as {row.file}"
                 raise conflict("trace-exists", line, "it is the same trace: nothing needs to be done")
-            row = TraceRow(**{**new.__dict__, "joints": list(new.joints)}, searched="", missing=False)
-            row.searched = _searched(row, ())
+            row.searched = _searched(row, tags)
             session.add(row)
 
     def files(self) -> set[str]:
@@ -141,8 +149,12 @@ class TraceStore:
             row.searched = _searched(row, tags)
             return _entry(row, tags)
 
-    def remove(self, robot: str, identity: str) -> None:
-        """Takes the row away. Raises a 404, and a 409 when a model or a job refers to it."""
+    def remove(self, robot: str, identity: str, also: Callable[[], None] = lambda: None) -> None:
+        """Takes the row away. Raises a 404, and a 409 when a model or a job refers to it.
+
+        `also` is done last before that is on the disk: where it raises, the row stays. A row without a file can be
+        taken away again; a file without a row would come back without its tags.
+        """
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             users = list(session.scalars(select(TraceUseRow.used_by).filter_by(trace=identity).limit(5)))
@@ -150,6 +162,8 @@ class TraceStore:
                 line = f"trace {identity} is what {', '.join(users)} was made from"
                 raise conflict("trace-in-use", line, "it is kept as long as they are")
             session.delete(row)
+            session.flush()
+            also()
 
 
 def _row(session: Session, robot: str, identity: str) -> TraceRow:

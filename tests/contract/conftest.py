@@ -49,7 +49,7 @@ class UnderContract:
 
 
 @pytest.fixture(
-    scope="session",
+    scope="module",  # no longer: two of them run in real time, and take a seventh of a processor each
     params=[*MOCKS, pytest.param("hardware", marks=pytest.mark.hardware)],
 )
 def under_contract(request: pytest.FixtureRequest) -> Iterator[UnderContract]:

@@ -134,6 +134,7 @@ def test_a_stop_is_obeyed_while_another_thread_samples(controller: Controller, s
         enough.set()
         sampler.join(10)
     assert stopped.acknowledged
+    assert StatusFlag.FROZEN in controller.status().flags
     assert ticks == sorted(set(ticks))
 
 

@@ -20,6 +20,7 @@ from firmware_protocol.commands import (
     Request,
     SetPointsTaken,
     Status,
+    StatusFlag,
     Stop,
     Stopped,
     WriteSetPoints,
@@ -87,6 +88,9 @@ def test_an_old_command_cannot_undo_a_later_one(line: Line, set_points: tuple[tu
 def test_a_stop_is_obeyed_however_old_its_number(line: Line, set_points: tuple[tuple[int, int], ...]) -> None:
     assert isinstance(line.ask(20, WriteSetPoints(set_points)), SetPointsTaken)
     assert isinstance(line.ask(15, Stop()), Stopped)
+    status = line.ask(21, ReadStatus())
+    assert isinstance(status, Status)
+    assert status.status & StatusFlag.FROZEN, "answered, and obeyed"
 
 
 def test_numbers_go_on_after_65535(line: Line, set_points: tuple[tuple[int, int], ...]) -> None:

@@ -58,7 +58,29 @@ def test_the_readme_shows_the_two_commands_of_a_new_user() -> None:
     assert {"demo", "test"} <= make_commands((ROOT / "README.md").read_text(encoding="utf-8"))
 
 
+def test_the_index_of_decisions_names_every_one_by_its_title() -> None:
+    folder = ROOT / "docs" / "decisions"
+    index = (folder / "README.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| \[(\d{4})\]\((\S+)\) \| (.+) \|$", index, re.MULTILINE)
+    files = sorted(path for path in folder.glob("*.md") if path.name != "README.md")
+    titles = [path.read_text(encoding="utf-8").partition("\n")[0] for path in files]
+    assert [(name, f"# {number}: {title}") for number, name, title in rows] == [
+        (path.name, title) for path, title in zip(files, titles, strict=True)
+    ]
+
+
+def test_the_readme_leads_to_every_page() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    pages = {path.relative_to(ROOT).as_posix() for path, _ in PAGES if path.parent in (ROOT, ROOT / "docs")}
+    assert {page for page in pages if f"({page})" not in readme} == {"README.md"}
+
+
 def test_make_help_names_every_command() -> None:
     commands = re.findall(r"^\.PHONY: (.+)$", MAKEFILE, re.MULTILINE)[0].split()
     printed = subprocess.run(["make", "help"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     assert set(re.findall(r"^  make (\S+) +\S", printed, re.MULTILINE)) == set(commands)
+
+
+def test_make_runs_one_thing_at_a_time() -> None:
+    """Two of them that install the page's packages at once would spoil each other's."""
+    assert re.search(r"^\.NOTPARALLEL:$", MAKEFILE, re.MULTILINE)

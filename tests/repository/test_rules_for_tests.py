@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import AGAINST_THE_CLOCK, DETERMINISTIC
+
 ROOT = Path(__file__).parents[2]
 
 SKIPPING = """
@@ -96,3 +98,9 @@ def test_a_test_or_a_shared_fixture_that_leaves_something_running_fails(tmp_path
     assert counts["errors"] == 2, printed
     assert "left running: thread 'forgotten'" in printed
     assert "time.sleep(60)" in printed
+
+
+def test_files_that_are_never_tried_again_are_there() -> None:
+    for name in DETERMINISTIC:
+        assert (ROOT / "tests" / name).is_file(), name
+        assert any(name.startswith(f"{folder}/") for folder in AGAINST_THE_CLOCK), name

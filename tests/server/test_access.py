@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,12 +10,14 @@ import httpx
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from starlette.types import Message, Receive, Scope, Send
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from server.access.caller import Caller
+from server.access.gate import NOT_ALLOWED, Gate
 from server.access.limits import Bucket, Buckets
-from server.access.origin import is_from_elsewhere, is_known_name, is_loopback
+from server.access.origin import is_from_elsewhere, is_known_name, is_loopback, is_this_computers_user
 from server.access.tickets import GOOD_FOR, Tickets
 from server.access.tokens import REMEMBERED_FOR, KnownTokens, TokenStore, digest_of
 from server.store.engine import Store
@@ -74,6 +77,25 @@ def test_pages_of_another_origin_change_nothing(headers: dict[str, str], elsewhe
     assert not is_from_elsewhere(headers, changes_something=False)
 
 
+@pytest.mark.parametrize(
+    ("headers", "local"),
+    [
+        ({"host": "127.0.0.1:8300"}, True),
+        ({"host": "localhost:8300", "accept": "*/*"}, True),
+        ({"host": "[::1]:8300"}, True),
+        ({"host": "arm.lab"}, False),
+        ({"host": "192.168.1.5:8300"}, False),
+        ({}, False),
+        ({"host": "127.0.0.1:8300", "x-forwarded-for": "10.0.0.9"}, False),
+        ({"host": "127.0.0.1:8300", "x-forwarded-proto": "https"}, False),
+        ({"host": "localhost:8300", "forwarded": "for=10.0.0.9"}, False),
+        ({"host": "localhost:8300", "via": "1.1 proxy"}, False),
+    ],
+)
+def test_what_a_proxy_hands_on_is_no_user_of_this_computer(headers: dict[str, str], local: bool) -> None:
+    assert is_this_computers_user(headers) is local
+
+
 @given(st.lists(st.floats(0, 10), min_size=1, max_size=200))
 def test_a_bucket_gives_no_more_than_its_size_and_rate(pauses: list[float]) -> None:
     bucket, now, given_out = Bucket(rate=2.0, size=5.0, level=5.0, at=0.0), 0.0, 0
@@ -128,6 +150,50 @@ def test_a_token_is_kept_as_its_hash_and_a_revoked_one_opens_nothing(tmp_path: P
     store.close()
 
 
+def test_a_ticket_of_a_revoked_token_and_who_watches_with_one_are_sent_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.access.gate.LOOK_EVERY", 0.001)
+    clock, store = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
+    store.migrate()
+    tokens, tickets = TokenStore(store), Tickets(clock)
+    token = tokens.add("anna", "operator", clock.utc())
+    gate, sent, ended = Gate(KnownTokens(tokens, clock), tickets, open_on_loopback=False), [], []
+
+    async def watches(_scope: Scope, _receive: Receive, send: Send) -> None:
+        await send({"type": "websocket.accept"})
+        caller = await asyncio.to_thread(tokens.caller, digest_of(token))
+        assert caller is not None
+        tickets.give(caller)
+        await asyncio.to_thread(tokens.revoke, "anna", clock.utc())
+        clock.turn(REMEMBERED_FOR)
+        try:
+            await asyncio.Event().wait()
+        finally:
+            ended.append("watching")
+
+    async def send(message: Message) -> None:
+        sent.append((message["type"], message.get("code")))
+        if len(sent) == 2:
+            await asyncio.Event().wait()  # a client that reads nothing
+
+    async def receive() -> Message:
+        raise AssertionError("nobody asks for it")
+
+    def opened(headers: dict[str, str], query: str = "") -> None:
+        pairs = [(name.encode(), value.encode()) for name, value in ({"host": "10.0.0.1"} | headers).items()]
+        scope = {"type": "websocket", "path": "/live", "query_string": query.encode(), "headers": pairs}
+        asyncio.run(gate.middleware(watches)(scope, receive, send))
+
+    opened({"authorization": f"Bearer {token}"})
+    assert sent == [("websocket.accept", None), ("websocket.close", NOT_ALLOWED)]
+    assert ended == ["watching"]
+    (ticket,) = tickets._given
+    opened({}, f"ticket={ticket}")
+    assert sent[2:] == [("websocket.close", NOT_ALLOWED)]
+    store.close()
+
+
 # ---- through a real service
 
 
@@ -173,6 +239,14 @@ def test_others_are_not_let_in_without_tokens(daq: CommandLine, monkeypatch: pyt
     monkeypatch.setattr("server.logs.begin", lambda: None)  # the logs of this process are the tests' own
     refused = daq("serve", "--host", "0.0.0.0", "--port", "0")
     refused.complains(2, "make one with `daq token add NAME --role operator`")
+
+
+def test_a_service_behind_a_proxy_does_not_start_without_tokens(
+    daq: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.logs.begin", lambda: None)
+    (tmp_path / "daq.toml").write_text('[server]\ntokens = "always"\n')
+    daq("serve", "--port", "0").complains(2, 'server.tokens is "always", and there is no token')
 
 
 def _token(daq: CommandLine, name: str, role: str) -> str:

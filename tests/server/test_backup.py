@@ -6,7 +6,7 @@ import json
 import shutil
 import threading
 import zipfile
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -23,6 +23,7 @@ from server.backup.write import back_up
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.lock import InUseError, sole_use
+from server.store.queues import QueueState, QueueStore
 from server.store.tables import TraceRow
 from server.store.traces import NewTrace, TraceStore
 from tests.daq.cli.invoke import CommandLine
@@ -112,6 +113,22 @@ def test_everything_comes_back_elsewhere_as_it_was(archive: Path, tmp_path: Path
     store = Store(places.url)
     store.migrate()
     assert ExperimentStore(store).count_waiting("ma2000") == 1
+    store.close()
+
+
+@pytest.mark.parametrize("before", [None, QueueState(False, "resumed", NOW), QueueState(True, "paused by anna", NOW)])
+def test_the_queue_comes_back_paused(tmp_path: Path, before: QueueState | None) -> None:
+    here, there, later = filled(tmp_path / "here"), places_in(tmp_path / "there"), NOW + timedelta(days=7)
+    store = Store(here.url)
+    if before is not None:
+        QueueStore(store).set("ma2000", before)
+    store.close()
+    back_up(here, tmp_path / "arm.zip", NOW, quietly)
+    restore(tmp_path / "arm.zip", there, later, quietly)
+    store = Store(there.url)
+    line = "restored from a backup: look at the arm, then resume the queue"
+    expected = before if before is not None and before.paused else QueueState(True, line, later)
+    assert QueueStore(store).get("ma2000") == expected
     store.close()
 
 

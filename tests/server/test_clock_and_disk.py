@@ -12,10 +12,12 @@ from typing import Any, NoReturn
 
 import httpx
 import pytest
+from sqlalchemy.exc import OperationalError
 
 from daq.contracts.trace import Trace
 from daq.traces.store import write_trace
 from server.catalogue.catalogue import Catalogue
+from server.store.events import EventStore
 from tests.server.inside import WrongClock, service_inside
 
 SHORT = {"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1], "settle": 0, "hold": 0}
@@ -98,6 +100,21 @@ def test_a_full_disk_refuses_new_experiments_and_says_so(api: httpx.Client, monk
     ready = api.get(api.base_url.join("/readyz"))
     assert (ready.status_code, ready.json()["checks"]["traces"]) == (503, "1 MB are free, 20 MB stay free")
     assert [one["id"] for one in api.get("queue/experiments").json()] == [waiting]
+
+
+def test_what_was_carried_out_is_told_though_no_event_of_it_can_be_written(
+    api: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuses(*_args: object) -> NoReturn:
+        raise OperationalError("INSERT", {}, Exception("database or disk is full"))
+
+    monkeypatch.setattr(EventStore, "add", refuses)
+    answer = api.post("control", json={})
+    assert answer.status_code == 201, answer.text
+    assert api.delete("control", headers={"Control-Lease": answer.json()["lease"]}).status_code == 204
+    made = _submit(api)
+    assert [one["id"] for one in api.get("queue/experiments").json()] == [made]
+    assert api.post("queue/pause").json()["paused"]
 
 
 def test_a_file_that_finds_no_room_is_refused_and_leaves_nothing(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -87,14 +86,15 @@ def test_ctrl_c_takes_back_what_waits_and_stops_nobody_else(service: Service, tm
         [*DAQ, "--server", service.url, *RAMP], cwd=tmp_path, env=environment_in(tmp_path), stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    while not service.robot.get("/queue/experiments").json():
-        assert running.poll() is None
-    mine = service.robot.get("/queue/experiments").json()[0]["id"]
-    while service.robot.get(f"/experiments/{mine}").json()["state"] == "queued":
-        running.send_signal(signal.SIGINT) if running.poll() is None else None
-        time.sleep(1)
-    _, err = running.communicate(timeout=60)
-    assert running.returncode in (6, 130), err
+    try:
+        while not service.robot.get("/queue/experiments").json():
+            assert running.poll() is None
+        mine = service.robot.get("/queue/experiments").json()[0]["id"]
+        running.send_signal(signal.SIGINT)
+        _, err = running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert running.returncode == 6, err
     assert service.robot.get(f"/experiments/{mine}").json()["state"] == "cancelled"
     assert service.robot.get(f"/experiments/{others}").json()["state"] == "running"
     service.robot.post(f"/experiments/{others}/cancel")

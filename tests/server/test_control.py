@@ -11,6 +11,9 @@ from server.problems import ProblemError
 from server.robot.control import LEASE_TIME, ControlDesk
 from tests.server.clocks import HandClock
 
+WITHIN = 60.0
+"""s after which a test has failed."""
+
 
 @pytest.fixture
 def lapsed() -> queue.Queue[str]:
@@ -69,4 +72,36 @@ def test_silence_is_told_once(clock: HandClock, desk: ControlDesk, lapsed: queue
     assert desk.status().name == "bert"
     desk.close()
     assert lapsed.get_nowait() == "anna"
+    assert lapsed.empty()
+
+
+def test_a_listener_that_fails_ends_neither_the_watch_nor_the_next_lease(clock: HandClock) -> None:
+    heard: queue.Queue[str] = queue.Queue()
+
+    def fails(holder: str) -> None:
+        heard.put(holder)
+        raise OSError("database or disk is full")
+
+    desk = ControlDesk(clock, fails)
+    for name in ("anna", "bert"):
+        desk.take(name, moves_real_arm=False)
+        clock.turn(LEASE_TIME)
+        if desk.take_for_queue("an experiment"):  # the watch looks at the clock, where it has not done so before
+            desk.give_back_for_queue()
+        assert heard.get(timeout=WITHIN) == name
+    desk.take("carl", moves_real_arm=False)
+    clock.turn(LEASE_TIME)
+    assert desk.take("dora", moves_real_arm=False).lease
+    assert heard.get(timeout=WITHIN) == "carl"
+    desk.close()
+
+
+def test_the_queue_has_the_control_only_after_it_was_told_that_a_client_went_silent(
+    desk: ControlDesk, clock: HandClock, lapsed: queue.Queue[str]
+) -> None:
+    desk.take("anna", moves_real_arm=False)
+    clock.turn(LEASE_TIME)
+    while not desk.take_for_queue("an experiment"):
+        assert lapsed.get(timeout=WITHIN) == "anna"
+    assert desk.status().holder == "queue"
     assert lapsed.empty()

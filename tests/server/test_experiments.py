@@ -67,3 +67,13 @@ def test_a_motion_beyond_the_limits_is_refused_before_it_is_queued(service: Serv
     assert answer.headers["Content-Type"] == "application/problem+json"
     assert answer.json()["type"] == "docs/service.md#beyond-limits"
     assert service.robot.get("/queue").json()["queued"] == 0
+
+
+def test_a_stop_while_nothing_waits_pauses_the_queue_until_it_is_resumed(service: Service) -> None:
+    assert service.robot.post("/stop").json()["confirmed"]
+    while not service.robot.get("/queue").json()["paused"]:
+        assert service.process.poll() is None
+    assert service.robot.post("/reset", json={}).status_code == 200
+    service.until_arm("idle")
+    queue = service.robot.get("/queue").json()
+    assert (queue["paused"], queue["reason"][:20]) == (True, "the arm is stopped (")

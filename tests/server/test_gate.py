@@ -48,6 +48,7 @@ class Request:
     path: str
     pieces: int = 0
     length: int | None = None
+    headers: dict[str, str] = field(default_factory=dict)
     taken: int = 0
     status: int = 0
     refused: HTTPException | None = None
@@ -65,7 +66,8 @@ class Request:
 
     def through(self, gate: Gate) -> Request:
         """Itself, answered."""
-        headers = [(b"host", b"127.0.0.1:8300")]
+        told = {"host": "127.0.0.1:8300"} | self.headers
+        headers = [(name.encode(), value.encode()) for name, value in told.items()]
         if self.length is not None:
             headers.append((b"content-length", str(self.length).encode()))
         scope: Scope = {"type": "http", "method": self.method, "path": self.path, "headers": headers}
@@ -85,8 +87,10 @@ async def _reads_everything(scope: Scope, receive: Receive, send: Send) -> None:
     await send({"type": "http.response.start", "status": 200, "headers": []})
 
 
-def _gate(tokens: KnownTokens, *, local: bool = True, buckets: Buckets | None = None) -> Gate:
-    return Gate(tokens, Tickets(HandClock()), open_on_loopback=local, buckets=buckets or Buckets())
+def _gate(
+    tokens: KnownTokens, *, local: bool = True, names: tuple[str, ...] = (), buckets: Buckets | None = None
+) -> Gate:
+    return Gate(tokens, Tickets(HandClock()), open_on_loopback=local, names=names, buckets=buckets or Buckets())
 
 
 @pytest.mark.parametrize(("method", "path"), NO_UPLOADS)
@@ -110,6 +114,14 @@ def test_an_upload_counts_its_own_bytes(tokens: KnownTokens, path: str) -> None:
 def test_nothing_is_read_of_whoever_has_no_token(tokens: KnownTokens, method: str, path: str) -> None:
     stranger = Request(method, path, 120).through(_gate(tokens, local=False))
     assert (stranger.status, stranger.taken) == (401, 0)
+
+
+@pytest.mark.parametrize("headers", [{"host": "arm.lab"}, {"x-forwarded-for": "10.0.0.9"}, {"via": "1.1 proxy"}])
+def test_whoever_comes_through_a_proxy_needs_a_token(tokens: KnownTokens, headers: dict[str, str]) -> None:
+    gate = _gate(tokens, names=("arm.lab",))
+    assert Request("POST", f"{ROBOT}/queue/resume", headers=headers).through(gate).status == 401
+    assert Request("POST", f"{ROBOT}/stop", headers=headers).through(gate).status == 401
+    assert Request("POST", f"{ROBOT}/queue/resume").through(gate).status == 200
 
 
 def test_no_limit_holds_up_a_stop_and_nothing_else_is_one(tokens: KnownTokens) -> None:

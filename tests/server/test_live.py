@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -10,9 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from server.access.caller import LOCAL
 from server.live.history import History
+from server.live.hub import Hub
 from server.live.outbox import DROP_AFTER, THIN_AFTER, THIN_BEYOND, Outbox
+from server.live.stream import stream
 from server.owner.messages import LiveSample
+from tests.server.clocks import HandClock
 from tests.server.service import Service
 from tests.server.watching import frames, messages, watching
 
@@ -138,6 +144,31 @@ def test_a_client_that_takes_nothing_is_hopeless_and_one_that_waits_for_news_is_
     assert outbox.is_hopeless(1000.1 + DROP_AFTER)
     outbox.take(1000.2 + DROP_AFTER)
     assert not outbox.is_hopeless(2000.0)
+
+
+def test_a_client_that_does_not_take_its_dismissal_either_is_dropped_without_a_fault(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("server.live.stream.LOOK_EVERY", 0.001)
+    clock = HandClock()
+
+    async def never(*_: object) -> None:
+        await asyncio.Event().wait()
+
+    async def dropped() -> tuple[int, int]:
+        hub = Hub(clock, History(6, 0.02, 1.0), lambda: pytest.fail("nobody asks for it"))
+        socket = SimpleNamespace(accept=lambda: asyncio.sleep(0), receive=never, send_text=never, close=never)
+        one = SimpleNamespace(robot=SimpleNamespace(clock=clock), hub=hub)
+        serving = asyncio.create_task(stream(socket, one, LOCAL))  # type: ignore[arg-type]
+        while hub.clients == 0:
+            await asyncio.sleep(0)
+        (client,) = hub._clients
+        client.outbox.put("news", clock.monotonic())
+        clock.turn(DROP_AFTER + 1)
+        await serving
+        return hub.dropped, hub.clients
+
+    assert asyncio.run(dropped()) == (1, 0)
 
 
 def _sample(tick: int, value: float) -> LiveSample:

@@ -7,11 +7,14 @@ from threading import Event
 from types import SimpleNamespace
 from typing import Any, cast
 
+import pytest
+
 from daq.contracts.errors import ReachError
 from daq.driver import NoSampleError
 from daq.link import LinkState
 from daq.runner import ArmControl
 from firmware_protocol.commands import StatusFlag
+from server.owner import long_orders
 from server.owner.messages import Answer, RunProgram
 from server.owner.owner import serve
 
@@ -39,8 +42,10 @@ class SilentForAWhile:
         return SimpleNamespace(flags=StatusFlag(0))
 
 
-def served(orders: dict[int, Any], turns: int = 8) -> tuple[list[str], list[Answer]]:
-    """States of the arm, turn by turn, and answers; `orders` by the turn in which they come."""
+def served(
+    orders: dict[int, Any], turns: int = 8, activities: list[str] | None = None
+) -> tuple[list[str], list[Answer]]:
+    """States of the arm as they are told, and answers; `orders` by the turn in which they come."""
     controller, closing = SilentForAWhile(), Event()
     states: list[str] = []
     answers: list[Answer] = []
@@ -52,6 +57,8 @@ def served(orders: dict[int, Any], turns: int = 8) -> tuple[list[str], list[Answ
 
     def tell_arm() -> None:
         states.append(str(control.arm.state))
+        if activities is not None:
+            activities.append(desk.activity)
         if len(states) >= turns:
             closing.set()
 
@@ -75,3 +82,20 @@ def test_what_would_move_a_robot_that_is_silent_is_refused() -> None:
     assert [(a.number, a.exit_code) for a in answers] == [(7, ReachError.exit_code)]
     assert "the link is lost; it is being tried again" in answers[0].problem
     assert states[-1] == "idle"
+
+
+@pytest.mark.parametrize("activity", ["program", "step"])
+def test_what_is_carried_out_is_told_before_it_begins_and_by_its_own_name(
+    activity: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order = cast(Any, RunProgram).model_construct(number=7, activity=activity)
+    activities: list[str] = []
+
+    def perform(_desk: Any, order: RunProgram) -> Answer:
+        assert activities[-1] == activity
+        return Answer(number=order.number)
+
+    monkeypatch.setattr(long_orders, "perform", perform)
+    _, answers = served({0: order}, activities=activities)
+    assert answers == [Answer(number=7)]
+    assert activities[:2] == [activity, "none"]

@@ -46,9 +46,9 @@ def test_an_owner_killed_in_the_middle_of_a_report_is_gone(owners_are: Start, ou
     owners_are(output)
     ended: SimpleQueue[str] = SimpleQueue()
     owner = OwnerProcess(OPEN, lambda _report: None, ended.put)
-    answer = owner.ask(ReadGains)
+    answer = owner.ask(ReadGains, asked=0.0)
     assert ended.get(timeout=60) == "signal 9"
-    for asked in (answer, owner.ask(ReadGains)):
+    for asked in (answer, owner.ask(ReadGains, asked=0.0)):
         with pytest.raises(OwnerGoneError):
             asked.result(0)
     assert owner.close()
@@ -95,7 +95,7 @@ def test_whatever_keeps_it_from_connecting_is_tried_again(error: Exception, monk
     robot = Robot(RobotPlace("ma2000", "mock://", MACHINE, Path()), HandClock())
     tried, third = [0], threading.Event()
 
-    def connect() -> None:
+    def connect(**_: object) -> None:
         tried[0] += 1
         if tried[0] == 3:
             third.set()

@@ -6,6 +6,7 @@ import shutil
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from datetime import timedelta
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,8 +18,12 @@ from sqlalchemy.exc import OperationalError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.experiments import Experiment, ExperimentRequest, Schedule, ScheduleRequest
 from daq.contracts.service.robot import RobotIdentity
-from server.owner.messages import Answer, ArmReport
-from server.queue.desk import QueueDesk, QueueParts
+from daq.contracts.trace import Outcome
+from server.owner.messages import Answer, ArmReport, Finished
+from server.problems import ProblemError
+from server.queue.desk import QueueDesk
+from server.queue.due_runs import DueRuns
+from server.queue.parts import QueueParts
 from server.robot.control import ControlDesk
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
@@ -28,43 +33,72 @@ from tests.server.clocks import HandClock
 
 CALM = ArmReport(arm="idle", cause="", activity="none", limp=(), link="connected", counters={})
 MOCK = RobotIdentity(simulated=True, protocol=1, period=0.02, boots=1)
+REAL = MOCK.model_copy(update={"simulated": False})
+FULL = OperationalError("INSERT", {}, Exception("database or disk is full"))
 SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]})
 
 
 class Bench:
-    """A queue, its stores, an arm, and all events."""
+    """A queue, its stores, an arm, and all events.
+
+    answer:   what the arm answers an experiment with; None while it moves
+    fails_at: the event whose listener fails, once
+    lost:     raised for a trace that is to be taken into the catalogue
+    """
 
     def __init__(self, folder: Path) -> None:
         self.store = Store(f"sqlite:///{folder / 'service.sqlite'}")
         self.store.migrate()
         self.experiments, self.schedules = ExperimentStore(self.store), ScheduleStore(self.store)
         self.clock = HandClock()
-        self.answer = Answer(number=1, problem="refused", exit_code=2)
+        self.answer: Answer | None = Answer(number=1, problem="refused", exit_code=2)
+        self.asked: Future[Answer] = Future()
+        self.moves = threading.Event()
+        self.fails_at = ""
+        self.lost: Exception | None = None
+        self.looked_for_traces = 0
+        self.orders: list[object] = []
         self._heard = threading.Condition()
         self.events: list[str] = []
         self.control = ControlDesk(self.clock, lambda _holder: None)
-        robot: Any = SimpleNamespace(
+        self.robot: Any = SimpleNamespace(
             name="ma2000", identity=MOCK, arm=CALM, problem="", experiment=None,
-            place=SimpleNamespace(folder=folder), ask=self._ask, tell=lambda _order: None,
+            place=SimpleNamespace(folder=folder), ask=self._ask, tell=self.orders.append,
         )  # fmt: skip
-        self.queue = QueueDesk(
-            QueueParts(
-                robot=robot, control=self.control, experiments=self.experiments, schedules=self.schedules,
-                queues=QueueStore(self.store), clock=self.clock, told=self._hear, recorded=lambda _answer: None,
-                unfinished=lambda: None, unattended=False,
-            )
+        self.queues = QueueStore(self.store)
+        self.queue = self.begun_anew()
+
+    def begun_anew(self) -> QueueDesk:
+        """The queue as a service that begins now has it."""
+        parts = QueueParts(
+            robot=self.robot, control=self.control, experiments=self.experiments, schedules=self.schedules,
+            queues=self.queues, clock=self.clock, told=self._hear, recorded=self._record,
+            unfinished=self._look_for_traces, unattended=False,
         )  # fmt: skip
+        return QueueDesk(parts)
 
     def _ask(self, _order: object, **_fields: object) -> Future[Answer]:
-        future: Future[Answer] = Future()
-        future.set_result(self.answer)
-        return future
+        self.asked = Future()
+        if self.answer is not None:
+            self.asked.set_result(self.answer)
+        self.moves.set()
+        return self.asked
+
+    def _record(self, _answer: Answer) -> None:
+        if self.lost is not None:
+            raise self.lost
+
+    def _look_for_traces(self) -> None:
+        self.looked_for_traces += 1
 
     def _hear(self, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
         del actor, experiment
         with self._heard:
             self.events.append(f"{kind}: {text}")
             self._heard.notify_all()
+            if text == self.fails_at:
+                self.fails_at = ""
+                raise FULL
 
     def until(self, said: Callable[[str], bool]) -> str:
         """Waits for such an event; the test's own time limit ends the wait."""
@@ -72,9 +106,13 @@ class Bench:
             self._heard.wait_for(lambda: any(said(event) for event in self.events))
             return next(event for event in self.events if said(event))
 
-    def schedule(self) -> Schedule:
+    def submit(self) -> Experiment:
+        """An experiment that may run at once."""
+        return self.queue.submit(ExperimentRequest(spec=SPEC), "anna", None)[0]
+
+    def schedule(self, every: float = 3600) -> Schedule:
         """One whose first run is due now, and then every hour."""
-        return self.schedules.create("ma2000", ScheduleRequest(spec=SPEC, every=3600), self.clock.utc(), "anna")
+        return self.schedules.create("ma2000", ScheduleRequest(spec=SPEC, every=every), self.clock.utc(), "anna")
 
     def runs(self, schedule: Schedule) -> list[Experiment]:
         """What it has submitted."""
@@ -90,6 +128,8 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
     """Its queue not yet begun, and not paused."""
     made = Bench(tmp_path)
     yield made
+    if made.moves.is_set() and not made.asked.done():
+        made.asked.set_result(_done())
     made.queue.close(10)
     made.control.close()
     made.store.close()
@@ -161,3 +201,174 @@ def test_events_and_the_queue_call_an_end_as_the_experiment_does(bench: Bench, e
     assert bench.experiments.get("ma2000", made.id).state == state
     expected = f"experiment {made.id} ended as {state} (why): look at the arm, then resume"
     assert bench.queue.status().reason == expected
+
+
+def _done(outcome: Outcome = "complete") -> Answer:
+    finished = Finished(outcome=outcome, trace="x.mcap", samples=1, missing=0, counters={}, reason="")
+    return Answer(number=1, finished=finished)
+
+
+def _fails(times: int, otherwise: Callable[..., Any]) -> Callable[..., Any]:
+    """What a full disk makes of `otherwise`, and of those who call it again."""
+    left = [FULL] * times
+
+    def tried(*args: Any, **named: Any) -> Any:
+        if left:
+            raise left.pop()
+        return otherwise(*args, **named)
+
+    return tried
+
+
+def _is_free(bench: Bench) -> bool:
+    """Whether Reset, Disconnect and whoever wants the control get it."""
+    bench.control.require_free_of_others(None)
+    return bench.robot.experiment is None and bench.queue.running is None
+
+
+# ---- what fails at the end
+
+
+def test_a_fault_before_the_arm_is_asked_ends_the_experiment_gives_the_control_back_and_holds_the_queue(
+    bench: Bench,
+) -> None:
+    bench.fails_at = "started"
+    made, following = bench.submit(), bench.submit()
+    bench.queue.start()
+    bench.until(lambda event: event.startswith("queue: paused"))
+    ended = bench.experiments.get("ma2000", made.id)
+    assert (ended.state, ended.reason) == ("interrupted", "OperationalError: see the log")
+    assert _is_free(bench)
+    assert bench.experiments.get("ma2000", following.id).state == "queued"
+
+
+def test_a_trace_that_cannot_be_taken_in_holds_the_queue_and_is_looked_for(bench: Bench) -> None:
+    bench.answer, bench.lost = _done(), FULL
+    made, following = bench.submit(), bench.submit()
+    bench.queue.start()
+    bench.until(lambda event: event.startswith("queue: paused"))
+    ended = bench.experiments.get("ma2000", made.id)
+    assert (ended.state, ended.outcome) == ("done", "complete")
+    assert ended.reason == "its trace is not in the catalogue: see the log"
+    assert bench.looked_for_traces == 1
+    assert _is_free(bench)
+    assert bench.experiments.get("ma2000", following.id).state == "queued"
+
+
+def test_an_end_that_cannot_be_written_holds_the_queue_and_is_written_later(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.answer = _done()
+    monkeypatch.setattr(bench.experiments, "end", _fails(2, bench.experiments.end))
+    made, following = bench.submit(), bench.submit()
+    bench.queue.start()
+    bench.until(lambda event: event.startswith("queue: paused"))
+    assert bench.queue.status().paused
+    assert _is_free(bench)
+    bench.queue.wake()
+    bench.until(lambda event: event == "experiment: completed")
+    assert bench.experiments.get("ma2000", made.id).state == "done"
+    assert bench.experiments.get("ma2000", following.id).state == "queued"
+
+
+def test_a_pause_holds_though_the_database_does_not_know_it_yet(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    write, written = bench.queues.set, threading.Event()
+
+    def then_told(*args: Any) -> None:
+        write(*args)
+        written.set()
+
+    monkeypatch.setattr(bench.queues, "set", _fails(1, then_told))
+    bench.queue.pause("paused by anna", "anna")
+    assert bench.queue.status().paused
+    assert bench.begun_anew().status().paused is False
+    bench.queue.start()
+    written.wait()
+    assert bench.begun_anew().status().reason == "paused by anna"
+
+
+def test_a_queue_whose_resuming_cannot_be_written_stays_paused(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench.queue.pause("paused by anna", "anna")
+    monkeypatch.setattr(bench.queues, "set", _fails(1, bench.queues.set))
+    with pytest.raises(OperationalError):
+        bench.queue.resume("anna", moves_real_arm=True)
+    assert bench.queue.status().paused
+
+
+# ---- a person beside the arm
+
+
+def test_a_pause_lets_the_one_that_runs_go_on_where_an_operator_must_be_there(bench: Bench) -> None:
+    bench.robot.identity, bench.answer = REAL, None
+    bench.queue.resume("anna", moves_real_arm=True)
+    bench.submit()
+    bench.queue.start()
+    bench.moves.wait()
+    bench.queue.pause("paused by anna", "anna")
+    attended = bench.queue.status().attended_until
+    assert attended is not None  # else the run is stopped within a second
+    assert attended > bench.clock.utc()
+
+
+@pytest.mark.parametrize("state", ["stopped", "fault"])
+def test_a_stop_holds_the_queue_though_nothing_waits_and_whatever_is_reset_meanwhile(bench: Bench, state: str) -> None:
+    stopped = CALM.model_copy(update={"arm": state, "cause": "somebody"})
+    bench.queue.hear(stopped)
+    bench.queue.hear(CALM)  # reset, before the queue's thread has looked
+    bench.queue.start()
+    line = f"the arm is {state} (somebody): look at it, reset it, then resume the queue"
+    bench.until(lambda event: event == f"queue: paused: {line}")
+    assert bench.queue.status().reason == line
+    bench.queue.resume("anna", moves_real_arm=False)
+    made = bench.submit()
+    bench.until(lambda event: event == "experiment: failed: refused")
+    assert bench.experiments.get("ma2000", made.id).state == "failed"
+
+
+def test_a_stop_is_remembered_by_whoever_wants_to_resume_too_early(bench: Bench) -> None:
+    bench.robot.arm = CALM.model_copy(update={"arm": "stopped", "cause": "somebody"})
+    bench.queue.hear(bench.robot.arm)
+    with pytest.raises(ProblemError, match="the arm is stopped: somebody"):
+        bench.queue.resume("anna", moves_real_arm=False)
+    bench.robot.arm = CALM
+    bench.queue.start()
+    bench.until(lambda event: event.startswith("queue: paused: the arm is stopped"))
+
+
+# ---- schedules that nobody could submit
+
+
+def test_what_was_due_while_the_service_was_off_is_left_out(bench: Bench) -> None:
+    schedule = bench.schedule()
+    bench.clock.turn(3 * 3600 + 60)
+    bench.queue = bench.begun_anew()
+    line = "what was due while the service was off is left out"
+    assert bench.events == [f"schedule: schedule {schedule.id}: {line}"]
+    assert bench.schedules.due("ma2000", bench.clock.utc()) == []
+    found = bench.schedules.get("ma2000", schedule.id)
+    assert (found.next, found.submitted_runs) == (schedule.starts + timedelta(hours=4), 0)
+
+
+def test_switching_a_schedule_on_submits_nothing_that_was_due_while_it_was_off(bench: Bench) -> None:
+    schedule = bench.schedule()
+    name, due = "ma2000", [schedule.id]
+    bench.schedules.switch(name, schedule.id, active=True, now=bench.clock.utc())  # it is on: its run stays due
+    assert bench.schedules.due(name, bench.clock.utc()) == due
+    bench.schedules.switch(name, schedule.id, active=False, now=bench.clock.utc())
+    bench.clock.turn(7 * 86400)
+    on = bench.schedules.switch(name, schedule.id, active=True, now=bench.clock.utc())
+    assert bench.schedules.due(name, bench.clock.utc()) == []
+    assert on.next == bench.clock.utc() + timedelta(hours=1)
+    bench.clock.turn(3600)
+    assert bench.schedules.due(name, bench.clock.utc()) == due
+
+
+def test_runs_that_are_left_out_are_told_once(bench: Bench) -> None:
+    schedule = bench.schedule(every=10)
+    bench.queue.pause("paused by anna", "anna")
+    runs = DueRuns(bench.queue._parts)
+    for _ in range(5):
+        runs.submit()
+        bench.clock.turn(10)
+    assert len([event for event in bench.events if "left out" in event]) == 1
+    assert bench.counted(schedule) == 5

@@ -9,10 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.robot import RobotIdentity
+from daq.trajectories import plan, start_angles
 from server.owner.messages import ArmReport
-from server.queue.order import Waiting, next_due, next_moment
+from server.queue.length import LONGEST, least_length
+from server.queue.order import Waiting, next_due
 from server.queue.readiness import Circumstances, what_is_missing
 from server.queue.schedule import Plan, following, is_due
 from server.queue.states import Event, IllegalEventError, advance, after_restart
@@ -96,13 +101,6 @@ def test_a_clock_that_is_set_back_reorders_nothing(all_of_them: list[Waiting], n
     assert next_due(at_once, now) == next_due(at_once, now - back)
 
 
-@given(waiting)
-def test_the_next_moment_is_the_first_of_those_that_wait_for_one(all_of_them: list[Waiting]) -> None:
-    moment = next_moment(all_of_them)
-    times = [one.at for one in all_of_them if one.at is not None]
-    assert moment == (min(times) if times else None)
-
-
 intervals = st.floats(10, 10**6)
 
 
@@ -179,3 +177,24 @@ def test_a_real_arm_needs_an_operators_word_and_a_mock_does_not() -> None:
     assert missing is not None
     assert "moves_real_arm" in missing.line
     assert what_is_missing(Circumstances(REAL, _arm(), "", True, True)) is None
+
+
+def _repeated(amplitude: float, **more: object) -> ExperimentSpec:
+    return ExperimentSpec.model_validate(
+        {"trajectory": {"kind": "step", "amplitude": amplitude}, "joints": [1], **more}
+    )
+
+
+def test_the_least_length_has_settling_and_holding_of_every_repeat() -> None:
+    machine = load_machine("ma2000")
+    spec = _repeated(0.0, repeats=5, settle=0.5, hold=2.0)  # no way back: only the step's own set point is not in it
+    planned = plan(spec, machine, start_angles(spec, machine))
+    assert least_length(spec) == pytest.approx(planned.duration, abs=5 * planned.period + 1e-9)
+
+
+def test_what_the_ways_back_make_too_long_is_refused_by_the_planner() -> None:
+    machine = load_machine("ma2000")
+    spec = _repeated(3.0, repeats=1000, hold=0.0)
+    assert least_length(spec) < LONGEST
+    with pytest.raises(SpecError, match="at most 4 h are allowed"):
+        plan(spec, machine, start_angles(spec, machine))

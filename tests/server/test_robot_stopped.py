@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
 from types import SimpleNamespace
+from typing import NoReturn
 
 import pytest
 
@@ -49,17 +50,32 @@ def _report(arm: ArmState) -> ArmReport:
 def test_nothing_is_jogged_after_a_confirmed_stop(robot: Robot, desk: StopDesk, jogging: bool) -> None:
     teaching = TeachingDesk(robot, lambda _line: None)
     if jogging:
-        teaching.jog(JOG)
+        teaching.jog(JOG, robot.clock.monotonic())
     assert desk.stop_now().confirmed
     with pytest.raises(ProblemError) as refused:
-        teaching.jog(JOG)
+        teaching.jog(JOG, robot.clock.monotonic())
     assert (refused.value.status, refused.value.kind) == (409, "arm-stopped")
     robot._heard(_report("stopped"))
     with pytest.raises(ProblemError):
-        teaching.jog(JOG)
+        teaching.jog(JOG, robot.clock.monotonic())
     robot._heard(_report("idle"))  # after a reset
-    teaching.jog(JOG)
+    teaching.jog(JOG, robot.clock.monotonic())
     assert teaching.status().activity == "jog"
+
+
+def test_a_stop_that_finds_no_file_for_its_socket_says_that_it_was_not_delivered(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_socket(*_: object) -> NoReturn:
+        raise OSError(24, "Too many open files")
+
+    monkeypatch.setattr("server.robot.stop.request_stop", no_socket)
+    desk = StopDesk(robot, HandClock())
+    told = desk.stop_now()
+    desk.close()
+    assert (told.delivered, told.confirmed) == (False, False)
+    assert told.text.startswith("stop NOT DELIVERED: ")
+    assert told.text.endswith("Too many open files. Use the emergency stop.")
 
 
 def test_a_fault_keeps_its_cause_when_it_is_stopped_too(robot: Robot, desk: StopDesk) -> None:

@@ -9,6 +9,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import httpx
 import pytest
@@ -21,6 +22,7 @@ from server.access.stop_gate import StopGate
 from server.access.tokens import KnownTokens, TokenStore
 from server.listening import ListenError, listening
 from server.problems import ProblemError
+from server.stop_listener import StopListener
 from server.store.engine import Store
 from tests.daq.cli.invoke import CommandLine
 from tests.server.clocks import HandClock
@@ -182,6 +184,28 @@ def test_a_silent_client_or_a_crowd_of_them_keeps_nobody_from_stopping(service: 
             connection.close()
 
 
+def test_whoever_does_not_ask_in_time_keeps_no_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = HandClock()
+
+    def later_at_every_look() -> float:
+        clock.turn(600.0)
+        return clock.monotonic()
+
+    monkeypatch.setattr("server.stop_listener.READ_WITHIN", 1000.0)
+    monkeypatch.setattr("server.stop_listener.time", SimpleNamespace(monotonic=later_at_every_look))
+    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
+    gate = StopGate(KnownTokens(TokenStore(store), clock), True, (), 8300)
+    with socket.create_server(("127.0.0.1", 0)) as door:
+        address = door.getsockname()
+        listener = StopListener(door, gate, {}, lambda *_: None)
+        with socket.create_connection(address, timeout=60) as slow:
+            slow.sendall(b"POST ")
+            while slow.recv(4096):  # what it has sent is no request
+                pass
+        listener.close()
+    store.close()
+
+
 def test_viewers_may_stop_and_strangers_may_not(tmp_path: Path) -> None:
     clock, store = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
     store.migrate()
@@ -193,7 +217,12 @@ def test_viewers_may_stop_and_strangers_may_not(tmp_path: Path) -> None:
         with pytest.raises(ProblemError) as refused:
             gate.admit({"host": "10.0.0.1:8301"} | headers)
         assert refused.value.status == 401
-    assert StopGate(KnownTokens(tokens, clock), True, (), 8300).admit({"host": "localhost:8301"}) == LOCAL
+    gate = StopGate(KnownTokens(tokens, clock), True, ("arm.lab",), 8300)
+    assert gate.admit({"host": "localhost:8301"}) == LOCAL
+    for proxied in ({"host": "arm.lab"}, {"host": "localhost:8301", "x-forwarded-for": "10.0.0.9"}):
+        with pytest.raises(ProblemError) as refused:
+            gate.admit(proxied)
+        assert refused.value.status == 401
     store.close()
 
 

@@ -29,6 +29,7 @@ def test_whoever_waits_is_answered_when_the_service_ends() -> None:
 
         begun = asyncio.create_task(when_ended(hub, {"jobs"}, look, is_done, 3600.0))
         await looked.wait()
+        assert hub.clients == 0  # nobody watches
         hub.end_waiting()
         return [await begun, await when_ended(hub, {"jobs"}, look, is_done, 3600.0)]
 

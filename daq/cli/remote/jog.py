@@ -24,7 +24,7 @@ def jog_at_server(
     with keys() as keyboard, taught(call, consent) as (robot, control, stopped):
         line.tell(HELP)
         while not pendant.ended:
-            stopped.raise_if_pressed()
+            stopped.raise_if_answered()
             typed = keyboard.pressed()
             now = time.monotonic()
             command = pendant.command(typed, now)

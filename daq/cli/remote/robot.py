@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from daq.cli.consent import agreed
 from daq.cli.context import Invocation
-from daq.contracts.errors import SafetyError, SpecError
+from daq.contracts.errors import SafetyError
 
 if TYPE_CHECKING:
     from daq.client import Robot
@@ -40,9 +40,3 @@ def require_word(status: RobotStatus, consent: bool) -> bool:
     if real and not consent and not agreed(f"{status.robot} at the server ({status.port})"):
         raise SafetyError(f"{status.robot} is a real arm: it moves only with the operator's consent (--yes)")
     return real
-
-
-def require_here(call: Invocation, what: str, instead: str) -> None:
-    """Refuses what a server's robot cannot do, in one line. Raises SpecError."""
-    if call.server is not None:
-        raise SpecError(f"--server: {what} is done beside the traces and models of this computer; {instead}")

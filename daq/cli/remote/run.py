@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.cli.context import Invocation
+from daq.cli.remote.companion import Companion
 from daq.cli.remote.robot import connected_status, remote_robot, require_word
 from daq.cli.run_result import AcquisitionFailedError, ShownRun, shown_run
 from daq.cli.stop_keys import StopKeys
-from daq.client import Robot, ServiceError, ServiceNotReachedError
+from daq.client import Robot, ServiceNotReachedError
 from daq.contracts.errors import SafetyError, TraceError
 from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.live import EventMessage, LiveMessage, ProgressMessage, QueueMessage, RecordEventMessage
@@ -26,8 +24,6 @@ if TYPE_CHECKING:
 
 EXIT_CODES = {"failed": 4, "cancelled": 6, "interrupted": 3}
 """Of an experiment that has left no trace."""
-ATTEND_EVERY = 20.0
-"""s between two words that the operator is there; the service waits a minute for them."""
 LOOK_EVERY = 2.0
 """s without news after which the experiment is looked at."""
 LOOKS_IN_VAIN = 5
@@ -44,11 +40,16 @@ def acquire_remotely(call: Invocation, spec: ExperimentSpec, folder: Path, conse
         _require_open_queue(call, status)
         real = require_word(status, consent)
         if real:
+            _require_open_queue(call, robot.status())  # the question may have stood there for minutes
             robot.queue.resume(moves_real_arm=True)
         with StopKeys() as keys, robot.live("events", "queue") as stream:
             experiment = robot.experiments.submit(spec)
-            with _companion(robot, experiment.id, keys, attends=real), shown_run(spec) as shown:
-                ended = _Follower(robot, experiment.id, shown).follow(stream)
+            with Companion(robot, experiment.id, attends=real) as companion, shown_run(spec) as shown:
+                keys.stops(companion.press)
+                try:
+                    ended = _Follower(robot, experiment.id, shown).follow(stream)
+                finally:
+                    keys.stops(lambda: None)
         return _finished(robot, ended, folder)
 
 
@@ -132,46 +133,6 @@ def _waiting(message: QueueMessage) -> str:
     if status.running is not None:
         return f"waiting: experiment {status.running} runs"
     return f"waiting: {status.waiting_for}" if status.waiting_for else "queued"
-
-
-@contextmanager
-def _companion(robot: Robot, experiment: str, keys: StopKeys, *, attends: bool) -> Iterator[None]:
-    """Within, keys that stop take the experiment back or stop the arm, on a thread that waits for nothing else; and on
-    a real arm the service is told again and again that somebody is there."""
-    pressed, ended = threading.Event(), threading.Event()
-
-    def stop() -> None:
-        try:
-            robot.experiments.cancel(experiment)
-        except ServiceError:
-            pass  # it has ended by itself in this moment
-        except ServiceNotReachedError:
-            robot.stop()  # whatever it can still reach: the outcome is told with the experiment's end, or its loss
-
-    def wait() -> None:
-        while not ended.is_set():
-            if pressed.wait(ATTEND_EVERY):
-                pressed.clear()
-                if not ended.is_set():
-                    stop()
-            elif attends:
-                _attend(robot)
-
-    companion = threading.Thread(target=wait, name="stop-keys", daemon=True)
-    companion.start()
-    keys.stops(pressed.set)
-    try:
-        yield
-    finally:
-        keys.stops(lambda: None)
-        ended.set()
-        pressed.set()
-        companion.join()
-
-
-def _attend(robot: Robot) -> None:
-    with suppress(ServiceError, ServiceNotReachedError):  # told again in time; a service that is gone stops the run
-        robot.queue.attend()
 
 
 def _finished(robot: Robot, ended: Experiment, folder: Path) -> Finished:

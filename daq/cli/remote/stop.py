@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
+import sys
 
 from daq.acquisition.stop_socket import StopAnswer
 from daq.cli.context import Invocation
 from daq.cli.remote.robot import TOKEN_VARIABLE
 from daq.client import Client
+from daq.client.stopping import NoSuchRobot
 from daq.contracts.errors import DaqError
 from daq.contracts.service.robot import StopResult
 
 DEFAULT_ROBOT = "ma2000"
+NAMES_WITHIN = 1.0
+"""s for a service to name its robots: whoever stops must soon know what became of it."""
 
 
 def stop_at_server(call: Invocation) -> list[StopAnswer]:
@@ -24,7 +28,7 @@ def stop_at_server(call: Invocation) -> list[StopAnswer]:
     try:
         with Client(call.server, os.environ.get(TOKEN_VARIABLE) or None) as client:
             first = client.robot(name).stop()
-            others = [] if first.delivered else _others(client, name)
+            others = _others(client, name, first) if isinstance(first, NoSuchRobot) else []
             return [_answer(one, call.server, client.robot(one).stop()) for one in others] or [
                 _answer(name, call.server, first)
             ]
@@ -40,10 +44,11 @@ def _likely_name(call: Invocation) -> str:
         return DEFAULT_ROBOT
 
 
-def _others(client: Client, name: str) -> list[str]:
-    """Names of the robots of a service that has none of this name."""
+def _others(client: Client, name: str, first: StopResult) -> list[str]:
+    """Names of the robots of a service that has none of this name, which is said first."""
+    print(f"{first.note}: {client.url} is asked to stop the robots that it has", file=sys.stderr, flush=True)
     try:
-        names = [one.robot for one in client.robots()]
+        names = [one.robot for one in client.robots(within=NAMES_WITHIN)]
     except DaqError:
         return []
     return [] if name in names else names

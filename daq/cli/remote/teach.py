@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from types import TracebackType
 from typing import TYPE_CHECKING
 
 from daq.cli.context import Invocation, console
@@ -39,7 +40,7 @@ def taught(call: Invocation, consent: bool) -> Iterator[tuple[Robot, HeldControl
     """The robot, its control, and whether a key has stopped it: Ctrl-C and its like do so within, on a thread that does
     nothing else."""
     with StopKeys() as keys, controlled(call, consent) as (robot, control), Stopped(robot) as stopped:
-        keys.stops(stopped.pressed.set)
+        keys.stops(stopped.press)
         try:
             yield robot, control, stopped
         finally:
@@ -47,30 +48,47 @@ def taught(call: Invocation, consent: bool) -> Iterator[tuple[Robot, HeldControl
 
 
 class Stopped:
-    """Stops the robot when `pressed` is set; `result` says then what became of it."""
+    """Stops the robot when `press` is called; `result` says then what became of it.
+
+    Leaving raises StoppedAtServerError after a press, whatever the work has ended with: a stop counts.
+    """
 
     def __init__(self, robot: Robot) -> None:
-        self.pressed = threading.Event()
+        self.pressed = False
         self.result: StopResult | None = None
         self._robot = robot
-        self._ended = False
+        self._wake = threading.Event()
         self._thread = threading.Thread(target=self._wait, name="stop-keys", daemon=True)
 
     def __enter__(self) -> Stopped:
         self._thread.start()
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._ended = True
-        self.pressed.set()
-        self._thread.join()
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._wake.set()
+        self._thread.join()  # a stop is answered within seconds, and raises nothing
+        if kind is None or issubclass(kind, DaqError):
+            self.raise_if_answered()
+
+    def press(self) -> None:
+        """A key that stops. As quick as a signal wants it; again and again."""
+        if not self.pressed:  # a signal that interrupts this one finds its lock taken, and need not wake again
+            self.pressed = True
+            self._wake.set()
 
     def _wait(self) -> None:
-        self.pressed.wait()
-        if not self._ended:
+        self._wake.wait()
+        if self.pressed:
             self.result = self._robot.stop()
 
-    def raise_if_pressed(self) -> None:
+    def wait_for_answer(self) -> None:
+        """Where a key has been pressed: until it is known what became of the stop."""
+        if self.pressed:
+            self._thread.join()
+
+    def raise_if_answered(self) -> None:
         """Raises StoppedAtServerError once the stop has been answered."""
         if self.result is not None:
             raise StoppedAtServerError(self.result.text)
@@ -81,7 +99,8 @@ def perform_at_server(call: Invocation, program: BaseModel, consent: bool) -> No
     with taught(call, consent) as (robot, control, stopped):
         before = _newest(robot.teaching())
         control.perform(program)
-        print(_end_of(robot, control, stopped, before).result)
+        ended = _end_of(robot, control, stopped, before)
+    print(ended.result)
 
 
 def lead_at_server(
@@ -95,17 +114,29 @@ def lead_at_server(
         control.lead(joints)
         console().print("recording: lead the arm" + ("; Enter ends it" if seconds is None else f" for {seconds:g} s"))
         until = None if seconds is None else time.monotonic() + seconds
-        while stopped.result is None and robot.teaching().activity == "lead":
+        while not stopped.pressed and robot.teaching().activity == "lead":
             if until is not None and time.monotonic() >= until:
                 break
             if select.select([] if until is not None else [sys.stdin], [], [], LOOK_EVERY)[0]:
                 break
-        found = robot.teaching() if stopped.result is not None else control.finish()
+        found = _end_of_lead(robot, control, stopped)
         if found.path is not None and found.path != before:
             keep(RecordedPath.model_validate(found.path.model_dump()))
-        stopped.raise_if_pressed()
+        stopped.raise_if_answered()
         if found.problem:
             raise SafetyError(found.problem)
+
+
+def _end_of_lead(robot: Robot, control: HeldControl, stopped: Stopped) -> TeachingStatus:
+    """Ends it, and waits for the end and its path: that of one that is stopped comes after the stop's own answer."""
+    stopped.wait_for_answer()
+    try:
+        return control.finish()
+    except DaqError:
+        if not stopped.pressed:
+            raise
+        stopped.wait_for_answer()
+        return robot.teaching()
 
 
 def _end_of(robot: Robot, control: HeldControl, stopped: Stopped, shown: int) -> TeachingStatus:
@@ -116,7 +147,7 @@ def _end_of(robot: Robot, control: HeldControl, stopped: Stopped, shown: int) ->
             if line.number > shown:
                 console().print(line.text)
         shown = max(shown, _newest(status))
-        stopped.raise_if_pressed()
+        stopped.raise_if_answered()
         if status.activity == "none":
             if status.problem:
                 raise SafetyError(status.problem)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from daq.acquisition.messages import Failed, Finished
+from daq.acquisition.process import EXIT_PROGRAM_FAULT
 from daq.acquisition.stop_socket import request_stop
 from daq.contracts.experiment import ExperimentSpec, Pause
 from daq.traces.reader import read_trace
@@ -168,6 +169,7 @@ def wait_for_trace(folder: Path, watched: int) -> None:
 def test_a_program_fault_is_told_as_one_and_freezes_nothing_else(tmp_path: Path) -> None:
     with running(text_of(job(tmp_path / "traces", QUICK)), before="ulimit -n 9") as process:  # too few open files
         end = process.end()
-        assert process.exit_code() == end.exit_code != 0  # type: ignore[union-attr]
-    assert isinstance(end, Failed)
+        assert isinstance(end, Failed), end
+        assert process.exit_code() == end.exit_code == EXIT_PROGRAM_FAULT
     assert "\n" not in end.message
+    assert not list(tmp_path.rglob("*.mcap*"))

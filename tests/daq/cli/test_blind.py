@@ -194,6 +194,15 @@ def test_a_trial_that_goes_on_does_nothing_twice(done: Campaign) -> None:
     assert {stage: (done.folder.path / f"{stage}.jsonl").read_bytes() for stage in STAGES} == before
 
 
+def test_the_lines_alone_are_enough_to_go_on_elsewhere(done: Campaign, tmp_path: Path) -> None:
+    for name in ("trial.json", *(f"{stage}.jsonl" for stage in STAGES)):
+        (tmp_path / name).write_bytes((done.folder.path / name).read_bytes())
+    again = Campaign(TrialFolder.open(tmp_path, "ramp", True, None, ""), MACHINE, ("/no/diagnoser",))
+    assert again.run(SECRETS, 1, lambda _number, _said: None) == 0
+    assert again.table() == done.table()
+    assert not list((tmp_path / "traces").iterdir())
+
+
 def test_an_answer_that_was_changed_after_it_was_sealed_is_not_scored(done: Campaign, tmp_path: Path) -> None:
     answers, sealed = done.folder.path / "answers", rows(done, "diagnose")[SECRETS[1]]
     copy = trial(tmp_path)

@@ -7,9 +7,10 @@ import os
 import pty
 from pathlib import Path
 
+import pytest
 import serial
 
-from daq.acquisition.stop_socket import stop_listener
+from daq.acquisition.stop_socket import StopAnswer, StopAttempt, stop_listener
 from daq.transport.mock_process import MockProcess
 from tests.daq.cli.board import ask
 from tests.daq.cli.invoke import CommandLine
@@ -76,3 +77,40 @@ def test_a_configuration_that_cannot_be_read_is_told_and_stops_nobody_from_stopp
     assert said.code == 3
     assert "NOT DELIVERED" in said.out
     assert "not TOML" in said.out
+
+
+def test_with_a_service_by_default_what_is_moved_from_here_is_stopped_too(
+    daq: CommandLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DAQ_SERVER", "http://127.0.0.1:1")
+    Path("mine.toml").touch()
+    with stop_listener("another"):  # does not answer
+        here_too = json.loads(daq("--config", "mine.toml", "stop", "--json").out)
+        named = json.loads(daq("--server", "http://127.0.0.1:1", "stop", "--json").out)
+    assert [answer["robot"] for answer in here_too] == ["another", "ma2000"]
+    assert [answer["robot"] for answer in named] == ["ma2000"]
+
+
+def test_a_port_that_is_named_goes_before_the_service_by_default(
+    daq: CommandLine, mock: MockProcess, port: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DAQ_SERVER", "http://127.0.0.1:1")
+    said = daq("--port", port, "stop")
+    assert said.code == 0, said
+    assert ask(mock, "state")["frozen"]
+    daq("--port", port, "--server", "http://127.0.0.1:1", "stop").complains(2, "--port and --server")
+    assert daq("--port", port, "reset").code == 0
+
+
+@pytest.mark.parametrize("written", ["serial://{device}?baud=9600", "serial://{link}", "serial://{link}?baud=115200"])
+def test_a_port_whose_process_has_been_asked_is_not_opened_however_it_is_written(
+    daq: CommandLine, monkeypatch: pytest.MonkeyPatch, written: str
+) -> None:
+    device, link = Path("device").absolute(), Path("link").absolute()
+    device.touch()
+    link.symlink_to(device)
+    answer = StopAnswer(robot="arm", port=f"serial://{device}", delivered=True, confirmed=True, tick=7)
+    monkeypatch.setattr("daq.cli.early_stop._asked", [StopAttempt(Path("arm-1.sock"), answer, 0.0)])
+    said = daq("--port", written.format(device=device, link=link), "stop")
+    assert said.code == 0, said
+    assert said.out == "arm: stopped, confirmed by the board: set points frozen at tick 7\n"

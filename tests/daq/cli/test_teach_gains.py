@@ -69,3 +69,34 @@ def test_teaching_asks_at_the_terminal_before_a_real_arm_moves(
     assert asked == [port]
     assert said.code == (0 if says else 4), said.err
     assert (held(mock) == before) is not says
+
+
+def test_a_step_that_is_refused_leaves_the_arm_as_it_was(daq: CommandLine, mock: MockProcess, port: str) -> None:
+    before = held(mock)
+    daq("--port", port, "teach", "step", "--to", "2=-44").complains(
+        4, "program refused: instruction 1: ", "nothing moved"
+    )
+    assert held(mock) == before
+    assert daq("--port", port, "teach", "step", "--by", "1=1").code == 0, "and goes on"
+
+
+def test_a_joint_without_drive_is_refused_and_nothing_is_frozen(daq: CommandLine, mock: MockProcess, port: str) -> None:
+    with Controller.connect(port) as controller:
+        controller.set_gains(3, 0, 0, 0)
+    before = held(mock)
+    assert daq("--port", port, "teach", "step", "--by", "1=1").code == 4
+    assert held(mock) == before
+    assert daq("--port", port, "gains", "set", "3=2/0/0").code == 0
+
+
+def test_kept_postures_need_a_name_that_a_program_can_have(daq: CommandLine, port: str) -> None:
+    daq("--port", port, "teach", "jog", "--program", "my postures.json").complains(2, "program 'my postures'")
+
+
+@pytest.mark.parametrize("wrong", ["2=99/0/0", "7=2/0/0"])
+def test_gains_of_which_one_is_not_allowed_change_none(
+    daq: CommandLine, mock: MockProcess, port: str, wrong: str
+) -> None:
+    before = ask(mock, "state")["gains"]
+    daq("--port", port, "gains", "set", f"1=3/0/0,{wrong}").complains(2, "allowed are")
+    assert ask(mock, "state")["gains"] == before

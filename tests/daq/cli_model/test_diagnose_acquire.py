@@ -10,13 +10,13 @@ import pytest
 from daq.acquisition.messages import Finished
 from daq.cli.context import Invocation
 from daq.cli.diagnose_acquire import acquired
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import SafetyError, SpecError
 from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.machine import load_machine
+from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Outcome, Trace
 from daq.traces.reader import read_trace
-from model.discrepancy.answer import Diagnosis, NextExperiment
-from model.discrepancy.next_experiment import Asker
+from model.discrepancy.answer import Acquired, Diagnosis, NextExperiment
+from model.discrepancy.next_experiment import Asker, Planner
 from model.machine_model.model import base_model
 from tests.daq.cli.invoke import CommandLine
 
@@ -61,9 +61,11 @@ class Answers:
     def __init__(self, duration: float) -> None:
         self.duration = duration
         self.given: list[tuple[int, float | None]] = []
+        self.plans: list[Planner] = []
 
     def __call__(self, traces: list[Trace], ask: Asker) -> Diagnosis:
         self.given.append((len(traces), ask.budget))
+        self.plans.append(ask.plan)
         model = base_model(load_machine("ma2000"))
         asked = NextExperiment(
             name="ramp", spec=ExperimentSpec(name="ramp"), duration=self.duration, separates=("a", "b"),
@@ -76,11 +78,18 @@ class Answers:
 
 
 @pytest.fixture
-def outcomes(ramp: Path, monkeypatch: pytest.MonkeyPatch) -> list[Outcome]:
+def moved() -> list[Machine]:
+    """The machines that the runs were for."""
+    return []
+
+
+@pytest.fixture
+def outcomes(ramp: Path, moved: list[Machine], monkeypatch: pytest.MonkeyPatch) -> list[Outcome]:
     """How the runs to come end; every one gives the same trace."""
     ends: list[Outcome] = []
 
-    def run(*_: object) -> Finished:
+    def run(_call: object, _spec: object, machine: Machine, *_: object) -> Finished:
+        moved.append(machine)
         samples = len(read_trace(ramp))
         return Finished(trace=ramp, outcome=ends.pop(0), reason="", samples=samples, missing=0, counters={})
 
@@ -114,3 +123,44 @@ def test_another_machine_than_the_configured_one_is_refused(ramp: Path) -> None:
     machine = load_machine("ma2000").model_copy(update={"name": "bench"})
     with pytest.raises(SpecError, match="bench, the configured robot is ma2000"):
         acquired(Invocation(port_option=PORT), machine, [read_trace(ramp)], None, 60.0, False, Answers(3.0))
+
+
+def test_what_moves_is_the_configured_machine_within_its_limits(
+    outcomes: list[Outcome], moved: list[Machine], ramp: Path
+) -> None:
+    """The limits were tightened after the trace was recorded: its own no longer hold."""
+    Path("daq.toml").write_text("[robot.limits]\nreach = 0.01\n")
+    outcomes += ["complete"]
+    answers = Answers(3.0)
+    acquired(Invocation(port_option=PORT), load_machine("ma2000"), [read_trace(ramp)], None, 5.0, False, answers)
+    assert [machine.limits.reach for machine in moved] == [0.01]
+    for plan in answers.plans:
+        with pytest.raises(SafetyError):
+            plan(ExperimentSpec())
+
+
+def test_another_sensor_than_the_traces_is_refused(ramp: Path) -> None:
+    shipped = load_machine("ma2000")
+    sensor = shipped.joint(2).sensor
+    assert sensor is not None
+    zero = sensor.at_zero.model_copy(update={"value": sensor.at_zero.value + 0.01})
+    joint = shipped.joint(2).model_copy(update={"sensor": sensor.model_copy(update={"at_zero": zero})})
+    machine = shipped.model_copy(update={"joints": (shipped.joint(1), joint, *shipped.joints[2:])})
+    with pytest.raises(SpecError, match="another sensor than in the traces on joint 2;"):
+        acquired(Invocation(port_option=PORT), machine, [read_trace(ramp)], None, 60.0, False, Answers(3.0))
+
+
+@pytest.mark.parametrize(("outcome", "code"), [("complete", 0), ("stopped", 6), ("fault", 5), ("interrupted", 5)])
+def test_the_answer_is_given_and_the_exit_code_is_the_last_runs(
+    daq: CommandLine, ramp: Path, monkeypatch: pytest.MonkeyPatch, outcome: str, code: int
+) -> None:
+    run = Acquired(experiment="ramp", trace="abc", file="abc.mcap", outcome=outcome, duration=3.0, reason="")
+
+    def made(_call: object, _machine: object, traces: list[Trace], *_: object) -> tuple[Diagnosis, list[Trace]]:
+        found = Answers(3.0)(traces, Asker((), lambda _: pytest.fail("nothing is planned")))
+        return found.model_copy(update={"acquired": (run,)}), traces
+
+    monkeypatch.setattr("daq.cli.diagnose_acquire.acquired", made)
+    said = daq("diagnose", ramp, "--acquire", "--json")
+    assert said.code == code
+    assert Diagnosis.model_validate(json.loads(said.out)).acquired == (run,)

@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import load_machine
+from model.machine_model.model import base_model
 from tests.daq.cli.invoke import CommandLine
 from tests.daq.cli_model.conftest import ROOT, SINGLE_AXIS, write_csv
 
@@ -31,6 +34,35 @@ def test_a_simulated_trace_simulated_again_leaves_nothing(daq: CommandLine, tmp_
     assert json.loads(first.out)["agreement"]["in_sample"][0]["rmse"] > 0
     again = json.loads(daq("simulate", SINGLE_AXIS, tmp_path / "simulated.csv", "--json").out)
     assert again["agreement"]["in_sample"][0]["largest"] < 1.01 * 2 * math.pi / 2**14
+
+
+def test_a_simulated_trace_does_not_replace_the_machine_file(daq: CommandLine, tmp_path: Path) -> None:
+    machine = tmp_path / "axis.toml"
+    machine.write_text(SINGLE_AXIS.read_text())
+    said = daq("simulate", machine, write_csv(tmp_path / "run.csv"), "-o", tmp_path / "axis.csv")
+    said.complains(2, "axis.csv", "axis.toml")
+    assert machine.read_text() == SINGLE_AXIS.read_text()
+
+
+def test_a_fit_is_kept_when_what_comes_after_it_fails(
+    daq: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Found:
+        model = base_model(load_machine(str(SINGLE_AXIS)))
+
+        def save(self, path: Path) -> None:
+            path.write_text("found")
+
+    def fails(*_: object, **__: object) -> None:
+        raise SpecError("cannot be compared")
+
+    monkeypatch.setattr("model.fitting.fit.fit", lambda *_: Found())
+    monkeypatch.setattr("model.comparison.compare.compare", fails)
+    out = tmp_path / "out.json"
+    said = daq("fit", write_csv(tmp_path / "run.csv"), "--machine", SINGLE_AXIS, "-o", out)
+    assert said.code == 2
+    assert f"model {Found.model.identity}: {out}" in said.err
+    assert out.read_text() == "found"
 
 
 def test_compare_names_the_parameter_that_differs(daq: CommandLine, tmp_path: Path) -> None:

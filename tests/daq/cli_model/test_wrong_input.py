@@ -113,6 +113,22 @@ def test_what_is_not_there_is_named(daq: CommandLine, tmp_path: Path, words: str
     refused(daq, *fitting(trace), *words.split(), says=says)
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("fit nothing -o missing/out.json", ("--out missing/out.json", "no folder")),
+        ("diagnose nothing -o missing/out.json", ("--out missing/out.json", "no folder")),
+        ("diagnose nothing --report missing/page.html", ("report missing/page.html", "no folder")),
+        ("fit nothing -o out.json --torques --starts 3", ("--torques", "--starts")),
+        ("fit nothing -o out.json --torques --open-loop", ("--torques", "--open-loop")),
+        ("fit nothing -o out.json --torques --method nelder_mead", ("--torques", "--method")),
+        ("fit nothing -o out.json --torques --seed 2", ("--torques", "--seed")),
+    ],
+)
+def test_what_cannot_be_is_said_before_a_trace_is_read(daq: CommandLine, words: str, says: tuple[str, ...]) -> None:
+    refused(daq, *words.split(), says=says)
+
+
 def test_the_same_trace_twice(daq: CommandLine, tmp_path: Path) -> None:
     trace = write_csv(tmp_path / "good.csv")
     imported = Path(daq("traces", "import", trace, "--folder", tmp_path).out.strip())

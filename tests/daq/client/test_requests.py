@@ -9,8 +9,9 @@ import httpx
 import pytest
 
 from daq.client import ServiceError, ServiceNotReachedError
-from daq.client.connection import PAUSES, Request, parse_url
-from daq.client.experiments import Experiments
+from daq.client.connection import ANSWER_WITHIN, PAUSES, Request, parse_url
+from daq.client.experiments import Experiments, Queue
+from daq.client.live import proxy_to
 from daq.client.traces import Traces
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.experiment import ExperimentSpec
@@ -199,3 +200,44 @@ def test_an_address_may_have_a_path_and_a_slash() -> None:
     network = StandIn([httpx.Response(200, json=ME)])
     network.connection("https://lab.example/arm/").get(Me, "me")
     assert str(network.asked[0].url) == "https://lab.example/arm/api/v1/me"
+
+
+@pytest.mark.parametrize("token", ["", "schlüssel", "daq_x\n", "daq x"])
+def test_a_token_that_no_header_can_carry_is_refused_and_not_shown(token: str) -> None:
+    with pytest.raises(SpecError) as wrong:
+        StandIn([]).connection(token=token)
+    assert str(wrong.value).startswith("token: only ASCII characters without spaces are allowed")
+
+
+def test_what_is_asked_for_within_a_time_is_asked_once_and_waits_no_longer() -> None:
+    for ask in (
+        lambda connection: Experiments(connection, "robots/ma2000").cancel("0123456789ab", within=1.0),
+        lambda connection: Queue(connection, "robots/ma2000").attend(within=1.0),
+    ):
+        network = StandIn([httpx.ReadTimeout("slow")])
+        with pytest.raises(ServiceNotReachedError):
+            ask(network.connection())
+        assert set(network.asked[0].extensions["timeout"].values()) == {1.0}
+    network = StandIn([httpx.Response(200, json=ME)])
+    network.connection().get(Me, "me", patience=5.0)
+    assert network.asked[0].extensions["timeout"]["read"] == ANSWER_WITHIN + 5.0
+
+
+def test_a_redirection_is_no_file(tmp_path: Path) -> None:
+    network = StandIn([httpx.Response(302, text="<html>log in", headers={"Location": "http://proxy.lab"})])
+    with pytest.raises(ServiceError, match="302 Found"):
+        network.connection().download("robots/ma2000/traces/a/data.mcap", tmp_path / "a.mcap")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_stream_takes_the_proxy_that_requests_take(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("http_proxy", "https_proxy", "all_proxy", "no_proxy"):
+        monkeypatch.delenv(name, raising=False)
+        monkeypatch.delenv(name.upper(), raising=False)
+    assert proxy_to("http://arm.lab:8300") is None
+    monkeypatch.setenv("http_proxy", "proxy.lab:3128")
+    monkeypatch.setenv("no_proxy", "near.lab")
+    assert proxy_to("http://arm.lab:8300") == "http://proxy.lab:3128"
+    assert proxy_to("https://arm.lab") is None
+    assert proxy_to("http://near.lab:8300") is None
+    assert proxy_to("http://127.0.0.1:8300") is None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from daq.config import config_files, load_settings
 from daq.config.limits import merged_limits
 from daq.config.robot_files import load_memory_map
+from daq.config.settings import Settings
 from daq.contracts.errors import SpecError
 from daq.contracts.limits import JointLimits, Limits
 from daq.contracts.machine import load_machine
@@ -22,6 +24,22 @@ def nothing_configured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in [name for name in os.environ if name.startswith("DAQ_")]:
         monkeypatch.delenv(name)
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "configuration"))
+
+
+def test_the_guides_configuration_can_be_said_and_says_everything() -> None:
+    guide = Path(__file__).parents[3].joinpath("docs", "user-guide.md").read_text("utf-8")
+    (block,) = (
+        text for text in re.findall(r"^```toml\n(.*?)^```", guide, re.MULTILINE | re.DOTALL) if "limits" in text
+    )
+    Path("daq.toml").write_text(block)
+    settings, _ = load_settings()
+    limits = settings.robot.limits
+    assert limits is not None
+    assert settings.model_fields_set == set(Settings.model_fields) - {"server"}
+    assert settings.robot.model_fields_set == set(type(settings.robot).model_fields)
+    assert limits.model_fields_set == set(Limits.model_fields)
+    assert settings.machine().limits.joints[0] == JointLimits(low=-1.0, high=1.0, speed=0.8)
+    assert settings.machine().limits.joints[1] == load_machine("ma2000").limits.joints[1]
 
 
 def test_with_nothing_configured_the_mock_is_used() -> None:

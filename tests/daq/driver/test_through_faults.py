@@ -11,7 +11,7 @@ from daq.driver import BoardSnapshot, Controller, ControllerRestartedError
 from daq.link import LinkCounters, LinkLostError
 from firmware_protocol.commands import StatusFlag
 from firmware_protocol.units import posture_to_counts
-from tests.daq.driver.mock_control import command
+from tests.control_port import told_by
 
 FAULTY_LINE = "&fault=flip:rate=0.03&fault=drop:rate=0.02&fault=duplicate:rate=0.02&fault=split:rate=0.05"
 
@@ -46,7 +46,7 @@ def assert_whole(run: Run) -> None:
 def test_on_a_faulty_line_no_period_is_lost_and_none_is_wrong() -> None:
     with Controller.connect("mock://?lock_step=1&seed=5" + FAULTY_LINE) as controller:
         run = ramp(controller, 1000)
-        injected = command(controller, "counts")["faults"]
+        injected = told_by(controller.link.control, "counts")["faults"]
     ticks = [snapshot.tick for snapshot in run.snapshots]
     assert ticks == list(range(ticks[0], ticks[0] + 1001))
     assert_whole(run)
@@ -79,7 +79,7 @@ def test_without_sample_a_faulty_line_costs_periods_but_never_a_wrong_reading() 
 def test_every_set_point_that_the_controller_missed_is_found() -> None:
     with Controller.connect("mock://?lock_step=1&seed=8&fault=busy_memory:rate=0.1") as controller:
         run = ramp(controller, 500)
-        missed_by_board = command(controller, "counts")["board"]["set_points_missed"]
+        missed_by_board = told_by(controller.link.control, "counts")["board"]["set_points_missed"]
     flagged = [StatusFlag.SET_POINT_MISSED in snapshot.flags for snapshot in run.snapshots]
     differs = [
         any(snapshot.set_points[joint] != posture for joint, posture in sent.items())
@@ -102,7 +102,7 @@ def test_a_stalled_bridge_costs_time_and_no_sample() -> None:
 def test_a_board_that_has_restarted_is_noticed_before_anything_else_is_believed(options: str) -> None:
     with Controller.connect("mock://?lock_step=1&seed=10" + options) as controller:
         snapshot = ramp(controller, 20).snapshots[-1]
-        command(controller, "brown_out")
+        told_by(controller.link.control, "brown_out")
         moved = {1: snapshot.set_points[1] + 1}
 
         def go_on() -> None:
@@ -126,7 +126,7 @@ def test_a_board_that_has_restarted_is_noticed_before_anything_else_is_believed(
 def test_after_a_lost_connection_nothing_moves_and_sampling_goes_on() -> None:
     with Controller.connect("mock://?lock_step=1&seed=11") as controller:
         before = ramp(controller, 20).snapshots[-1]
-        command(controller, "disconnect", seconds=0.05)
+        told_by(controller.link.control, "disconnect", seconds=0.05)
         with pytest.raises(LinkLostError):
             controller.next_snapshot(before.tick)
         stop = controller.stop()

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
-import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 from daq.contracts.experiment import ExperimentSpec, Pause, Ramp
 from daq.contracts.machine import Machine, load_machine
@@ -20,6 +17,7 @@ from daq.driver import Controller
 from daq.runner import ArmControl, Arrangement, Consent, Outside, RunResult, run_experiment
 from daq.traces.reader import read_trace
 from daq.transport.mock_process import MockProcess
+from tests.control_port import told_by
 
 SHORT = ExperimentSpec(
     trajectory=Ramp(amplitude=math.radians(5.4), duration=0.2), settle=0.1, hold=0.2, joints=(1, 2, 3)
@@ -81,13 +79,7 @@ class Rig:
 
     def ask(self, do: str, **details: object) -> dict[str, Any]:
         """The mock's control port."""
-        address = urlsplit(self.control_port)
-        with socket.create_connection((str(address.hostname), address.port or 0), 10) as connection:
-            connection.sendall(json.dumps({"do": do, **details}).encode() + b"\n")
-            with connection.makefile("rb") as answers:
-                answer: dict[str, Any] = json.loads(answers.readline())
-        assert answer["ok"], answer
-        return answer
+        return told_by(self.control_port, do, **details)
 
     def stop_as_the_guardian_does(self) -> None:
         """What `daq stop` leads to, in the middle of whatever is going on."""

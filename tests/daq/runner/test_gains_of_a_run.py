@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pytest
+
+from daq.driver import GainsNotTakenError
 from daq.traces.reader import read_trace
 from tests.daq.runner.rig import SHORT, Rig
 
@@ -18,6 +21,23 @@ def test_gains_hold_for_the_run_and_are_put_back_after_it(arm: Rig) -> None:
         "joint 1: gains 4/0/0 for this run, 2/0/0 before"
     ]
     assert arm.ask("state")["gains"] == before
+
+
+def test_gains_that_cannot_be_put_back_are_a_fault(arm: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    written: list[int] = []
+
+    def only_once(joint: int, p: int, i: int, d: int) -> None:
+        written.append(joint)
+        if len(written) > 1:
+            raise GainsNotTakenError(f"joint {joint}: gains {(p, i, d)} written, (4, 0, 0) read back")
+        take(joint, p, i, d)
+
+    take = arm.controller.set_gains
+    monkeypatch.setattr(arm.controller, "set_gains", only_once)
+    result = arm.run(STIFF)
+    assert arm.ask("state")["frozen"]
+    assert (result.outcome, read_trace(result.trace).record.outcome) == ("fault", "fault")
+    assert result.reason.startswith("the plan was carried out, but its gains could not be put back: joint 1: gains")
 
 
 def test_after_a_stop_the_gains_stay_and_the_trace_says_so(arm: Rig) -> None:

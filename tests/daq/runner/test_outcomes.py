@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from daq.contracts.experiment import ExperimentSpec, Pause
+from daq.driver import BoardSnapshot
 from daq.runner import RunFaultError, StoppedError
 from daq.traces.reader import read_trace
 from daq.traces.verify import verify
@@ -75,8 +76,9 @@ def test_a_stop_in_the_middle_freezes_the_arm_and_a_second_more_is_recorded(arm:
 
 
 def test_a_stop_by_another_host_is_noticed_on_the_board(arm: Rig) -> None:
-    arm.ears.at_sample[12] = arm.controller.stop
+    arm.ears.at_sample[12] = arm.controller.link.stop  # so that this host's own driver knows nothing of it
     result = arm.run()
+    assert arm.ask("state")["frozen"]
     assert result.outcome == "stopped"
     assert "has been stopped" in result.reason or "stopped on the board" in result.reason
 
@@ -178,6 +180,42 @@ def test_a_fault_on_the_way_to_the_start_is_told_and_nothing_recorded(arm: Rig, 
     assert not list(tmp_path.iterdir())
 
 
+def test_an_arm_that_does_not_come_up_to_its_start_is_a_fault(arm: Rig, tmp_path: Path) -> None:
+    """A way so short that the following error never comes to its limit of 127 counts, of which 40 may be left."""
+    near = SHORT.model_copy(update={"start": {1: math.radians(185)}})
+    arm.ask("fault_on", fault="stalled_joint:joint=1")
+    with pytest.raises(RunFaultError, match=r"joint 1 is \d\d ADC counts away .*not come nearer.*nothing was rec"):
+        arm.run(near)
+    assert arm.ask("state")["frozen"]
+    assert not list(tmp_path.iterdir())
+
+
+def test_set_points_wait_while_samples_are_old(arm: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fresh_again() -> None:
+        arm.ears.at_sample[len(arm.ears.rows) + 5] = monkeypatch.undo
+
+    arm.ears.at_event["ramp_start"] = lambda: monkeypatch.setattr(BoardSnapshot, "jitter", 0.08)
+    arm.ears.at_event["pause"] = fresh_again
+    result = arm.run(LONG_RAMP)
+    trace = read_trace(result.trace)
+    assert result.outcome == "complete"
+    assert trace.tick is not None
+    assert trace.set_point is not None
+    first, last = (event.tick for event in trace.events if event.kind in ("pause", "resume"))
+    waiting = trace.set_point[(trace.tick > first) & (trace.tick <= last), 0]
+    assert len(waiting) == 5
+    assert (waiting == waiting[0]).all()
+    assert arm.kinds.index("pause") < arm.kinds.index("resume") < arm.kinds.index("ramp_end")
+
+
+def test_samples_that_were_lost_are_counted_and_told(tmp_path: Path) -> None:
+    with rig(tmp_path, "seed=5&no_sample=1&fault=drop:rate=0.06") as arm:
+        result = arm.run(LONG_RAMP)
+    trace = read_trace(result.trace)
+    assert result.missing == trace.missing > 0
+    assert result.samples == len(trace)
+
+
 def test_a_memory_that_is_always_busy_is_a_fault(arm: Rig) -> None:
     arm.ears.at_event["ramp_start"] = lambda: arm.ask("fault_on", fault="busy_memory")
     result = arm.run(LONG_RAMP)
@@ -244,6 +282,13 @@ def test_repeats_go_back_slowly_and_are_told_apart(arm: Rig) -> None:
     assert result.outcome == "complete"
     notes = [event.message for event in arm.ears.events if event.message.startswith("repeat")]
     assert notes == ["repeat 1 of 2", "repeat 2 of 2"]
+    trace = read_trace(result.trace)
+    assert trace.set_point is not None
+    begin, end = (event.time for event in trace.events if event.message in ("slow move starts", "slow move ends"))
+    back = np.diff(trace.set_point[(trace.time >= begin) & (trace.time <= end)], axis=0)
+    units = [abs(arm.machine.calibration(joint).rad_per_posture_unit) for joint in range(1, 7)]
+    assert np.degrees(back.sum(axis=0))[:3] == pytest.approx([-5.4] * 3, abs=0.3)
+    assert (np.abs(back) <= 0.25 * 0.02 + np.array(units)).all(), "at no more than 0.25 rad/s"
 
 
 def test_limits_that_are_not_set_are_not_zero(arm: Rig) -> None:

@@ -63,6 +63,16 @@ def test_an_arm_that_is_not_where_its_controller_holds_it(arm: Rig) -> None:
     refused(arm, SafetyError, r"joint 1 is \d+ ADC counts from its set point, allowed are ±127.*blocked")
 
 
+def test_an_arm_with_a_joint_that_nothing_drives(arm: Rig) -> None:
+    arm.controller.set_gains(2, 0, 5, 5)
+    refused(arm, SafetyError, r"joints 2 have gain P = 0 and no drive: support the arm, then `daq gains set` them")
+
+
+def test_an_experiment_that_would_take_a_joints_drive(arm: Rig) -> None:
+    limp = SHORT.model_copy(update={"gains": {1: (9, 9, 9), 3: (0, 0, 0)}})
+    refused(arm, SafetyError, "joints 3 have gain P = 0", limp)
+
+
 def test_a_controller_with_another_period_than_the_machine_file_says(arm: Rig) -> None:
     controller = arm.machine.controller
     period = controller.period.model_copy(update={"value": 0.03})

@@ -44,6 +44,12 @@ class StandIn:
         self.lateness = 0.0
         self.running = False
 
+    def place(self, joint: int, angle: float) -> None:
+        """Puts a joint (from 1) where its set point then is, as near to `angle` (rad) as a posture unit allows."""
+        own = CALIBRATIONS[joint - 1]
+        self.postures[joint - 1] = own.rad_to_posture(angle)
+        self.position[joint - 1] = own.posture_to_rad(self.postures[joint - 1])
+
     @contextmanager
     def driven(self) -> Iterator[None]:
         self.running = True

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from daq.contracts.errors import SpecError
@@ -71,8 +71,7 @@ def test_it_goes_to_the_limit_and_no_further_and_says_so_once() -> None:
 def test_a_slow_jog_does_not_creep_past_the_limit() -> None:
     """Limits give way to rounding by half a posture unit; not by half a unit again and again."""
     arm = StandIn()
-    arm.position[3] = CALIBRATIONS[3].posture_to_rad(990)
-    arm.postures[3] = 990
+    arm.place(4, CALIBRATIONS[3].posture_to_rad(990))
     driven(arm, {4: 0.02}, held_until=400, periods=400)
     assert arm.postures[3] == round((1.56 - CALIBRATIONS[3].angle_at_zero_rad) / CALIBRATIONS[3].rad_per_posture_unit)
 
@@ -84,19 +83,32 @@ def test_the_floor_ends_a_jog_too() -> None:
     assert arm.position[1] == pytest.approx(-math.asin(0.30 / (0.285755 + 0.16841)), abs=0.02)
 
 
-@given(st.dictionaries(st.integers(1, 6), st.floats(-JOG_SPEED, JOG_SPEED), min_size=1), st.integers(1, 400))
-def test_no_key_drives_the_arm_out_of_its_limits(velocities: dict[int, float], periods: int) -> None:
-    jogger = Jogger(MA2000, LIMITS, StandIn.joints)
+@pytest.mark.parametrize("upwards", [True, False], ids=["up", "down"])
+@pytest.mark.parametrize("joint", StandIn.joints)
+@given(speed=st.floats(0.05, JOG_SPEED), others=st.dictionaries(st.integers(1, 6), st.floats(-JOG_SPEED, JOG_SPEED)))
+@settings(max_examples=5)
+def test_no_key_drives_the_arm_out_of_its_limits(
+    joint: int, upwards: bool, speed: float, others: dict[int, float]
+) -> None:
+    """Two seconds from a tenth of a radian inside each joint's limit, towards it, while others move as they like."""
+    own = LIMITS.joint(joint)
+    assert own.low is not None
+    assert own.high is not None
     arm = StandIn()
+    arm.place(joint, own.high - 0.1 if upwards else own.low + 0.1)
+    begun = arm.postures[joint - 1]
+    jogger = Jogger(MA2000, LIMITS, StandIn.joints)
     arm.running = True
-    for _ in range(periods // 20):
+    velocities = others | {joint: speed if upwards else -speed}
+    for _ in range(100):
         row = arm.next_sample()
         step = jogger.step(row, JogCommand(velocities, row.host_time))
         arm.set_points(step.postures)
         jogger.accept(step)
-    for joint, posture in enumerate(arm.postures, start=1):
-        own = LIMITS.joint(joint)
-        angle = CALIBRATIONS[joint - 1].posture_to_rad(posture)
+    assert others or arm.postures[joint - 1] != begun, "nothing but the floor holds it at once"
+    for number, posture in enumerate(arm.postures, start=1):
+        own = LIMITS.joint(number)
+        angle = CALIBRATIONS[number - 1].posture_to_rad(posture)
         assert own.low is not None
         assert own.high is not None
         assert own.low - 0.005 <= angle <= own.high + 0.005

@@ -67,6 +67,15 @@ def test_gains_wait_until_the_hand_keeps_still() -> None:
     assert arm.gain[1] == (2, 0, 0)
 
 
+@pytest.mark.parametrize("speed", [0.1, 0.35], ids=["6 degrees a second", "20 degrees a second"])
+def test_gains_wait_until_an_arm_that_sinks_evenly_has_stopped(speed: float) -> None:
+    """Set points that follow it leave no error to be seen: it is the position that tells."""
+    arm = StandIn(lambda tick: {2: REST[1] - speed * 0.02 * min(tick, 150)})
+    led(arm, joints=(2,), periods=60)
+    assert arm.tick > 150
+    assert arm.gain[2] == (2, 0, 0)
+
+
 def test_an_arm_that_never_comes_to_rest_stays_limp_and_says_so() -> None:
     arm = StandIn(lambda tick: {1: REST[0] + 0.2 * math.sin(tick)})
     with pytest.raises(TeachingError, match=r"did not come to rest within 10 s\. JOINTS 1 ARE LIMP"):

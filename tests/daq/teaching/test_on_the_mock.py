@@ -1,14 +1,18 @@
 """Teaching through a real driver, on the mock in lock-step."""
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Callable, Iterator
 
 import pytest
 
+from daq.contracts.errors import SafetyError
 from daq.contracts.sample import SampleRow
 from daq.driver import Controller
 from daq.runner import ArmControl, StoppedError
-from daq.teaching import JogCommand, RecordedPath, TeachingError, jog, lead_by_nose
+from daq.teaching import JogCommand, Program, RecordedPath, TeachingError, jog, lead_by_nose, plan_program, run_program
 from daq.teaching.controller_arm import ControllerArm
+from daq.teaching.performer import FollowingPerformer
+from tests.control_port import told_by
 from tests.daq.teaching.stand_in import MA2000
 
 
@@ -65,6 +69,56 @@ def test_set_points_are_sent_only_while_driven(arm: WatchedArm, controller: Cont
     with pytest.raises(TeachingError, match="only while the arm is driven: it is idle"):
         arm.set_points({1: 600})
     assert controller.next_snapshot().set_points == before
+
+
+def test_a_controller_with_another_period_than_the_machine_file_says(controller: Controller) -> None:
+    period = MA2000.controller.period.model_copy(update={"value": 0.03})
+    other = MA2000.model_copy(update={"controller": MA2000.controller.model_copy(update={"period": period})})
+    with pytest.raises(SafetyError, match="control period of 20 ms, the machine file ma2000 says 30 ms"):
+        ControllerArm(controller, ArmControl(controller), other, lambda: None)
+
+
+def carried_out(controller: Controller, ended: Callable[[], str | None], *instructions: dict[str, object]) -> None:
+    program = Program.model_validate({"name": "test", "machine": "ma2000", "instructions": instructions})
+    control = ArmControl(controller)
+    here = ControllerArm(controller, control, MA2000, lambda: None).next_sample()
+    planned = plan_program(program, MA2000, here.set_point)
+    performer = FollowingPerformer(controller, control, MA2000, MA2000.limits, ended, lambda _line: None)
+    run_program(planned, MA2000, performer, lambda _line: None)
+    performer.finish()
+
+
+@pytest.mark.parametrize(
+    "instruction", [{"kind": "wait", "duration": 5}, {"kind": "input", "line": 3, "on": True, "longest": 5}]
+)
+def test_a_restart_while_a_program_waits_freezes_the_arm(instruction: dict[str, object]) -> None:
+    """The board takes other set points then: what comes next must not be sent from there."""
+    with Controller.connect("mock://?lock_step=1") as controller:
+        asked = itertools.count()
+
+        def restarted() -> None:
+            if next(asked) == 20:
+                told_by(controller.link.control, "brown_out")
+
+        with pytest.raises(TeachingError, match="restarted"):
+            carried_out(controller, restarted, instruction, {"kind": "relative", "angles": {1: 0.2}})
+        assert told_by(controller.link.control, "state")["frozen"]
+
+
+def test_nothing_is_switched_after_a_stop(controller: Controller) -> None:
+    asked = itertools.count()
+
+    def ended() -> str | None:
+        return "stopped on request" if next(asked) >= 30 else None
+
+    before = controller.process().outputs
+    with pytest.raises(StoppedError, match="on request"):
+        carried_out(
+            controller, ended, {"kind": "wait", "duration": 0.6}, *[{"kind": "output", "line": 2, "on": True}] * 40
+        )
+    assert next(asked) <= 34, "the first that asks is told, and nobody else"
+    controller.release()
+    controller.write_outputs(0xFF, before)
 
 
 def test_a_stop_in_the_moment_of_the_end_is_not_taken_for_a_good_end(arm: WatchedArm, controller: Controller) -> None:

@@ -21,6 +21,7 @@ from daq.teaching import (
     run_program,
     save_program,
 )
+from daq.teaching.program import require_program_file
 from daq.trajectories import Plan
 from tests.daq.teaching.stand_in import MA2000, REST
 
@@ -175,6 +176,22 @@ def test_a_folder_that_is_not_there_is_one_line(tmp_path: Path) -> None:
         save_program(Program.model_validate(EVERYTHING), tmp_path / "no" / "pick.json")
     with pytest.raises(SpecError, match=r"pick\.json: cannot be read: "):
         load_program(tmp_path / "pick.json")
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("my postures.json", "program 'my postures': a name has"),
+        ("-p.json", "program '-p': a name has"),
+        ("no/pick.json", r"program .*no/pick\.json: its folder does not exist"),
+    ],
+)
+def test_a_file_that_could_not_be_saved_is_refused_before_there_is_a_program(
+    tmp_path: Path, name: str, line: str
+) -> None:
+    with pytest.raises(SpecError, match=line):
+        require_program_file(tmp_path / name)
+    require_program_file(tmp_path / "pick_2.json")
 
 
 @pytest.mark.parametrize(

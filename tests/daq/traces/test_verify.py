@@ -1,8 +1,10 @@
 """What verify finds in traces that are right, and in traces with one thing wrong."""
 
+from functools import partial
 from pathlib import Path
 
 import pytest
+from mcap.writer import Writer
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Outcome, TraceEvent
@@ -72,6 +74,35 @@ def test_an_error_of_one_rounding_is_no_finding_and_of_two_counts_is(tmp_path: P
     assert findings(recorded(tmp_path / "a.mcap", [0, 1], error=near)) == {}
     far = (good[0] + 2 * count, *good[1:])
     assert "worst 2.0 counts at 0.020 s" in findings(recorded(tmp_path / "b.mcap", [0, 1], error=far))["error", "error"]
+
+
+def test_an_event_beyond_the_record_is_noted(tmp_path: Path) -> None:
+    late = TraceEvent(time=1.0, kind="note", message="")
+    notes = [f for f in verify(recorded(tmp_path / "a.mcap", [0, 1], event=late)).findings if f.check == "events"]
+    assert [(f.level, f.message) for f in notes] == [
+        ("note", "1 events lie outside the record, the first 'note' at 1.000 s")
+    ]
+
+
+def test_a_file_without_an_index_can_be_trusted_and_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("daq.traces.recording.Writer", partial(Writer, use_statistics=False))
+    assert findings(recorded(tmp_path / "a.mcap", [0, 1])) == {
+        ("warning", "index"): "has no index: other tools open it slowly"
+    }
+
+
+def test_an_index_of_other_chunks_than_the_file_has_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finish = Writer.finish
+
+    def with_one_more(writer: Writer) -> None:
+        writer._Writer__statistics.chunk_count += 1
+        finish(writer)
+
+    monkeypatch.setattr(Writer, "finish", with_one_more)
+    found = findings(recorded(tmp_path / "a.mcap", [0, 1]))
+    assert found["error", "index"] == "the index names 2 chunks, the file has 1"
 
 
 def test_damage_is_an_error_and_an_unfinished_trace_a_warning(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from firmware_protocol.commands import (
     Advance,
     Block,
     ReadBlock,
+    Release,
     ReportErrorsPositionsPowers,
     Request,
     SetGains,
@@ -34,7 +35,10 @@ def busy(sample: bool, seed: int) -> LockStepHost:
             SetGains(1, 2, 0, 0),
             Stop(),
         ]
-        host.ask(dice.choice(accesses))
+        request = dice.choice(accesses)
+        host.ask(request)
+        if isinstance(request, Stop):
+            host.ask(Release())
     return host
 
 

@@ -61,10 +61,18 @@ def test_waist_follows_the_first_order_lag_of_its_motor() -> None:
 
 @pytest.mark.parametrize("inductance", [0.0, 0.82e-3, 20e-3])
 def test_holding_a_jammed_motor_draws_the_current_of_its_resistance(inductance: float) -> None:
-    plant = Plant(frictionless(inductance=inductance), angles=UP)
+    """Let go, it sets off with the torque of that current, not with that of one which has yet to rise."""
+    parameters = frictionless(inductance=inductance)
+    plant = Plant(parameters, angles=UP)
     plant.stall(1)
     plant.advance([0.3, 0, 0, 0, 0, 0], 200_000)
     assert plant.joint_angles[0] == pytest.approx(math.pi, abs=1e-9)
+    plant.release(1)
+    plant.advance([0.3, 0, 0, 0, 0, 0], 1_000)
+    joint = parameters.joints[0]
+    torque = joint.gear_ratio * joint.torque_constant * 0.3 * parameters.amplifier.gain / joint.resistance
+    inertia = waist_inertia(parameters) + 3 * parameters.rigid_body.wrist_inertia
+    assert plant.joint_rates[0] == pytest.approx(torque / inertia * 1e-3, rel=0.05)
 
 
 def test_inductance_of_the_data_sheet_hardly_delays_the_arm_and_a_large_one_does() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +13,7 @@ import serial
 
 from firmware_protocol.commands import Reply, Request
 from firmware_protocol.dialect import FramedDialect
+from tests.control_port import told_by
 
 ROOT = Path(__file__).parents[3]
 
@@ -64,21 +64,7 @@ class RunningMock:
 
     def control(self, command: str, **more: object) -> dict[str, Any]:
         """One command to the control port."""
-        assert self.control_url is not None
-        with _connect(self.control_url) as connection:
-            connection.sendall(json.dumps({"do": command, **more}).encode() + b"\n")
-            answer = connection.makefile("rb").readline()
-        assert answer, "no answer"
-        return json.loads(answer)  # type: ignore[no-any-return]
-
-
-def _connect(url: str) -> socket.socket:
-    if url.startswith("unix://"):
-        connection = socket.socket(socket.AF_UNIX)
-        connection.connect(url.removeprefix("unix://"))
-        return connection
-    host, _, port = url.removeprefix("tcp://").rpartition(":")
-    return socket.create_connection((host, int(port)), timeout=10)
+        return told_by(self.control_url, command, **more)
 
 
 class SerialHost:

@@ -80,7 +80,8 @@ def test_start_posture_gains_and_hidden_effects_reach_board_and_arm() -> None:
     )
     device = build_device(chosen, lambda _: None)
     memory = device.board.memory
-    assert [abs(at - wanted) <= 3 for at, wanted in zip(memory.values("set_point"), chosen.start or (), strict=True)]
+    assert chosen.start is not None
+    assert all(abs(at - wanted) <= 3 for at, wanted in zip(memory.values("set_point"), chosen.start, strict=True))
     assert [memory.values(name)[0] for name in ("gain_p", "gain_i", "gain_d")] == [4, 1, 2]
     assert device.board.plant.parameters.rigid_body.m_load == pytest.approx(1.250307 + 0.5)
     assert device.modifications == ("payload:mass=0.5,offset=0.1",)

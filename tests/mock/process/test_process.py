@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import termios
 from pathlib import Path
 
 import pytest
@@ -134,9 +135,9 @@ def test_the_pseudo_terminal_is_raw_whoever_opens_it() -> None:
     with RunningMock("--pty") as mock:
         descriptor = os.open(mock.url.removeprefix("serial://"), os.O_RDWR | os.O_NOCTTY)
         try:
-            os.write(descriptor, b"\0\x03\x0d\x0a\x03\x04\x11\x13\0")
-            state = mock.control("counts")
-            while state["bridge"]["damaged"] == 0:
-                state = mock.control("counts")
+            inputs, outputs, _, local, *_ = termios.tcgetattr(descriptor)
+            assert not inputs & (termios.ICRNL | termios.IXON)
+            assert not outputs & termios.OPOST
+            assert not local & (termios.ECHO | termios.ICANON | termios.ISIG)
         finally:
             os.close(descriptor)

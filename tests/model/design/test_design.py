@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -103,12 +104,10 @@ def test_nothing_within_the_limits_is_said_with_the_reason() -> None:
 
 
 def test_can_be_cancelled() -> None:
-    class Now:
-        def is_set(self) -> bool:
-            return True
-
+    now = threading.Event()
+    now.set()
     with pytest.raises(CancelledError):
-        design(arm(), plan, DesignOptions(candidates=4), FEW, cancel=Now())
+        design(arm(), plan, DesignOptions(candidates=4), FEW, cancel=now)
 
 
 def test_the_best_set_is_found_where_greed_alone_fails() -> None:

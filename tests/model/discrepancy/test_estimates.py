@@ -76,7 +76,7 @@ def test_an_interval_knows_how_far_noise_has_moved_an_estimate() -> None:
     assert wide.low is not None
     assert wide.high is not None
     own = moved[[u.name for u in found.point.unknowns].index(parameter.name)]
-    assert abs(own) > 1e-4
+    assert 1e-4 < abs(own) < 3 * abs(narrow.value - WIDTH), "of the size of what it is to account for"
     statistical = (narrow.value - narrow.low) / INTERVAL
     assert (wide.value - wide.low) / INTERVAL == pytest.approx(np.hypot(statistical, own))
     assert wide.low <= WIDTH <= wide.high

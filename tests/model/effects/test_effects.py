@@ -176,7 +176,7 @@ def test_a_whole_period_of_delay_is_the_drive_of_the_period_before(model: Model,
         with_(model.with_values({"controller.delay": 0.016}), "input_delay", joint=3, time=0.01), inputs
     ).position
     assert np.abs(whole[:20] - run(model, inputs).position[:20])[:, 2].max() > 1e-4
-    assert np.abs(whole - parts)[:, 2].max() < np.abs(whole - run(model, inputs).position)[:, 2].max()
+    assert np.abs(whole - parts)[:, 2].max() < 0.05 * np.abs(whole - run(model, inputs).position)[:, 2].max()
 
 
 def test_shared_effects_have_one_parameter_for_all_their_joints(model: Model) -> None:

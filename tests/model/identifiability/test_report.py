@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from model.fitting.unknowns import Unknown, torque_power
 from model.identifiability.report import judged
 
 Floats = NDArray[np.float64]
-rng = np.random.default_rng(5)
+RANDOM = partial(np.random.default_rng, 5)
 
 
 def unknown(name: str, unit: str, value: float, deviation: float | None = None, nuisance: bool = False) -> Unknown:
@@ -23,7 +25,7 @@ def pendulum_jacobian(values: Floats, noise: float) -> Floats:
     Unknowns: mass m (kg), length l (m), torque constant K (N·m/A), viscous v (N·m·s/rad).
     """
     m, length, K, v = values
-    u, speed, s = rng.normal(size=(3, 400))
+    u, speed, s = RANDOM().normal(size=(3, 400))
     torque, inertia = K * u - v * speed, m * length**2
     by_mass, by_length = -torque / (m * inertia), -2 * torque / (length * inertia) + 9.81 * s / length**2
     return np.stack([by_mass, by_length, u / inertia, -speed / inertia], axis=1) / noise
@@ -64,6 +66,7 @@ def test_the_scale_is_fixed_once_one_torque_is_held() -> None:
 
 
 def test_a_sum_is_named_as_a_combination() -> None:
+    rng = RANDOM()
     column = rng.normal(size=(300, 1))
     J = np.concatenate([column, column, rng.normal(size=(300, 1))], axis=1)
     unknowns = [unknown(n, "V", 2.0, 0.5) for n in ("a", "b", "c")]
@@ -75,6 +78,7 @@ def test_a_sum_is_named_as_a_combination() -> None:
 
 
 def test_a_parameter_without_influence_is_unknown_and_says_why() -> None:
+    rng = RANDOM()
     J = np.concatenate([rng.normal(size=(300, 1)), np.zeros((300, 1)), 1e-3 * rng.normal(size=(300, 1))], axis=1)
     report = judged(J, np.ones(3), [unknown(n, "m", 1.0, 0.3) for n in ("a", "b", "c")])
     assert [p.verdict for p in report.parameters] == ["known", "unknown", "unknown"]
@@ -89,7 +93,7 @@ def test_what_is_expected_is_not_known() -> None:
 
 
 def test_a_nuisance_blurs_the_parameter_it_resembles_as_far_as_its_prior_allows() -> None:
-    column = rng.normal(size=(400, 1))
+    column = RANDOM().normal(size=(400, 1))
     J = np.concatenate([column, column], axis=1)
     wide = [unknown("a", "rad", 1.0, 1.0), unknown("n", "rad", 0.0, 5.0, nuisance=True)]
     narrow = [unknown("a", "rad", 1.0, 1.0), unknown("n", "rad", 0.0, 0.01, nuisance=True)]
@@ -100,6 +104,7 @@ def test_a_nuisance_blurs_the_parameter_it_resembles_as_far_as_its_prior_allows(
 
 
 def test_estimates_that_move_together_form_a_group() -> None:
+    rng = RANDOM()
     base = rng.normal(size=(500, 1))
     J = np.concatenate([base, base + 0.05 * rng.normal(size=(500, 1)), rng.normal(size=(500, 1))], axis=1)
     report = judged(20 * J, np.ones(3), [unknown(n, "V", 1.0, 1.0) for n in ("a", "b", "c")])

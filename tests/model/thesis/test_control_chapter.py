@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import threading
 from itertools import pairwise
 
 import pytest
 
 from daq.contracts.progress import CancelledError
-from model.thesis.control_cases import ControlChapter, control_chapter
+from model.thesis.control_cases import ControlChapter, control_chapter, lags
 
 
 @pytest.fixture(scope="module")
@@ -42,15 +43,23 @@ def test_pid_follows_and_overshoots_from_another_posture(chapter: ControlChapter
     assert other.overshoot[1] > math.radians(2)
 
 
+def test_pid_lags_on_every_joint(chapter: ControlChapter) -> None:
+    """Seen from the other side, as if the wanted motion followed the position, it leads by as much."""
+    pid = chapter.case("PID")
+    assert min(lags(pid)) > math.radians(0.5)
+    assert max(lags(pid)) < math.radians(10)
+    leading = pid.model_copy(update={"wanted": pid.position, "position": pid.wanted})
+    assert lags(leading) == pytest.approx([-lag for lag in lags(pid)])
+    assert "lag" in next(c.ours for c in chapter.checks if c.name == "PID follows with a lag")
+
+
 def test_what_does_not_come_out_is_said(chapter: ControlChapter) -> None:
     failed = {c.name for c in chapter.checks if not c.holds}
     assert failed == {"with the tabled back-EMF constants cases 1 and 2 are damped", "PID from 90°: joint 3 overshoots"}
 
 
 def test_the_chapter_can_be_cancelled() -> None:
-    class Now:
-        def is_set(self) -> bool:
-            return True
-
+    now = threading.Event()
+    now.set()
     with pytest.raises(CancelledError):
-        control_chapter(cancel=Now())
+        control_chapter(cancel=now)

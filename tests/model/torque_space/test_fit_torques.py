@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -80,6 +81,20 @@ def test_what_is_known_has_an_interval_and_the_report_shows_it(tmp_path: Path) -
     assert "link1.mass" in page
     assert page.count("<svg") == 2
     assert "swing5" in page
+
+
+@pytest.mark.parametrize("held", [False, True], ids=["fitted to", "held out"])
+def test_a_drive_that_is_0_throughout_is_refused_before_the_search(held: bool) -> None:
+    good, still = swinging(1), swinging(5)
+    assert still.drive is not None
+    still = replace(still, drive=np.zeros_like(still.drive))
+    said: list[str] = []
+    with pytest.raises(TraceError, match="trace swing5: its drive is 0 throughout"):
+        fit_torques(
+            rod(), [good] if held else [good, still], [still] if held else [], OPTIONS,
+            progress=lambda _, text: said.append(text),
+        )  # fmt: skip
+    assert said == ["low-passing the records"]
 
 
 def test_the_torque_of_the_drive_is_in_newton_metres() -> None:

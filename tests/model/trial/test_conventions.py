@@ -40,7 +40,7 @@ SIZES: dict[str, tuple[int | None, dict[str, float]]] = {
     "joint_compliance": (2, {"compliance": 1.5e-3, "damping": 4.0}),
     "link_mass": (3, {"mass": 1.5}),
     "centre_of_mass": (2, {"shift": 0.1}),
-    "base_tilt": (None, {"about_x": 0.0, "about_y": 0.15}),
+    "base_tilt": (None, {"about_x": 0.1, "about_y": 0.15}),
     "spring_torque": (2, {"stiffness": 20.0, "neutral": 0.79}),
     "periodic_disturbance": (3, {"amplitude": 1.2, "frequency": 2.5, "phase": 0.0}),
     "potentiometer_gain": (3, {"error": -0.1}),
@@ -56,7 +56,7 @@ SHAPES = {
 }
 """Parameters that no interval is counted for, needed to simulate; phases are zero here."""
 DECIDES = {
-    "stribeck_friction": "torque", "torque_ripple": "cycles", "base_tilt": "about_y", "spring_torque": "stiffness",
+    "stribeck_friction": "torque", "torque_ripple": "cycles", "spring_torque": "stiffness",
 }  # fmt: skip
 """The parameter that is varied, where there are several."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -83,9 +85,7 @@ def test_parameters_outside_their_bounds_are_refused() -> None:
 
 
 def test_a_search_can_be_cancelled() -> None:
-    class Now:
-        def is_set(self) -> bool:
-            return True
-
+    now = threading.Event()
+    now.set()
     with pytest.raises(CancelledError):
-        doubling_changes(lambda points: np.ones(len(points)), BEST, LOW, HIGH, FIRST, cancel=Now())
+        doubling_changes(lambda points: np.ones(len(points)), BEST, LOW, HIGH, FIRST, cancel=now)

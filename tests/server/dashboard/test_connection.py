@@ -11,6 +11,13 @@ from tests.server.dashboard.test_stop import hanging
 pytestmark = pytest.mark.browser
 
 
+def test_a_service_that_cannot_tell_about_itself_is_shown_all_the_same(dashboard: Dashboard) -> None:
+    dashboard.page.route("**/api/v1/system", lambda route: route.fulfill(status=500))
+    page = dashboard.until_live()
+    expect(page.get_by_text("The service cannot be reached")).not_to_be_attached()
+    dashboard.forgive()
+
+
 def test_a_cable_that_is_pulled_makes_everything_stale_and_heals_when_it_is_plugged_in(dashboard: Dashboard) -> None:
     page = dashboard.until_live()
     dashboard.mock.ask("disconnect")

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, Playwright, expect
+from playwright.sync_api import APIResponse, Browser, Locator, Page, Playwright, Request, Route, WebSocketRoute, expect
 
 from tests.server.dashboard.browser import TABLET, WIDE, WITH_3D, Dashboard, MockControl, chromium, watched
 from tests.server.dashboard.faults import faults_of
@@ -174,6 +175,64 @@ def test_an_experiment_waits_for_its_time_and_one_is_run_every_so_often(dashboar
     row.get_by_role("button", name=re.compile("Take the schedule")).click()
     expect(row).not_to_be_attached()
     assert dashboard.service.robot.get("/schedules").json()["items"] == []
+
+
+def test_times_are_told_by_the_clock_of_the_service(paused: Dashboard) -> None:
+    paused.page.add_init_script("const own = Date.now; Date.now = () => own() - 3600000")
+    at = datetime.now(UTC) + timedelta(minutes=10)
+    sent = paused.service.robot.post("/experiments", json={"spec": SHORT, "at": at.isoformat()})
+    assert sent.status_code == 201, sent.text
+    expect(_waiting(paused.open("experiments")).first).to_contain_text(re.compile(r"in (9|10) min"))
+
+
+def test_a_list_that_comes_after_a_newer_one_is_left_aside(paused: Dashboard, form: Page) -> None:
+    number = _submit(paused, name="taken-back")
+    expect(_waiting(form)).to_have_count(1)
+    older: list[tuple[Route, APIResponse]] = []
+
+    def hold_first(route: Route) -> None:
+        if older:
+            route.continue_()
+        else:
+            older.append((route, route.fetch()))
+
+    form.route("**/queue/experiments", hold_first)
+    paused.service.robot.post("/queue/pause")
+    while not older:
+        form.wait_for_timeout(20)  # lets the page ask; the test's own time limit ends the wait
+    paused.service.robot.post(f"/experiments/{number}/cancel")
+    expect(_waiting(form)).to_have_count(0)
+    route, response = older[0]
+    with form.expect_event("requestfinished", lambda request: request == route.request):
+        route.fulfill(response=response)
+    form.evaluate("new Promise(requestAnimationFrame)")
+    expect(_waiting(form)).to_have_count(0)
+
+
+def test_whoever_uses_the_page_attends_what_runs_on_a_real_arm(paused: Dashboard) -> None:
+    def as_if_real(route: WebSocketRoute) -> None:
+        server = route.connect_to_server()
+
+        def tell(message: str | bytes) -> None:
+            text = str(message).replace('"simulated":true', '"simulated":false')
+            route.send(text.replace('"running":null', '"running":"a"'))
+
+        server.on_message(tell)
+
+    page = paused.page
+    page.route_web_socket(re.compile("/live"), as_if_real)
+    requested: list[str] = []
+
+    def note(request: Request) -> None:
+        requested.append(request.url)
+
+    page.on("request", note)
+    paused.open("experiments")
+    expect(page.get_by_text("Paused:")).to_be_visible()
+    expect(page.get_by_role("button", name="I am here")).to_be_visible()
+    assert [url for url in requested if "attend" in url] == []
+    with page.expect_request("**/queue/attend"):
+        page.keyboard.press("Tab")
 
 
 def test_the_queue_says_that_it_waits_for_whoever_has_the_control(dashboard: Dashboard, form: Page) -> None:

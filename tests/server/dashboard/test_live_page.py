@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, WebSocketRoute, expect
 
 from tests.server.dashboard.browser import Dashboard
 
@@ -93,6 +93,46 @@ def test_a_joint_moves_while_its_key_is_held_and_holds_when_it_is_let_go(dashboa
     page.get_by_role("button", name="Give it back").click()
     expect(page.get_by_role("button", name="Take the control")).to_be_visible()
     assert dashboard.service.robot.get("/control").json()["holder"] == "nobody"
+
+
+def test_a_joint_is_not_driven_on_when_the_connection_was_lost_while_its_key_was_held(dashboard: Dashboard) -> None:
+    connections: list[WebSocketRoute] = []
+    sent: list[str] = []
+    heard: list[str | bytes] = []
+
+    def join(route: WebSocketRoute) -> None:
+        server = route.connect_to_server()
+        connections.append(server)
+        sent.clear()
+        heard.clear()
+
+        def send(message: str | bytes) -> None:
+            sent.append(str(message))
+            server.send(message)
+
+        def hear(message: str | bytes) -> None:
+            heard.append(message)
+            route.send(message)
+
+        route.on_message(send)
+        server.on_message(hear)
+
+    page = dashboard.page
+    page.route_web_socket(re.compile("/live"), join)
+    dashboard.until_live()
+    page.get_by_role("button", name="Take the control").click()
+    page.get_by_role("group", name="Jog:").focus()
+    page.keyboard.down("ArrowLeft")
+    expect(page.get_by_text("Jogged by hand")).to_be_visible()
+    before = len(connections)
+    connections[-1].close()
+    while len(connections) == before or len(heard) < 50:
+        page.wait_for_timeout(20)  # lets the page connect again; the test's own time limit ends the wait
+    assert [text for text in sent if "jog" in text] == []
+    page.keyboard.up("ArrowLeft")
+    page.get_by_role("button", name="Give it back").click()
+    expect(page.get_by_role("button", name="Take the control")).to_be_visible()
+    dashboard.forgive()
 
 
 def test_the_gripper_closes_for_whoever_has_the_control(dashboard: Dashboard) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.server.dashboard.browser import TABLET, TABLET_ON_ITS_SIDE, Dashboard
 
@@ -25,6 +25,23 @@ def hanging(process: int) -> Iterator[None]:
         yield
     finally:
         os.kill(process, signal.SIGCONT)
+
+
+def held(page: Page, address: str) -> list[Route]:
+    """Requests to an address, as they come: none goes on by itself."""
+    found: list[Route] = []
+
+    def hold(route: Route) -> None:
+        found.append(route)
+
+    page.route(address, hold)
+    return found
+
+
+def until_one(page: Page, requests: list[Route]) -> None:
+    """Until the page has asked; the test's own time limit ends the wait."""
+    while not requests:
+        page.wait_for_timeout(20)
 
 
 def test_a_pressed_stop_freezes_the_board_before_it_is_let_go(dashboard: Dashboard) -> None:
@@ -86,6 +103,23 @@ def test_a_reset_ends_the_stop_and_moves_nothing(dashboard: Dashboard) -> None:
     state = dashboard.mock.ask("state")
     assert not state["frozen"]
     assert all(abs(one - other) <= 2 for one, other in zip(before, state["set_points"], strict=True))
+
+
+def test_a_late_answer_to_a_reset_does_not_hide_a_stop_that_was_pressed_meanwhile(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    page.keyboard.press("F8")
+    expect(page.get_by_text("The arm is stopped.")).to_be_visible()
+    resets, stops = held(page, "**/reset"), held(page, "**/robots/*/stop")
+    page.get_by_role("button", name="Reset").click()
+    until_one(page, resets)
+    page.keyboard.press("F8")
+    until_one(page, stops)
+    with page.expect_response("**/reset"):
+        resets[0].continue_()
+    expect(page.get_by_text("The arm is stopped.")).not_to_be_attached()
+    stops[0].continue_()
+    expect(page.locator(CONFIRMED)).to_be_visible()
+    assert dashboard.mock.ask("state")["frozen"]
 
 
 def test_a_stop_that_somebody_else_has_ended_is_not_called_confirmed_any_more(dashboard: Dashboard) -> None:

@@ -56,12 +56,17 @@ export async function ask<T>(request: Promise<Answer<T>>): Promise<Told<T>> {
 
 /** How the service is. One that is not ready says so with a 503, whose body is what is wanted. Throws a Problem. */
 export async function readiness(): Promise<Health> {
-  const answer = await fetch('/readyz').catch(() => {
+  const answer = await fetch('/readyz', { headers: authorization() }).catch(() => {
     throw notAnswered();
   });
   const body: unknown = await answer.json().catch(() => null);
   if (!(answer.ok || answer.status === 503) || body === null) throw problemOf(answer.status, body);
   return body as Health;
+}
+
+function authorization(): HeadersInit {
+  const token = currentToken();
+  return token === null ? {} : { Authorization: `Bearer ${token}` };
 }
 
 /** The address of a file to download: a picture, a trace. With a token the file is fetched first: see `download`. */
@@ -71,9 +76,7 @@ export function addressOf(path: string): string {
 
 /** Saves a file of the service under a name of its own. Throws a Problem. */
 export async function download(path: string, name: string): Promise<void> {
-  const token = currentToken();
-  const headers: HeadersInit = token === null ? {} : { Authorization: `Bearer ${token}` };
-  const answer = await fetch(addressOf(path), { headers }).catch(() => {
+  const answer = await fetch(addressOf(path), { headers: authorization() }).catch(() => {
     throw notAnswered();
   });
   if (!answer.ok) throw problemOf(answer.status, await answer.json().catch(() => null));

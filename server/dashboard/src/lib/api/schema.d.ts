@@ -382,6 +382,8 @@ export interface paths {
         /**
          * Calibrate Gain
          * @description Queues the experiment that shows the actual proportional gain; GET …/traces/{trace}/gain tells it afterwards.
+         *
+         *     It is checked as any other, and the same Idempotency-Key gives the same experiment (200).
          */
         post: operations["calibrate_gain"];
         delete?: never;
@@ -1186,6 +1188,8 @@ export interface paths {
         /**
          * Readyz
          * @description 200 while experiments can be taken: database and traces' folder can be written. A robot need not be there.
+         *
+         *     What is wrong is told to whoever may see the robot.
          */
         get: operations["readyz"];
         put?: never;
@@ -5280,7 +5284,10 @@ export interface operations {
     calibrate_gain: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Sent again with the same request, it is carried out once. */
+                "idempotency-key"?: string | null;
+            };
             path: {
                 /** @description Name of the robot. */
                 robot: string;
@@ -5293,6 +5300,15 @@ export interface operations {
             };
         };
         responses: {
+            /** @description OK */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Experiment"];
+                };
+            };
             /** @description Successful Response */
             201: {
                 headers: {

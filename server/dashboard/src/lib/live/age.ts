@@ -1,15 +1,20 @@
-/** How old a value is: by the service's clock while frames come, growing by this computer's clock since the last. */
+/**
+ * The service's clocks, growing by this computer's since its last frame: how old a value is, and what time it is there.
+ * This computer's own time of day may be minutes off.
+ */
 
 /** s after which a sample is stale: five control periods and a slow frame. */
 export const STALE_AFTER = 0.5;
 
 export class ServiceClock {
   private now = 0;
+  private utc = 0;
   private heardAt: number | null = null;
 
-  /** A frame that said `now` has arrived at `at` (s, this computer's monotonic clock). */
-  heard(now: number, at: number): void {
+  /** A frame that said `now` and `utc` (s) has arrived at `at` (s, this computer's monotonic clock). */
+  heard(now: number, utc: number, at: number): void {
     this.now = now;
+    this.utc = utc;
     this.heardAt = at;
   }
 
@@ -21,6 +26,11 @@ export class ServiceClock {
   /** The service's clock at `at`; null before the first frame. */
   at(at: number): number | null {
     return this.heardAt === null ? null : this.now + (at - this.heardAt);
+  }
+
+  /** Time of day at the service at `at`, in ms since 1970; null before the first frame. */
+  wall(at: number): number | null {
+    return this.heardAt === null ? null : (this.utc + (at - this.heardAt)) * 1000;
   }
 
   /** s since `hostTime`, at `at`; null before the first frame. */

@@ -5,14 +5,14 @@
 
 import { api, ask, here, showRobot } from '../api/client';
 import { Problem } from '../api/problem';
-import type { Machine, Me } from '../api/types';
+import type { Machine, Me, SystemStatus } from '../api/types';
 
 export interface Asked {
   /** The robot's name; from then on `here()` tells it. */
   readonly robot: Promise<string>;
   readonly machine: Promise<Machine>;
   readonly me: Promise<Me>;
-  readonly stopPort: Promise<number | null>;
+  readonly system: Promise<SystemStatus>;
   /** Opens one socket. */
   readonly ticket: Promise<string>;
 }
@@ -31,6 +31,10 @@ export function asked(): Asked {
   return found;
 }
 
+export async function askSystem(): Promise<SystemStatus> {
+  return ask(api.GET('/api/v1/system'));
+}
+
 export async function newTicket(): Promise<string> {
   return (await ask(api.POST('/api/v1/tickets'))).ticket;
 }
@@ -41,7 +45,7 @@ function askAll(): Asked {
     robot,
     machine: robot.then(() => ask(api.GET('/api/v1/robots/{robot}/machine', { params: { path: here() } }))),
     me: ask(api.GET('/api/v1/me')),
-    stopPort: ask(api.GET('/api/v1/system')).then((system) => system.stop_port),
+    system: askSystem(),
     ticket: newTicket(),
   };
   // A refusal is told to whoever waits for the answer; until then nobody has missed it.

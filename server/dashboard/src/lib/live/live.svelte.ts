@@ -21,11 +21,12 @@ import type {
   RobotMessage,
   SampleMessage,
   ServiceEvent,
+  SystemStatus,
 } from '../api/types';
 import { armNow } from '../stop/standing';
 import { stop } from '../stop/stop.svelte';
 import { ServiceClock, STALE_AFTER } from './age';
-import { asked, newTicket } from './asked';
+import { asked, askSystem, newTicket } from './asked';
 import { ReceivedRate } from './rate';
 import { Recording } from './recording';
 
@@ -36,6 +37,8 @@ const AT_START = 60;
 const POINTS = 1200;
 const EVENTS_KEPT = 100;
 const LINES_KEPT = 20;
+/** s until the service is asked again what it has not said about itself. */
+const SYSTEM_AGAIN = 10;
 
 /** s of control, of the original controller; gaps are told by ticks, so that another one does no harm. */
 const PERIOD = 0.02;
@@ -59,6 +62,8 @@ class Live {
   problem = $state.raw<Problem | null>(null);
   machine = $state.raw<Machine | null>(null);
   me = $state.raw<Me | null>(null);
+  /** Whether a real arm may run while nobody says to be there. */
+  isUnattended = $state(false);
   robot = $state.raw<RobotMessage | null>(null);
   link = $state.raw<LinkMessage | null>(null);
   queue = $state.raw<QueueStatus | null>(null);
@@ -92,6 +97,9 @@ class Live {
   /** Whether what is shown is not what is: no connection, or no samples although the robot is connected. */
   isStale: boolean = $derived(!this.isOpen || this.sampleAge === null || this.sampleAge > STALE_AFTER);
   isOperator: boolean = $derived(this.me?.role === 'operator');
+  isRealArm: boolean = $derived(this.robot?.identity?.simulated === false);
+  /** Whether something runs that is ended unless an operator says to be there. */
+  needsAttendance: boolean = $derived(this.isRealArm && !this.isUnattended && !!this.queue?.running);
 
   readonly clock = new ServiceClock();
   recording: Recording | null = null;
@@ -126,20 +134,25 @@ class Live {
     return () => this.listeners.delete(call);
   }
 
+  /** Time of day at the service, ms since 1970. Reactive: it grows. */
+  get wall(): number {
+    return this.clock.wall(this.now) ?? Date.now();
+  }
+
   /** s since `hostTime` of the service's clock. Reactive: it grows. */
   ageOf(hostTime: number): number | null {
     return this.clock.age(hostTime, this.now);
   }
 
   private async begin(): Promise<void> {
-    const { robot, machine, me, stopPort, ticket } = asked();
+    const { robot, machine, me, system, ticket } = asked();
     try {
       await robot;
       this.connection = this.connect(ticket);
       this.connection.start();
-      const [known, caller, port] = await Promise.all([machine, me, stopPort]);
+      const [known, caller] = await Promise.all([machine, me]);
       this.me = caller;
-      stop.port = port;
+      void this.learn(system);
       this.problem = null;
       this.know(known);
     } catch (error) {
@@ -148,6 +161,17 @@ class Live {
       this.unheard = [];
       this.problem = asProblem(error);
       if (this.problem.status === 0 || this.problem.status >= 500) setTimeout(() => this.retryNow(), 2000);
+    }
+  }
+
+  /** What the page can do without, so that nothing waits for it: without it a stop has one door less. */
+  private async learn(system: Promise<SystemStatus>): Promise<void> {
+    try {
+      const known = await system;
+      stop.port = known.stop_port;
+      this.isUnattended = known.unattended;
+    } catch {
+      setTimeout(() => void this.learn(askSystem()), SYSTEM_AGAIN * 1000);
     }
   }
 
@@ -202,7 +226,7 @@ class Live {
       return;
     }
     if (this.clock.wentBack(frame.now, CLOCK_SLACK)) this.beginAnew();
-    this.clock.heard(frame.now, at);
+    this.clock.heard(frame.now, frame.utc, at);
     for (const message of frame.messages) {
       this.take(message);
       for (const listener of this.listeners) listener(message);

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { HistoryMessage, SampleMessage } from '../api/types';
-import { Recording } from './recording';
+import { Recording, SIGNALS } from './recording';
 import { MOST_ROWS, shownPart } from './window';
 
 const PERIOD = 0.02;
@@ -82,6 +82,30 @@ describe('the recording', () => {
     made.addHistory(history([1, 2, 3, 4]));
     made.addSample(sample(5));
     expect(made.columns.position[0]).toEqual([1.1, 2.1, 3.5, 4.5, 5.1]);
+  });
+
+  it('fills what was missed also when a new sample was there before the past', () => {
+    const made = recordingOf(1, 2, 20);
+    made.addHistory(history([2, 3, 8, 14, 19, 20]));
+    made.addSample(sample(21));
+    expect(made.time.map((time) => Math.round(time / PERIOD))).toEqual([1, 2, 3, 8, 14, 19, 20, 21]);
+    expect(made.columns.position[0]).toEqual([1.1, 2.1, 3.5, 8.5, 14.5, 19.5, 20.1, 21.1]);
+    for (const signal of SIGNALS)
+      for (const column of made.columns[signal]) expect(column).toHaveLength(made.time.length);
+  });
+
+  it('leaves as much of a gap as the past does not have', () => {
+    const made = recordingOf(1, 40, 41, 90);
+    made.addHistory(history([10, 12, 41]));
+    expect(made.columns.position[0]).toEqual([1.1, null, 10.5, 12.5, null, 40.1, 41.1, null, 90.1]);
+    expect(made.time).toEqual([...made.time].sort((one, other) => one - other));
+  });
+
+  it('takes a sample for the same whose time is rounded otherwise', () => {
+    const made = recordingOf(1, 2);
+    const past = history([1, 2, 3]);
+    made.addHistory({ ...past, host_time: past.host_time.map((time) => time + 0.0004) });
+    expect(made.columns.position[0]).toEqual([1.1, 2.1, 3.5]);
   });
 
   it('forgets what is older than it keeps, but not at every sample', () => {

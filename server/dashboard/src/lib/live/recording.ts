@@ -36,14 +36,9 @@ export class Recording {
     return this.time.at(-1) ?? null;
   }
 
-  /** The past as the service has it. What is here already, and newer, stays. */
+  /** The past as the service has it: what is missing here is taken from it. What is here already stays. */
   addHistory(past: HistoryMessage): void {
-    const older = this.time[0] ?? Infinity;
-    const newer = this.newest ?? -Infinity;
-    const before = past.host_time.findLastIndex((time) => time < older) + 1;
-    const after = past.host_time.findIndex((time) => time > newer);
-    if (before > 0) this.prepend(past, before);
-    if (after >= 0 && after >= before) this.append(past, after);
+    for (const [row, replaced] of this.holes()) this.fill(past, row, replaced);
     for (const event of past.events) this.addEvent(event);
     this.version += 1;
   }
@@ -100,20 +95,35 @@ export class Recording {
     for (const signal of SIGNALS) for (const column of this.columns[signal]) column.push(null);
   }
 
-  private prepend(past: HistoryMessage, end: number): void {
-    this.time.unshift(...past.host_time.slice(0, end));
-    this.eachColumn(past, (column, row) => column.unshift(...row.slice(0, end)));
+  /** Where something may be missing, the newest first: a row, and how many stand there for what is missing. */
+  private holes(): (readonly [row: number, replaced: number])[] {
+    const gaps = this.time.flatMap((_, row) => (this.isGapRow(row) ? [[row, 1] as const] : []));
+    return [[this.time.length, 0] as const, ...gaps.reverse(), [0, 0] as const];
   }
 
-  private append(past: HistoryMessage, begin: number): void {
-    const newest = this.newest;
-    const first = past.host_time[begin] as number;
-    if (newest !== null && first - newest > GAP * this.period) this.addGap(newest);
-    for (const time of past.host_time.slice(begin)) this.time.push(time);
-    this.eachColumn(past, (column, row) => {
-      for (const value of row.slice(begin)) column.push(value);
-    });
-    this.lastTick = past.tick.at(-1) ?? this.lastTick;
+  private isGapRow(row: number): boolean {
+    return SIGNALS.every((signal) => this.columns[signal].every((column) => column[row] === null));
+  }
+
+  /** Half a period is kept on either side: the same sample's time is not rounded alike in a sample and in the past. */
+  private fill(past: HistoryMessage, row: number, replaced: number): void {
+    const before = this.time[row - 1] ?? -Infinity;
+    const after = this.time[row + replaced] ?? Infinity;
+    const begin = past.host_time.findIndex((time) => time > before + this.period / 2);
+    const end = past.host_time.findLastIndex((time) => time < after - this.period / 2) + 1;
+    if (begin < 0 || end <= begin) return;
+    const time = past.host_time.slice(begin, end);
+    const first = time[0] as number;
+    const last = time[time.length - 1] as number;
+    const opening = isFinite(before) && first - before > GAP * this.period ? [null] : [];
+    const closing = isFinite(after) && after - last > GAP * this.period ? [null] : [];
+    const half = this.period / 2;
+    const times = [...opening.map(() => before + half), ...time, ...closing.map(() => last + half)];
+    this.time.splice(row, replaced, ...times);
+    this.eachColumn(past, (column, values) =>
+      column.splice(row, replaced, ...opening, ...values.slice(begin, end), ...closing),
+    );
+    if (after === Infinity) this.lastTick = past.tick[end - 1] ?? this.lastTick;
   }
 
   private eachColumn(

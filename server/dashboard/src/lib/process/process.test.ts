@@ -1,17 +1,19 @@
 import { describe, expect, it } from 'vitest';
 import { Problem } from '../api/problem';
 import type { ProcessState } from '../api/types';
-import { ProcessSignals } from './process.svelte';
+import { OLD_AFTER, ProcessSignals } from './process.svelte';
 
 const gripper = (state: 'open' | 'closed'): ProcessState =>
   ({ gripper: state, outputs: [], inputs: [] }) as never;
 
-/** A service whose answers come when the test says so. */
+/** A service whose answers come, and a clock that goes on, when the test says so. */
 function slow() {
+  const clock = { now: 0 };
   const answers: { tell: (state: ProcessState) => void; refuse: (problem: Problem) => void }[] = [];
   const request = (): Promise<ProcessState> =>
     new Promise((tell, refuse) => answers.push({ tell, refuse: refuse as (problem: Problem) => void }));
-  return { answers, process: new ProcessSignals({ look: request, grip: request, set: request }) };
+  const requests = { look: request, grip: request, set: request };
+  return { answers, clock, process: new ProcessSignals(requests, () => clock.now) };
 }
 
 describe('process signals', () => {
@@ -42,5 +44,36 @@ describe('process signals', () => {
     answers[2]!.tell(gripper('open'));
     await again;
     expect(process.problem).toBeNull();
+  });
+
+  it('are not looked at again while an answer is awaited', async () => {
+    const { answers, process } = slow();
+    const looked = process.look();
+    await process.look();
+    expect(answers).toHaveLength(1);
+    answers[0]!.refuse(new Problem(409, 'arm-busy', 'the arm is busy: program'));
+    await looked;
+    void process.grip(true);
+    await process.look();
+    expect(answers).toHaveLength(2);
+  });
+
+  it('are old when no look has told anything since, by the moment they were asked for', async () => {
+    const { answers, clock, process } = slow();
+    expect(process.oldAt(100)).toBeNull();
+    const looked = process.look();
+    clock.now = 2;
+    answers[0]!.tell(gripper('open'));
+    await looked;
+    expect([process.oldAt(OLD_AFTER), process.oldAt(OLD_AFTER + 1)]).toEqual([null, OLD_AFTER + 1]);
+    clock.now = OLD_AFTER + 1;
+    const again = process.look();
+    answers[1]!.refuse(new Problem(409, 'arm-busy', 'the arm is busy: program'));
+    await again;
+    expect(process.oldAt(OLD_AFTER + 2)).toBe(OLD_AFTER + 2);
+    const third = process.look();
+    answers[2]!.tell(gripper('open'));
+    await third;
+    expect(process.oldAt(OLD_AFTER + 2)).toBeNull();
   });
 });

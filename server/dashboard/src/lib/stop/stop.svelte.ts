@@ -17,7 +17,8 @@ class Stop {
   words = $derived(wordsOf(this.state, this.standing, this.arm, this.time));
   /** The port of the listener that takes stops alone; null until the service has told it. */
   port: number | null = null;
-  private call: StopCall | null = null;
+  /** The last press. */
+  call: StopCall | null = null;
   private followed = new StopStanding('none');
 
   /** At once, and without a question. */
@@ -34,9 +35,10 @@ class Stop {
     this.call.begin();
   }
 
-  /** The message has been read. */
-  dismiss(): void {
-    this.call?.leave();
+  /** The message about this press has been read, or a reset has ended it. A newer one is left as it is. */
+  dismiss(call = this.call): void {
+    if (call !== this.call) return;
+    call?.leave();
     this.tell({ kind: 'none' });
   }
 

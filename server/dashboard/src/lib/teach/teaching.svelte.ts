@@ -18,6 +18,8 @@ export class Teaching {
   chosen = $state.raw<readonly number[]>([]);
   /** Joints that this page has begun to lead; none where somebody else has. */
   led = $state.raw<readonly number[]>([]);
+  /** Whether the end of leading has been asked for: the arm has to come to rest first. */
+  isEnding = $state(false);
   problem = $state.raw<Problem | null>(null);
 
   constructor(
@@ -64,9 +66,12 @@ export class Teaching {
     this.led = [];
   }
 
-  /** Ends leading, and keeps its path as an instruction. */
+  /** Ends leading, and keeps its path as an instruction: once, however often it is asked for. */
   async finish(): Promise<void> {
+    if (this.isEnding) return;
+    this.isEnding = true;
     const status = await this.tried(() => this.requests.finish());
+    this.isEnding = false;
     if (status === null) return;
     this.led = [];
     const path = status.path ?? null;

@@ -50,6 +50,15 @@ describe('teaching', () => {
     ]);
   });
 
+  it('keeps a path once, however often its end is asked for', async () => {
+    const taught = teaching({ finish: () => Promise.resolve({ ...status, path }) });
+    await taught.lead();
+    const first = taught.finish();
+    expect(taught.isEnding).toBe(true);
+    await Promise.all([first, taught.finish()]);
+    expect([taught.instructions, taught.isEnding]).toEqual([[{ kind: 'path', path, rate: 1 }], false]);
+  });
+
   it('does not say that joints are led where that was refused', async () => {
     const taught = teaching({ lead: refused });
     await taught.lead();

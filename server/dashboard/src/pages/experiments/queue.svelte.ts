@@ -22,6 +22,8 @@ export class QueueLists {
   refused = $state.raw<Problem | null>(null);
   loaded = $state(false);
   busy = $state(false);
+  /** How often they were asked for: an answer that comes after a newer one is left aside. */
+  private asked = 0;
   private readonly reload = new Reload({ load: () => void this.load(), after: afterSeconds });
 
   /** Follows the service until the returned function is called. */
@@ -42,6 +44,7 @@ export class QueueLists {
   }
 
   async load(): Promise<void> {
+    const turn = ++this.asked;
     const path = here();
     try {
       const [waiting, running, ended, schedules] = await Promise.all([
@@ -56,12 +59,14 @@ export class QueueLists {
         ),
         ask(api.GET('/api/v1/robots/{robot}/schedules', { params: { path } })),
       ]);
+      if (turn !== this.asked) return;
       this.waiting = waiting;
       this.running = running.items[0] ?? null;
       this.ended = ended.items;
       this.schedules = schedules.items;
       this.problem = null;
     } catch (error) {
+      if (turn !== this.asked) return;
       this.problem = asProblem(error);
     }
     this.loaded = true;

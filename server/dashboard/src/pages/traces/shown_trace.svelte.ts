@@ -6,6 +6,7 @@ import { traceName } from '../../lib/traces/label';
 import { isThinned, refined, type Range, type Signals } from '../../lib/traces/columns';
 import { serves, toAsk } from '../../lib/traces/zoom';
 import { Simulating } from './simulating.svelte';
+import { SIMULATING_REQUESTS } from './simulating_requests';
 
 /** Points of a plot. */
 const POINTS = 3000;
@@ -24,7 +25,7 @@ export class ShownTrace {
   signals: Signals | null = $derived(this.whole && this.part ? refined(this.whole, this.part) : this.whole);
 
   constructor(readonly id: string) {
-    this.simulating = new Simulating(id);
+    this.simulating = new Simulating(id, SIMULATING_REQUESTS);
   }
 
   get name(): string {

@@ -1,10 +1,11 @@
-/** A trace beside its simulation: the service simulates it with a model, in a job of its own, and the curve is laid over. */
+/**
+ * A trace beside its simulation: the service simulates it with a model, in a job of its own, and the curve is laid over.
+ * What asks the service is handed in.
+ */
 
-import { api, ask, asProblem, here, type Problem } from '../../lib/api';
+import { asProblem, type Problem } from '../../lib/api/problem';
+import type { Job } from '../../lib/api/types';
 import { rmsDifference } from '../../lib/traces/columns';
-
-/** s that one question waits for the job's end. */
-const WAIT = 20;
 
 /** Columns of the joints that the model describes; rad, or m on a prismatic joint. */
 export interface Simulation {
@@ -25,6 +26,15 @@ interface Compared {
   }[];
 }
 
+export interface SimulatingRequests {
+  /** The number of a new job. */
+  begin(trace: string, model: string): Promise<string>;
+  /** The job once it has ended, or after a while. */
+  news(job: string): Promise<Job>;
+  result(job: string): Promise<unknown>;
+  remove(job: string): Promise<void>;
+}
+
 export class Simulating {
   shown = $state.raw<Simulation | null>(null);
   busy = $state(false);
@@ -32,7 +42,10 @@ export class Simulating {
   problem = $state.raw<Problem | null>(null);
   private turn = 0;
 
-  constructor(private readonly trace: string) {}
+  constructor(
+    private readonly trace: string,
+    private readonly requests: SimulatingRequests,
+  ) {}
 
   /** Simulates the trace with a model (`machine`: as the machine file describes it) and shows the curve. */
   async with(model: string): Promise<void> {
@@ -41,14 +54,14 @@ export class Simulating {
     this.problem = null;
     this.progress = 'waits for a worker';
     try {
-      const body = { kind: 'compare' as const, traces: [this.trace], models: [model] };
-      const job = await ask(api.POST('/api/v1/robots/{robot}/jobs', { params: { path: here() }, body }));
-      const found = await this.ended(job.id, turn);
-      if (turn === this.turn) this.shown = simulationOf(found, model);
-      // What was only looked at is not kept: a job would keep the trace from being deleted.
-      await ask(
-        api.DELETE('/api/v1/robots/{robot}/jobs/{job}', { params: { path: { ...here(), job: job.id } } }),
-      );
+      const job = await this.requests.begin(this.trace, model);
+      try {
+        const found = await this.ended(job, turn);
+        if (turn === this.turn) this.shown = simulationOf(found, model);
+      } finally {
+        // What was only looked at is not kept, nor what failed: a job would keep the trace from being deleted.
+        await this.requests.remove(job).catch(() => {});
+      }
     } catch (error) {
       if (turn === this.turn) this.problem = asProblem(error);
     } finally {
@@ -64,16 +77,13 @@ export class Simulating {
   }
 
   private async ended(id: string, turn: number): Promise<Compared> {
-    const path = { ...here(), job: id };
     for (;;) {
-      const query = { wait: WAIT };
-      const job = await ask(api.GET('/api/v1/robots/{robot}/jobs/{job}', { params: { path, query } }));
+      const job = await this.requests.news(id);
       if (turn === this.turn) this.progress = job.progress_text;
       if (job.state === 'done') break;
       if (job.state !== 'queued' && job.state !== 'running') throw new Error(job.reason);
     }
-    const result = await ask(api.GET('/api/v1/robots/{robot}/jobs/{job}/result', { params: { path } }));
-    return result.data as unknown as Compared;
+    return (await this.requests.result(id)) as Compared;
   }
 }
 

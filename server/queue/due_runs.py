@@ -1,0 +1,69 @@
+"""Runs of schedules, submitted when they are due."""
+
+from __future__ import annotations
+
+import logging
+from datetime import datetime
+
+from daq.contracts.service.experiments import ExperimentRequest
+from server.problems import ProblemError
+from server.queue.parts import QueueParts
+from server.queue.room import require_room
+
+log = logging.getLogger("server.queue")
+
+
+class DueRuns:
+    """Submits the runs of one robot's schedules. Used by the queue's thread alone."""
+
+    def __init__(self, parts: QueueParts) -> None:
+        self._parts = parts
+        self._hindered: dict[str, type[Exception]] = {}
+        """Schedules whose run is due and cannot be submitted, and what has been said about it."""
+        self._left_out: set[str] = set()
+        """Schedules whose runs are left out since the one before waits: said once, however many there are."""
+
+    def leave_out_missed(self) -> None:
+        """At the start: what was due while nobody was there to submit it is not made up for."""
+        parts = self._parts
+        for identity in parts.schedules.leave_out_missed(parts.robot.name, parts.clock.utc()):
+            line = "what was due while the service was off is left out"
+            parts.told("schedule", f"schedule {identity}: {line}")
+
+    def submit(self) -> None:
+        """A run that cannot be submitted stays due, and is tried again; it holds up no other, and not the queue."""
+        now = self._parts.clock.utc()
+        for identity in self._parts.schedules.due(self._parts.robot.name, now):
+            try:
+                self._submit_one(identity, now)
+                self._hindered.pop(identity, None)
+            except Exception as error:
+                if self._hindered.get(identity) is type(error):
+                    continue  # it has been said
+                self._hindered[identity] = type(error)
+                log.exception("schedule %s", identity)
+                why = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: see the log"
+                self._parts.told("schedule", f"schedule {identity}: its run waits: {why}")
+
+    def _submit_one(self, identity: str, now: datetime) -> None:
+        parts = self._parts
+        name = parts.robot.name
+        schedule = parts.schedules.get(name, identity)
+        if parts.experiments.page(name, ("queued", "running"), identity, None, 1).items:
+            parts.schedules.leave_out(name, identity, now)
+            if identity not in self._left_out:
+                self._left_out.add(identity)
+                line = "the run before still waits; until it has ended, those that are due are left out"
+                parts.told("schedule", f"schedule {identity}: {line}")
+            return
+        require_room(parts.robot.place.folder)
+        made, _ = parts.experiments.submit(
+            name,
+            ExperimentRequest(spec=schedule.spec, priority=schedule.priority),
+            now,
+            f"schedule {identity}",
+            schedule=identity,
+            also=lambda session: parts.schedules.count_run(session, name, identity, now),
+        )
+        self._left_out.discard(identity)
+        parts.told("experiment", f"queued by schedule {identity}", experiment=made.id)

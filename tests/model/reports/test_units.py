@@ -1,0 +1,122 @@
+"""Reports name the units of the joints that they are about: a sliding joint has no radians."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from matplotlib.figure import Figure
+
+from daq.cli.compare import _tell
+from daq.cli.validate import _print_in_time
+from daq.contracts.machine import Machine, load_machine
+from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
+from model.comparison.compare import Comparison
+from model.discrepancy.answer import SignalError
+from model.reports.comparison_report import comparison_report
+from model.reports.diagnosis_pictures import error_picture
+from model.reports.page import Table
+from model.reports.units import joint_unit, squared, with_unit
+from model.reports.validation_report import validation_report
+from model.validation.criterion import Fidelity, ParameterDistortion
+from model.validation.variation import JointResidual, TimeDomain, Variation
+
+AXIS = Path(__file__).parents[3] / "examples" / "linear_axis.toml"
+
+
+@pytest.fixture
+def axis() -> Machine:
+    """A machine with one joint, which slides."""
+    return load_machine(str(AXIS))
+
+
+@pytest.fixture
+def labels(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What stands at the axes of figures that are drawn from now on, without the seconds that an SVG costs."""
+    found: list[str] = []
+
+    def drawn(draw: Callable[[Figure], None], *_: float) -> str:
+        figure = Figure()
+        draw(figure)
+        for axes in figure.axes:
+            found.extend([axes.get_xlabel(), axes.get_ylabel(), *(t.get_text() for t in axes.get_yticklabels())])
+        return "<svg></svg>"
+
+    for module in ("validation_report", "diagnosis_pictures", "motion"):
+        monkeypatch.setattr(f"model.reports.{module}.drawn", drawn)
+    return found
+
+
+def agreement(*units: str) -> ModelAgreement:
+    """A model on a trace of joints of these units."""
+    joints = tuple(
+        JointAgreement(joint=j, unit=unit, rmse=0.1, largest=0.2, floor=0.01, count=None, share=None)
+        for j, unit in enumerate(units, start=1)
+    )
+    traces = (TraceAgreement(trace="first", held_out=None, samples=10, joints=joints),)
+    return ModelAgreement(label="a", model="abc", effects=(), traces=traces, in_sample=pooled(traces), held_out=None)
+
+
+def test_a_square_of_unlike_joints_says_so() -> None:
+    assert squared(["rad", "rad"]) == "rad²"
+    assert squared(["m/s"]) == "(m/s)²"
+    assert squared(["rad", "m", "rad"]) == "rad² + m²"
+    assert with_unit("3", "°") == "3°"
+    assert with_unit("3", "mm/s") == "3 mm/s"
+
+
+def test_the_unit_of_a_joint_is_that_of_its_kind(axis: Machine) -> None:
+    assert joint_unit(axis, 1) == "m"
+    assert joint_unit(load_machine("ma2000"), 1) == "rad"
+
+
+@pytest.mark.parametrize(("units", "said"), [(("m",), "0.01 m²"), (("rad", "m"), "0.02 rad² + m²")])
+def test_a_comparison_is_in_the_squares_of_its_joints_units(
+    capsys: pytest.CaptureFixture[str], units: tuple[str, ...], said: str
+) -> None:
+    model = agreement(*units)
+    _tell([model], (), as_json=False)
+    assert f"in sample {said}\n" in capsys.readouterr().out
+    report = comparison_report(Comparison((model,), ()))
+    assert f"mean squared error {said} summed" in report.answer
+    table = report.sections[0].blocks[1]
+    assert isinstance(table, Table)
+    assert squared(units) in table.caption
+
+
+def test_a_validation_of_a_sliding_joint_is_in_metres(
+    axis: Machine, labels: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    mass = ParameterDistortion(
+        name="link1.mass", unit="kg", value=1.0, change_down=None, change_up=None, required=None, expected=0.1,
+        basis="stated", contribution=0.0,
+    )  # fmt: skip
+    fidelity = Fidelity(
+        model="abc", traces=("first",), outputs=(1,), convention="source", damping_ratio=0.5, error=0.02,
+        error_by_joint=(0.02,), parameters=(mass,), sum_of_contributions=0.0,
+    )  # fmt: skip
+    residual = JointResidual(joint=1, values=(0.1, 0.2), noise=0.01, rms=0.15, against=())
+    variation = Variation(
+        name="link1.mass", unit="kg", value=1.0, values=(0.0, 0.1), noise=(0.1, 0.1), deviation=0.1, expected=0.1,
+        mean=0.0, significant=0.0, alone_constant=0.0, alone_varying=0.0, against=(),
+    )  # fmt: skip
+    in_time = TimeDomain(
+        model="abc", trace="first", convention="source", smoothing=0.02, time=(0.0, 1.0), joints=(residual,),
+        parameters=(variation,),
+    )  # fmt: skip
+    report = validation_report("axis", (fidelity, fidelity), [in_time], axis)
+    assert dict(report.facts)["squared error"].startswith("0.02 m² (")
+    assert "measured − expected / m/s²" in labels
+    _print_in_time(in_time, axis)
+    assert "rms 0.15 m/s² (noise 0.01)" in capsys.readouterr().out
+
+
+def test_an_axis_of_degrees_and_millimetres_is_not_labelled_with_one_of_them(labels: list[str]) -> None:
+    turns = SignalError(joint=1, unit="rad", before=0.2, after=0.1, floor=0.01)
+    slides = SignalError(joint=2, unit="m", before=0.2, after=0.1, floor=0.01)
+    error_picture([turns, slides], [])
+    assert {"rms error / unit of the joint", "joint 1 / °", "joint 2 / mm"} <= set(labels)
+    labels.clear()
+    error_picture([slides], [])
+    assert {"rms error / mm", "joint 2"} <= set(labels)

@@ -1,0 +1,91 @@
+"""Benchmarks tell a missed target by their exit code, treat rivals alike, and reach no robot but their own."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import benchmarks.__main__ as listing
+from benchmarks.fitting import REPEATS, Run, beside_ours, best_in_turn
+from benchmarks.stop_latency import stop_command
+from benchmarks.undetected_damage import BOUND, WITHIN, Rate, verdict
+
+
+@pytest.mark.parametrize("name", ["startup", "main-job"])
+@pytest.mark.parametrize(("ended", "code"), [(0, 0), (1, 1), (-9, 1)])
+def test_a_benchmark_that_a_signal_ended_has_met_no_target(
+    monkeypatch: pytest.MonkeyPatch, name: str, ended: int, code: int
+) -> None:
+    def run(command: list[str], **_: object) -> Any:
+        return subprocess.CompletedProcess(command, ended if "benchmarks.startup" in command else 0)
+
+    monkeypatch.setattr(subprocess, "run", run)
+    assert listing.main([name]) == code
+
+
+def test_the_stop_that_is_measured_knows_no_robot_of_the_caller(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It freezes what is configured: with the caller's settings that would be a real arm."""
+    told: dict[str, Any] = {}
+
+    def run(command: list[str], **options: Any) -> Any:
+        told.update(options)
+        return subprocess.CompletedProcess(command, 0)
+
+    monkeypatch.setattr(subprocess, "run", run)
+    for name in ("DAQ_ROBOT__PORT", "DAQ_SERVER", "DAQ_CONFIG", "daq_robot__port", "XDG_CONFIG_HOME"):
+        monkeypatch.setenv(name, "the caller's")
+    assert stop_command(tmp_path) == 0
+    assert told["cwd"] == tmp_path
+    assert {name for name in told["env"] if name.upper().startswith("DAQ_")} == {"DAQ_RUNTIME_FOLDER"}
+    assert "the caller's" not in told["env"].values()
+
+
+def test_damage_is_within_the_bound_when_its_whole_interval_is() -> None:
+    frames = 4_000_000
+    expected = round(BOUND * frames)
+    low, near, above = Rate(frames, 0), Rate(frames, expected), Rate(frames, 2 * expected)
+    assert verdict({"a": low, "b": near}) == WITHIN
+    assert verdict({"a": low, "b": low, "c": low, "d": above}) == "ABOVE THE BOUND: d"
+    assert verdict({"a": near}).startswith("NOT SHOWN")
+
+
+def test_every_fit_warms_up_and_has_as_many_turns() -> None:
+    turns: list[str] = []
+
+    def fit(name: str, *seconds: float) -> Any:
+        left = list(seconds)
+
+        def run() -> Run:
+            turns.append(name)
+            return Run(left.pop(0), 1.0, 1.0, 1)
+
+        return run
+
+    found = best_in_turn({"one": fit("one", 1, 5, 4, 6), "other": fit("other", 1, 3, 9, 8), "absent": lambda: "no"})
+    assert turns == ["one", "other"] * (1 + REPEATS)
+    assert [found[name] for name in ("one", "other", "absent")] == [Run(4, 1.0, 1.0, 1), Run(3, 1.0, 1.0, 1), "no"]
+
+
+def test_a_rival_that_ends_at_a_larger_error_is_told_to() -> None:
+    own = Run(1.0, 1.0, 1.0, 7)
+    short = "it did not get as far as ours"
+    assert short in beside_ours("rival", own, Run(30.0, 30.0, 1.1, 99), 10.0, 1.001).beside
+    assert short not in beside_ours("rival", own, Run(30.0, 30.0, 1.001, 99), 10.0, 1.001).beside
+
+
+def test_a_missed_target_of_the_simulation_is_its_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    from benchmarks import simulation
+    from benchmarks.figures import at_most
+
+    monkeypatch.setattr("sys.argv", ["simulation"])
+    for part in ("_scaling", "_first_use"):
+        monkeypatch.setattr(simulation, part, lambda *_: [])
+    monkeypatch.setattr(simulation, "_step_sizes", lambda *_: None)
+    for value, code in ((1.0, 0), (2.0, 1)):
+        monkeypatch.setattr(simulation, "_one_run", lambda *_, value=value: [at_most("a run", value, 1.3, "× C")])
+        assert simulation.main() == code

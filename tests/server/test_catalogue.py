@@ -1,0 +1,103 @@
+"""Traces whose files are gone, or cannot be taken away."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+import pytest
+
+from daq.contracts.service.traces import TraceChange
+from daq.traces.csv_table import import_csv
+from daq.traces.naming import trace_path
+from daq.traces.store import write_trace
+from server.catalogue.catalogue import Catalogue
+from server.problems import ProblemError
+from server.store.engine import Store
+from server.store.experiments import ExperimentStore
+from server.store.traces import TraceStore
+
+ROBOT = "ma2000"
+
+
+@dataclass
+class Shelf:
+    """A catalogue with one trace, which has a tag; `copy` is its file elsewhere."""
+
+    catalogue: Catalogue
+    traces: TraceStore
+    number: str
+    path: Path
+    copy: Path
+
+    def tags(self) -> tuple[str, ...]:
+        """The trace's."""
+        return self.traces.get(ROBOT, self.number).tags
+
+
+@pytest.fixture
+def shelf(tmp_path: Path) -> Iterator[Shelf]:
+    """In a folder of its own."""
+    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
+    store.migrate()
+    traces = TraceStore(store)
+    catalogue = Catalogue(tmp_path / "traces", ROBOT, traces, ExperimentStore(store))
+    table, copy = tmp_path / "table.csv", tmp_path / "copy.mcap"
+    table.write_text("time,position_1\n" + "\n".join(f"{0.02 * n:.2f},{0.001 * n}" for n in range(50)))
+    trace = import_csv(table)
+    write_trace(trace, copy)
+    catalogue.folder.mkdir()
+    path = trace_path(catalogue.folder, trace.record)
+    path.write_bytes(copy.read_bytes())
+    assert catalogue.add(path) == trace.record.trace_id
+    traces.change(ROBOT, trace.record.trace_id, TraceChange(tags=("rig b",), notes="loose belt"))
+    yield Shelf(catalogue, traces, trace.record.trace_id, path, copy)
+    store.close()
+
+
+@pytest.mark.parametrize("noticed", [False, True])
+def test_a_trace_whose_file_is_gone_can_be_deleted(shelf: Shelf, noticed: bool) -> None:
+    shelf.path.unlink()
+    if noticed:
+        shelf.catalogue.bring_up_to_date()
+    assert shelf.catalogue.remove(shelf.number) == shelf.path
+    with pytest.raises(ProblemError, match="there is no trace"):
+        shelf.tags()
+
+
+@pytest.mark.parametrize("noticed", [False, True])
+@pytest.mark.parametrize("name", [None, "renamed.mcap"])
+def test_a_trace_whose_file_is_gone_comes_back_with_a_file(shelf: Shelf, noticed: bool, name: str | None) -> None:
+    shelf.path.unlink()
+    if noticed:
+        shelf.catalogue.bring_up_to_date()
+    target = shelf.path if name is None else shelf.catalogue.folder / name
+    assert shelf.catalogue.move_in(shelf.copy, target)
+    found = shelf.traces.get(ROBOT, shelf.number)
+    assert (found.file, found.missing, found.tags, found.notes) == (target.name, False, ("rig b",), "loose belt")
+    assert shelf.catalogue.path_of(shelf.number) == target
+
+
+def test_a_trace_that_is_there_is_not_taken_in_again(shelf: Shelf) -> None:
+    with pytest.raises(ProblemError, match="is there already"):
+        shelf.catalogue.move_in(shelf.copy, shelf.path)
+    other = shelf.catalogue.folder / "other.mcap"
+    assert not shelf.catalogue.move_in(shelf.copy, other)
+    assert not other.exists()
+    assert shelf.catalogue.path_of(shelf.number) == shelf.path
+
+
+def test_a_file_that_cannot_be_taken_away_keeps_its_row_and_tags(shelf: Shelf, monkeypatch: pytest.MonkeyPatch) -> None:
+    def read_only(_path: Path, missing_ok: bool = False) -> NoReturn:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "unlink", read_only)
+        with pytest.raises(OSError, match="Read-only"):
+            shelf.catalogue.remove(shelf.number)
+    assert shelf.path.is_file()
+    assert shelf.tags() == ("rig b",)

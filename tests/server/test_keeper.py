@@ -1,0 +1,102 @@
+"""Giving the port back while a connection is being made."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from daq.contracts.errors import ReachError
+from daq.contracts.machine import load_machine
+from server.robot.keeper import Keeper
+from server.robot.robot import Robot, RobotPlace
+from tests.server.clocks import HandClock
+
+
+class SlowOwner:
+    """A process that takes until `go` to be started, and never greets."""
+
+    made: list[SlowOwner]
+    begun: threading.Event
+    go: threading.Event
+
+    def __init__(self, _opening: object, _report: object, ended: Callable[[str], None]) -> None:
+        self.begun.set()
+        assert self.go.wait(60)
+        self.ended = ended
+        self.closed = False
+        self.made.append(self)
+
+    def close(self, _patience: float) -> bool:
+        """It goes."""
+        self.closed = True
+        self.ended("exit code 0")
+        return True
+
+
+@pytest.fixture
+def owners(monkeypatch: pytest.MonkeyPatch) -> type[SlowOwner]:
+    """What stands for processes of owners."""
+
+    class Owners(SlowOwner):
+        made, begun, go = [], threading.Event(), threading.Event()
+
+    monkeypatch.setattr("server.robot.robot.OwnerProcess", Owners)
+    return Owners
+
+
+@pytest.fixture
+def robot() -> Robot:
+    """Not connected."""
+    return Robot(RobotPlace("ma2000", "mock://", load_machine("ma2000"), Path()), HandClock())
+
+
+def test_a_port_is_not_free_while_a_process_for_it_is_started(
+    owners: type[SlowOwner], robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keeper, disconnect, entered = Keeper(robot), robot.disconnect, threading.Event()
+
+    def entering(patience: float) -> bool:
+        entered.set()
+        return disconnect(patience)
+
+    monkeypatch.setattr(robot, "disconnect", entering)
+    keeper.start(connect=False)
+    connecting = threading.Thread(target=_refused, args=(keeper.connect,))
+    connecting.start()
+    assert owners.begun.wait(60)
+    answers: list[bool] = []
+    disconnecting = threading.Thread(target=lambda: answers.append(keeper.disconnect()))
+    disconnecting.start()
+    assert entered.wait(60)
+    owners.go.set()
+    disconnecting.join()
+    assert answers == [True]
+    assert [one.closed for one in owners.made] == [True]
+    connecting.join()
+    assert robot.connection == "disconnected"
+    keeper.close(60)
+
+
+@pytest.mark.parametrize("ending", ["disconnect", "close"])
+def test_nothing_is_begun_that_is_not_wanted_any_more(
+    owners: type[SlowOwner], robot: Robot, monkeypatch: pytest.MonkeyPatch, ending: str
+) -> None:
+    keeper, connect = Keeper(robot), robot.connect
+
+    def after_an_end(**options: Any) -> object:
+        keeper.disconnect() if ending == "disconnect" else keeper.close(60)
+        return connect(**options)
+
+    monkeypatch.setattr(robot, "connect", after_an_end)
+    owners.go.set()
+    _refused(keeper.connect)
+    assert owners.made == []
+
+
+def _refused(connect: Callable[[], None]) -> None:
+    with pytest.raises(ReachError):
+        connect()
