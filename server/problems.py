@@ -34,7 +34,7 @@ TITLES = {
     422: "The request is not valid",
     429: "Too many requests",
     500: "A fault of this program",
-    503: "The robot cannot be reached",
+    503: "Something that this needs cannot be reached",
     507: "No room",
 }
 

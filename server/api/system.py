@@ -18,6 +18,7 @@ from daq.traces.room import RESERVE
 from server.access.caller import caller_of
 from server.api.parts import ServicesPart, Viewer
 from server.problems import PROBLEMS
+from server.queue.room import free_room
 from server.services import Services
 from server.store.tables import TraceRow
 
@@ -72,7 +73,7 @@ def get_system(found: ServicesPart, _: Viewer) -> SystemStatus:
         uptime=found.clock.monotonic() - found.begun,
         storage=StorageStatus(
             traces_folder=str(folder),
-            traces_free=shutil.disk_usage(folder).free,
+            traces_free=free_room(folder),
             traces_reserve=RESERVE,
             traces=count,
             database=make_url(found.store.url).get_backend_name(),

@@ -69,6 +69,20 @@ def test_a_database_that_can_be_read_and_not_written_is_noticed(
     store.close()
 
 
+def test_a_folder_of_traces_that_is_away_is_told_and_takes_no_experiment(api: httpx.Client, tmp_path: Path) -> None:
+    """Both were a fault of the program, 500: the disk is away, and that is what has to be said."""
+    folder = tmp_path / "traces"
+    folder.rename(tmp_path / "elsewhere")
+    system = api.base_url.join("/api/v1/system")
+    for answer in (api.get(system), api.post("experiments", json={"spec": {}})):
+        assert answer.status_code == 503, answer.text
+        assert answer.json()["type"] == "docs/service.md#traces-away"
+        assert str(folder) in answer.json()["detail"]
+    (tmp_path / "elsewhere").rename(folder)
+    assert api.get(system).status_code == 200
+    assert api.get("queue/experiments").json() == []
+
+
 def test_a_calibration_is_checked_and_queued_as_any_experiment(
     api: httpx.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
