@@ -16,6 +16,7 @@ from model.discrepancy.refitting import (
     STRANGE,
     Judged,
     Refitted,
+    astray,
     begun_again,
     finished,
     polished,
@@ -83,6 +84,8 @@ def ranked(
     fits += fitted_together(observation, current, fits, probes, thresholds, cancel)
     fits.sort(key=lambda r: -r.evidence)
     answers = _different(fits)[: options.polished]
+    if astray(current.point):
+        answers += _most_promised(fits, answers)[: options.polished]
     stop_if(cancel)
     head = _polished(observation, current, answers)
     head = _begun_again(observation, current, head, thresholds)
@@ -130,6 +133,16 @@ def _different(fits: Sequence[Refitted]) -> list[Refitted]:
     found: list[Refitted] = []
     for fit in fits:
         if fit.evidence > 0 and not any(same_answer(fit, better) for better in found):
+            found.append(fit)
+    return found
+
+
+def _most_promised(fits: Sequence[Refitted], besides: Sequence[Refitted]) -> list[Refitted]:
+    """Fits of other answers whose probes promise most, whatever their evidence: compared with a point that has gone
+    astray, it says nothing before they have been begun again."""
+    found: list[Refitted] = []
+    for fit in sorted(fits, key=lambda f: -f.probed.gain):
+        if not any(same_answer(fit, other) for other in (*besides, *found)):
             found.append(fit)
     return found
 

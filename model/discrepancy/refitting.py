@@ -190,6 +190,11 @@ def begun_again(observation: Observation, before: Judged, found: Refitted, goal:
     return with_evidence(observation, before, found.probed, point)
 
 
+def astray(point: Point) -> bool:
+    """Whether a strong effect has driven the tolerance parameters to numbers that nobody expects, and still shows."""
+    return point.misfit >= STRANGE and _strain(point) >= STRAINED
+
+
 def _strain(point: Point) -> float:
     """The largest deviation from what is expected, in those that are."""
     return float(np.max(np.abs(point.values - point.expected) * np.sqrt(point.precision), initial=0.0))

@@ -12,9 +12,9 @@ from model.machine_model.model import base_model
 from tests.model.discrepancy.recording import recorded
 
 
-def diagnosed(folder: Path, modification: str | None) -> Diagnosis:
-    """What is said of the 55 s set and a held-out trace of an arm with that effect."""
+def diagnosed(folder: Path, *modifications: str) -> Diagnosis:
+    """What is said of the 55 s set and a held-out trace of an arm with those effects."""
     machine = load_machine("ma2000")
     specs = [preset("diagnostic").spec, preset("held-out").spec]
-    fitted, held = recorded(specs, machine, seed=7, folder=folder, modification=modification)
+    fitted, held = recorded(specs, machine, seed=7, folder=folder, modifications=modifications)
     return diagnose(base_model(machine), [fitted], [held])

@@ -30,14 +30,12 @@ class Unheard:
 
 
 def recorded(
-    specs: Sequence[ExperimentSpec], machine: Machine, seed: int, folder: Path, modification: str | None
+    specs: Sequence[ExperimentSpec], machine: Machine, seed: int, folder: Path, modifications: Sequence[str] = ()
 ) -> list[Trace]:
     """Traces of experiments, one after the other on one mock in lock-step, read from their files."""
-    options = {"lock_step": "1", "seed": str(seed)}
-    if modification is not None:
-        options["modify"] = modification
+    options = urlencode({"lock_step": "1", "seed": str(seed), "modify": list(modifications)}, doseq=True)
     traces = []
-    with Controller.connect(f"mock://?{urlencode(options)}") as controller:
+    with Controller.connect(f"mock://?{options}") as controller:
         for spec in specs:
             run = Arrangement(
                 controller, ArmControl(controller), spec, machine, machine.limits, folder, Unheard(), Outside()

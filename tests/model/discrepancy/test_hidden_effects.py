@@ -32,3 +32,13 @@ def test_a_hidden_effect_is_named_at_its_joint_and_the_gap_shrinks(name: str, tm
     before, after = ((size / gap.floor) ** 2 - 1 for size in (gap.before, gap.after))
     assert after < max(0.35, 0.3 * before)
     assert name in {u.name for u in answer.model_after.effects}
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_two_effects_so_strong_that_the_tolerance_parameters_go_astray_are_both_named(tmp_path: Path) -> None:
+    """Either alone is found from where the first fit ends; of both, no fit was any good there, and none was begun
+    again."""
+    answer = diagnosed(tmp_path, "spring_torque:joint=2,stiffness=8", "dead_zone:joint=1,width=0.8")
+    assert answer.verdict == "named", answer.summary
+    assert [s.effect for s in answer.steps if s.adopted] == ["spring_torque", "dead_zone"]

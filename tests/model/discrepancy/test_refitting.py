@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from model.discrepancy.candidates import candidates
 from model.discrepancy.observation import Observation, observed
 from model.discrepancy.probing import probed
-from model.discrepancy.refitting import begun_again, judge, refitted, with_evidence
+from model.discrepancy.refitting import astray, begun_again, judge, refitted, with_evidence
 from model.discrepancy.search import point_at, settled
 from tests.model.fitting import imagined
 
@@ -43,6 +44,20 @@ def test_a_rival_without_hope_is_left_where_it_is(monkeypatch: pytest.MonkeyPatc
     with_time, counted[:] = len(counted), []
     refitted(observation, before, found, goal=1.0)
     assert 0 < len(counted) < 0.7 * with_time
+
+
+def test_a_point_is_astray_where_it_explains_nothing_with_numbers_that_nobody_expects() -> None:
+    observation, model, unknowns = observed(imagined.arm(), [imagined.trace(imagined.arm(), seconds=2.0)])
+    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
+    sound = replace(given, weighted=given.weighted / np.sqrt(given.misfit))
+    far = sound.values.copy()
+    k = [u.name for u in unknowns].index("joint2.motor.rotor_inertia")
+    far[k] += 10 * (unknowns[k].deviation or 0.0)
+    unexplained = 3.0 * sound.weighted
+    assert not astray(sound)
+    assert not astray(replace(sound, weighted=unexplained))
+    assert not astray(replace(sound, values=far))
+    assert astray(replace(sound, weighted=unexplained, values=far))
 
 
 def test_a_fit_with_numbers_that_nobody_expects_is_begun_again() -> None:
