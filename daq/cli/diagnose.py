@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq.cli.context import Invocation, JsonOption, YesOption, console, invocation, print_json
+from daq.cli.held_load import check_held
 from daq.cli.model_input import (
     MODEL_HELP,
     EffectFileOption,
@@ -16,6 +17,7 @@ from daq.cli.model_input import (
     ReportOption,
     TraceFolderOption,
     TracesArgument,
+    check_made_for,
     load_effects,
     machine_of,
     read_model,
@@ -29,6 +31,7 @@ from daq.contracts.carried_load import carrying
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from daq.contracts.errors import DaqError
     from daq.contracts.trace import Trace
     from model.discrepancy.answer import Diagnosis
     from model.discrepancy.next_experiment import Asker
@@ -75,7 +78,11 @@ def diagnose(
     options = _options(effects, joints, most)
     fitted_to = read_traces(call, folder, traces)
     held = read_traces(call, folder, holdout) if holdout else []
-    begin = _beginning(call, fitted_to, model, load)
+    begin = _beginning(call, fitted_to, traces, model, load)
+    check_made_for(begin.machine, [*fitted_to, *held], [*traces, *(holdout or [])])
+    if load is not None:
+        check_held(begin, fitted_to)
+    failure: DaqError | None = None
 
     def once(traces: Sequence[Trace], ask: Asker) -> Diagnosis:
         with shown_progress("diagnosing") as tell:
@@ -90,12 +97,15 @@ def diagnose(
         _tell(found, out, None, as_json=json)
         return
     if acquire:
-        found, fitted_to = acquired(call, begin.machine, fitted_to, folder, budget, yes, once)
+        ended = acquired(call, begin.machine, fitted_to, folder, budget, yes, once)
+        found, fitted_to, failure = ended.found, ended.traces, ended.failure
     else:
         found = once(fitted_to, asker(begin.machine))
     _save(found, out)
     page = None if report is None else _written(found, fitted_to, held, report)
     _tell(found, out, page, as_json=json)
+    if failure is not None:
+        raise failure
     if found.acquired and (outcome := found.acquired[-1].outcome) != "complete":
         raise typer.Exit(EXIT_CODES[outcome])
 
@@ -124,21 +134,23 @@ def _tell(found: Diagnosis, out: Path | None, page: Path | None, *, as_json: boo
 
 
 def _options(effects: str | None, joints: str | None, most: int) -> DiagnosisOptions:
-    from daq.cli.effect_choice import effect_name
+    from daq.cli.effect_choice import effect_names
     from daq.contracts.experiment import parse_joints
     from model.discrepancy.options import DiagnosisOptions
 
-    names = None if effects is None else tuple(effect_name(part) for part in effects.split(","))
     return DiagnosisOptions(
-        effects=names, joints=None if joints is None else tuple(parse_joints(joints)), most_steps=most
-    )
+        effects=None if effects is None else effect_names(effects),
+        joints=None if joints is None else tuple(parse_joints(joints)), most_steps=most,
+    )  # fmt: skip
 
 
-def _beginning(call: Invocation, traces: Sequence[Trace], model: str | None, load: float | None) -> Model:
-    """The model that is doubted, with the load that was carried."""
+def _beginning(
+    call: Invocation, traces: Sequence[Trace], names: Sequence[str], model: str | None, load: float | None
+) -> Model:
+    """The model that is doubted, with the load that was carried. names: what the command line calls the traces."""
     from model.machine_model.model import base_model
 
-    begin = base_model(machine_of(traces, call)) if model is None else read_model(model)
+    begin = base_model(machine_of(traces, call, names)) if model is None else read_model(model)
     return begin if load is None else with_load(begin, load)
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.cli.context import Invocation, console
 from daq.cli.diagnose_asking import as_run, next_to_run, time_left
 from daq.cli.run_result import acquire
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import DaqError, SpecError
 from server.jobs.asking import asker
 
 if TYPE_CHECKING:
@@ -21,32 +22,66 @@ if TYPE_CHECKING:
 Diagnose = Callable[["Sequence[Trace]", "Asker"], "Diagnosis"]
 
 
+@dataclass(frozen=True)
+class Ended:
+    """How a diagnosis that ran what it asked for has ended.
+
+    found: the latest answer. traces: what it rests on. failure: why a run that was asked for could not be begun, or
+    used; None where none failed. Nothing that was found before is lost to it.
+    """
+
+    found: Diagnosis
+    traces: list[Trace]
+    failure: DaqError | None = None
+
+
 def acquired(
     call: Invocation, machine: Machine, traces: Sequence[Trace], folder: Path | None, budget: float, consent: bool,
     diagnose: Diagnose,
-) -> tuple[Diagnosis, list[Trace]]:  # fmt: skip
-    """The answer after all that was asked for has been run, and the traces it rests on.
+) -> Ended:  # fmt: skip
+    """The answer after all that was asked for has been run, as far as that could be.
 
     `next_to_run` says when it ends; `budget`: s of robot time; `machine`: that of the model in doubt. Planned for, and
-    moved, is the configured one, within the limits that hold for it now. Raises what `daq run` raises,
-    AcquisitionFailedError among them.
+    moved, is the configured one, within the limits that hold for it now. Raises SpecError for another machine, and what
+    connecting raises, before anything is computed; what fails after the first answer is told beside it.
     """
     arm = call.machine
     _check_same_machine(arm, machine)
+    _check_reached(call)
     runs: list[Acquired] = []
     every = list(traces)
+    failure: DaqError | None = None
     found = diagnose(every, asker(arm, budget))
-    while (asked := next_to_run(found, runs, budget)) is not None:
+    while failure is None and (asked := next_to_run(found, runs, budget)) is not None:
         left = time_left(runs, budget)
         console().print(f"ask     {asked.name}, {asked.duration:.0f} s of {left:.0f} s: {asked.reason}")
-        run, trace = _run(call, arm, asked, folder or call.trace_folder, consent)
-        runs.append(run)
-        if run.outcome == "complete":
-            every.append(trace)
-            found = diagnose(every, asker(arm, time_left(runs, budget)))
-        else:
-            console().print(f"{run.outcome}: no more is asked for; its trace is {run.file}", style="red")
-    return found.model_copy(update={"acquired": tuple(runs)}), every
+        try:
+            run, trace = _run(call, arm, asked, folder or call.trace_folder, consent)
+            runs.append(run)
+            if run.outcome == "complete":
+                found = diagnose([*every, trace], asker(arm, time_left(runs, budget)))
+                every.append(trace)
+            else:
+                console().print(f"{run.outcome}: no more is asked for; its trace is {run.file}", style="red")
+        except DaqError as error:
+            failure = error
+    return Ended(found.model_copy(update={"acquired": tuple(runs)}), every, failure)
+
+
+def _check_reached(call: Invocation) -> None:
+    """That there is a robot to run on, before minutes are spent on what it is to do: greeted, and let go again, as
+    `daq status` does; of a mock, that it starts with its options. Raises what connecting raises."""
+    if call.server is not None:
+        from daq.cli.remote.robot import connected_status, remote_robot
+
+        with remote_robot(call) as robot:
+            connected_status(robot)
+        return
+    from daq.config.robot_files import load_memory_map
+    from daq.driver import Controller
+
+    with Controller.connect(call.port, load_memory_map(call.settings.robot.memory_map)):
+        pass
 
 
 def _run(call: Invocation, arm: Machine, asked: NextExperiment, folder: Path, consent: bool) -> tuple[Acquired, Trace]:

@@ -60,6 +60,20 @@ def effect_name(text: str) -> str:
     raise SpecError(f"effect {text!r}: not in the library; it has {', '.join(library())}")
 
 
+def effect_names(text: str) -> tuple[str, ...]:
+    """The effects of `backlash,coulomb`, where joints are an option of their own. Raises SpecError with one line."""
+    found = []
+    for part in text.split(","):
+        name, colon, joints = part.strip().partition(":")
+        if colon:
+            raise SpecError(
+                f"effect {part.strip()!r}: joints go with --joints here, for all effects alike: "
+                f"--effects {name} --joints {joints or '2'}"
+            )
+        found.append(effect_name(part))
+    return tuple(found)
+
+
 def patterns(text: str | None) -> tuple[str, ...] | None:
     """Names or patterns of parameters, separated by commas; None where nothing is said."""
     if text is None:

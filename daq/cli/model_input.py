@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from daq.cli.context import Invocation
+from daq.cli.context import Invocation, console
 from daq.cli.output_file import check_folder
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, load_machine, shipped_machines
@@ -110,22 +110,67 @@ def read_traces(call: Invocation, folder: Path | None, names: Sequence[str]) -> 
     return found
 
 
-def machine_of(traces: Sequence[Trace], call: Invocation) -> Machine:
-    """The machine that the traces were made on; the configured one where they do not say.
+def machine_of(traces: Sequence[Trace], call: Invocation, names: Sequence[str] = ()) -> Machine:
+    """The machine that the traces were made on; the configured one where they do not say, which is then said aloud.
 
-    Limits may differ: the last trace's are taken. Raises SpecError when the machines differ otherwise.
+    Limits may differ: the last trace's are taken.
+
+    Args:
+        names: what the command line calls the traces, in order; without them, their own numbers.
+
+    Raises SpecError when the machines differ otherwise, and for a trace that names none and lacks a joint of it.
     """
     machines = [t.record.machine for t in traces if t.record.machine is not None]
-    names = list(dict.fromkeys(machine.name for machine in machines))
-    if len(names) > 1:
-        raise SpecError(f"the traces were made on different machines: {', '.join(names)}; one at a time")
+    called = list(dict.fromkeys(machine.name for machine in machines))
+    if len(called) > 1:
+        raise SpecError(f"the traces were made on different machines: {', '.join(called)}; one at a time")
     for machine in machines[1:]:
         if place := _difference(_described(machines[0]), _described(machine)):
             raise SpecError(
                 f"the traces were made on different machines that are both called {machine.name}: {place} differs; "
                 "one at a time, or name the machine or model to use"
             )
-    return machines[-1] if machines else call.machine
+    taken = machines[-1] if machines else call.machine
+    unnamed = [
+        (name, t) for name, t in zip(_names(traces, names), traces, strict=True) if t.record.machine is None
+    ]  # fmt: skip
+    for name, trace in unnamed:
+        if lacking := [joint for joint in taken.modelled_joints if joint not in trace.joints]:
+            raise SpecError(
+                f"{name}: names no machine, and has no joint {_listed(lacking)} of {taken.name}, "
+                f"{'that of the other traces' if machines else 'the configured one'}; name its machine or model with "
+                "--model"
+            )
+    if unnamed and not machines:
+        files = ", ".join(name for name, _ in unnamed)
+        console().print(f"{files}: no machine is named there: taken for the configured {taken.name} (else say --model)")
+    return taken
+
+
+def check_made_for(machine: Machine, traces: Sequence[Trace], names: Sequence[str]) -> None:
+    """Raises SpecError, with the file as the command line calls it, for a trace that cannot be of this machine."""
+    speeds = [j for j in machine.modelled_joints if (s := machine.joint(j).sensor) and s.measures == "velocity"]
+    for name, trace in zip(_names(traces, names), traces, strict=True):
+        own = trace.record.machine
+        if own is not None and own.name != machine.name:
+            raise SpecError(f"{name}: was made on {own.name}, the model describes {machine.name}")
+        if lacking := [joint for joint in machine.modelled_joints if joint not in trace.joints]:
+            raise SpecError(
+                f"{name}: has no joint {_listed(lacking)}, which the model of {machine.name} moves; it has "
+                f"{', '.join(map(str, trace.joints))}"
+            )
+        if speeds and trace.velocity is None:
+            raise SpecError(
+                f"{name}: has no velocity, which the sensors of {machine.name} measure; is it of another machine?"
+            )
+
+
+def _names(traces: Sequence[Trace], names: Sequence[str]) -> list[str]:
+    return list(names) if names else [f"trace {t.record.trace_id}" for t in traces]
+
+
+def _listed(joints: Sequence[int]) -> str:
+    return " or ".join(map(str, joints))
 
 
 def _described(machine: Machine) -> dict[str, Any]:

@@ -117,7 +117,9 @@ def find_trace(folder: Path, wanted: str) -> Path:
         if wanted and (summary.path.name.startswith(wanted) or (summary.trace_id or "").startswith(wanted))
     ]
     if not found:
-        raise TraceError(f"trace {wanted!r}: is not a file, and no trace in {folder} has a number or name like it")
+        raise TraceError(
+            f"trace {wanted!r}: is not a file, and the folder {folder} has none with such a number or name"
+        )
     if len(found) > 1:
         names = ", ".join(path.name for path in found[:4])
         raise TraceError(f"trace {wanted!r}: {len(found)} traces in {folder} begin so: {names}; give more of it")

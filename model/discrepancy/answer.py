@@ -92,7 +92,7 @@ class MovingParameter(_Part):
 
 
 class Where(_Part):
-    """Where simulation and measurement disagree, before the step: a one-line summary, and the numbers behind it."""
+    """Where simulation and measurement disagree, of a step before it: a one-line summary, and the numbers behind it."""
 
     joint: int | None
     phase: Phase | None
@@ -182,6 +182,10 @@ class Diagnosis(_Part):
     """From the model as it was given to the model that comes out, on the traces it was fitted to."""
     rmse_holdout: tuple[SignalError, ...] = ()
     """The same on the held-out traces."""
+    where: Where | None = None
+    """What is left in the end: the map and dependences of the model that comes out; None in older answers."""
+    candidates: tuple[Candidate, ...] = ()
+    """The ranking of the last turn, where nothing was added in it: what was tried against what is left."""
     remaining: tuple[RemainingShape, ...] = ()
     next_experiment: NextExperiment | None = None
     acquired: tuple[Acquired, ...] = ()

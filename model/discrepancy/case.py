@@ -98,9 +98,10 @@ class Case:
             )
         return None
 
-    def where(self, point: Point) -> Where:
-        """Where the point disagrees with the fitted traces."""
-        driven = tuple(t for t in self.traces if t.drive is not None)
+    def where(self, point: Point, *, moving: bool = True) -> Where:
+        """Where the point disagrees with the fitted traces. moving: also which parameters would have to move, which
+        takes most of the time."""
+        driven = tuple(t for t in self.traces if moving and t.drive is not None)
         return located(with_point(point), self.told.records, self._told(point), self.told.deviations, traces=driven)
 
     def remaining(self, point: Point) -> tuple[RemainingShape, ...]:

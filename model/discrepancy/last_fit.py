@@ -1,4 +1,8 @@
-"""Steps as the last fit has them: what was still missing at their turn has bent their parameters."""
+"""Steps as the last fit has them: what was still missing at their turn has bent their parameters.
+
+A reason tells the size of the last fit too, so that an answer has one number and one interval for it. Its pattern, and
+the errors that it tells, stay those of the turn.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ from model.discrepancy.answer import FoundValue, Step
 from model.discrepancy.case import with_point
 from model.discrepancy.estimates import found_values, moved_by_noise
 from model.discrepancy.observation import Observation
+from model.discrepancy.reasons import with_size
 from model.discrepancy.refitting import Judged, judge
 from model.discrepancy.search import Point, point_at, settled
 from model.discrepancy.turn import LAST_STEPS
@@ -37,7 +42,9 @@ def as_last_fitted(
             return step
         if step in empty:
             return step.model_copy(update={"adopted": False, "rejected_because": SUPERFLUOUS})
-        return step.model_copy(update={"parameters": {n: values[n] for n in step.parameters}})
+        last = {n: values[n] for n in step.parameters}
+        reason = with_size(step.reason, step.effect or "", step.joints, step.parameters, last)
+        return step.model_copy(update={"parameters": last, "reason": reason})
 
     return current, tuple(told(s) for s in steps)
 

@@ -8,13 +8,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from model.discrepancy.answer import Candidate, FoundValue, RemainingShape, Step, Where
-from model.discrepancy.reasons_observations import Observation, Spoken
+from model.discrepancy.answer import Candidate, FoundValue, RemainingShape, SignalError, Step, Where
+from model.discrepancy.excess import LEAST_EXCESS
+from model.discrepancy.reasons_numbers import Spoken, from_to, plain
+from model.discrepancy.reasons_observations import Observation
 from model.discrepancy.reasons_samples import Left, Motions, Samples, motions
 from model.discrepancy.reasons_table import telling
+from model.discrepancy.remaining import CLEAR_SHAPE, FEWEST_BINS, clear_shape, filled_bins
 from model.discrepancy.where import spoken_unit
 from model.discrepancy.where_dependence import drive_units
-from model.fitting.records import Record, Signal
+from model.fitting.records import Record, Signal, resolution
 from model.machine_model.model import Model
 
 NOTICEABLE = 0.98
@@ -23,12 +26,16 @@ ALL = 0.95
 """Share of the evidence from which a rival that far behind has next to none."""
 CLEAR = 0.1
 """Share of a disagreement from which an observation is taken before those that come after it in an effect's list."""
+GROWN = 1.1
+"""Times a joint's mean square error on held-out traces from which a fit has made it worse, beyond what noise may do."""
+LEAST_COUNTS = 0.1
+"""Counts of a joint's sensor below which a deviation is not told as a number."""
 
 
 def reason(
     effect: str, joints: Sequence[int], parameters: Mapping[str, FoundValue], evidence: float, margin: float,
     *, model: Model, before: Model, records: Sequence[Record], signal: Signal = "position",
-    runner_up: Candidate | None = None, left: Left | None = None,
+    runner_up: Candidate | None = None, left: Left | None = None, where: Where | None = None,
 ) -> str:  # fmt: skip
     """What speaks for an effect: the pattern that a record shows without it, its size, and what it takes off.
 
@@ -42,6 +49,7 @@ def reason(
         runner_up: the next best that would be another answer.
         left: measured − simulated of a model, where the caller simulates better than without noise: an arm without
             noise sticks where the real one creeps, so that stiction or a dead zone would hardly show.
+        where: the place that the same step names, if any: where it is not the effect's, the reason says so.
 
     Raises SpecError when a simulation does not stay finite.
     """
@@ -55,7 +63,18 @@ def reason(
     alike = f" (and likewise joint{'s' if len(others) > 1 else ''} {_listed(others)})" if others else ""
     called = telling(effect).called + _size(effect, parameters, joint)
     rival = "" if runner_up is None else f"; {_beaten(runner_up, evidence, margin)}"
-    return f"joint {joint} {seen.text}{alike}: {called}{_taken_off(model, samples, joint)}{rival}"
+    return (
+        f"joint {joint} {seen.text}{alike}: {called}{_taken_off(model, samples, joint)}{rival}{_spread(where, joints)}"
+    )
+
+
+def with_size(
+    text: str, effect: str, joints: Sequence[int], before: Mapping[str, FoundValue], after: Mapping[str, FoundValue]
+) -> str:
+    """A reason that was given with the parameters `before`, with the size that `after` says."""
+    joint = next((j for j in joints if text.startswith(f"joint {j} ")), 0)  # 0: an effect of the whole machine
+    called = telling(effect).called
+    return text.replace(called + _size(effect, before, joint), called + _size(effect, after, joint), 1)
 
 
 def observed(
@@ -105,23 +124,54 @@ def undecided(group: Sequence[Candidate], where: Where) -> str:
 
 
 def unexplained(
-    where: Where, remaining: Sequence[RemainingShape], joints: Sequence[int] = (), best: Candidate | None = None
-) -> str:
-    """Why none of the known effects is named, and what a torque that would explain it goes with. joints: those that are
-    left unexplained."""
+    where: Where, remaining: Sequence[RemainingShape], joints: Sequence[int] = (), best: Candidate | None = None,
+    held: Sequence[SignalError] = (),
+) -> str:  # fmt: skip
+    """Why none of the known effects is named, and what a torque that would explain it goes with.
+
+    Args:
+        joints: those that are left unexplained.
+        held: errors on held-out traces, from the model as it was given to the one that comes out.
+    """
     place = where.summary if where.joint is not None or not joints else _left_on(joints, where)
     tried = "no known effect takes it off"
     if best is not None and best.misfit is not None:
         name = _named(best.effect, best.joints)
         tried = f"the best known one, {name}, leaves {best.misfit:.2f} times what noise would"
-    if not remaining:
-        return f"{place}; {tried}, and what is left goes with none of time, position, speed, direction or drive"
-    first = remaining[0]
-    torques = [t for t in first.torque if t is not None]
+    return f"{place}; {tried}; {_shape(remaining)}{_refuted(held)}"
+
+
+def _refuted(held: Sequence[SignalError]) -> str:
+    """A warning where held-out traces speak against the fit of the tolerance parameters."""
+    grown = [
+        e.joint for e in held if (e.after / e.floor) ** 2 > GROWN * (e.before / e.floor) ** 2 + LEAST_EXCESS
+    ]  # fmt: skip
+    if not grown:
+        return ""
     return (
-        f"{place}; {tried}; a torque at joint {first.joint} of {min(torques):.2g} to {max(torques):.2g} "
-        f"{first.torque_unit} that goes with {first.against} explains {100 * first.explained:.0f} % of what is left"
+        "; the fit of the tolerance parameters does not hold on held-out traces, where the error of "
+        f"joint{'s' if len(grown) > 1 else ''} {_listed(grown)} grows: the model after is not to be used"
     )
+
+
+def _shape(remaining: Sequence[RemainingShape]) -> str:
+    """What the torque that is left goes with, and whether that is clear enough to invent an effect."""
+    if not remaining:
+        return "what is left has no shape against time, position, speed, direction or drive"
+    clear = clear_shape(remaining)
+    told = remaining[0] if clear is None else clear
+    torques = [t for t in told.torque if t is not None]
+    torque = (
+        f"a torque at joint {told.joint} of {plain(min(torques))} to {plain(max(torques))} {told.torque_unit} that "
+        f"goes with {told.against}"
+    )
+    share = f"{100 * told.explained:.0f} % of what is left"
+    if clear is not None:
+        return f"{torque} explains {share}"
+    if told.explained < CLEAR_SHAPE:
+        return f"no clear shape: the best, {torque}, explains only {share}"
+    few = f"rests on {filled_bins(told)} of the {FEWEST_BINS} bins that a shape needs"
+    return f"no clear shape: the best, {torque}, explains {share}, but {few}"
 
 
 def _left_on(joints: Sequence[int], where: Where) -> str:
@@ -151,25 +201,40 @@ def _taken_off(model: Model, samples: Samples, joint: int) -> str:
     factor, unit = spoken_unit(model, joint)
     first, last = (factor * float(np.sqrt(np.mean(r**2))) for r in (samples.without, samples.left))
     if last > NOTICEABLE * first:
-        return f", whose mark is faint: the rms error stays near {last:.2g} {unit}"
-    return f", which takes its rms error from {first:.2g} to {last:.2g} {unit}"
+        return f", whose mark is faint: the rms error stays near {plain(last)} {unit}"
+    told = from_to(first, last)
+    return f", which takes its rms error from {told[0]} to {told[1]} {unit}"
 
 
 def _beaten(rival: Candidate, evidence: float, margin: float) -> str:
     """How far the next best is behind."""
     if margin >= ALL * evidence:
-        return "no other candidate explains a twentieth of it"
-    return f"{_named(rival.effect, rival.joints)} would explain {margin:.0f} less of {evidence:.0f}"
+        return f"no other candidate that was fitted has a twentieth of its evidence, {evidence:.0f}"
+    name = _named(rival.effect, rival.joints)
+    if rival.evidence > evidence:  # it was ranked first, but came to less when its fit was taken to its end
+        return (
+            f"taken to its end, its fit has {evidence:.0f} of evidence, less than the {rival.evidence:.0f} of {name}: "
+            "these traces do not tell which of the two it is"
+        )
+    return f"the next best, {name}, has {rival.evidence:.0f} of evidence where this has {evidence:.0f}"
+
+
+def _spread(where: Where | None, joints: Sequence[int]) -> str:
+    """What is said where the place that a step names is none, or another joint's."""
+    if where is None or (where.joint is not None and (not joints or where.joint in joints)):
+        return ""
+    return "; what shows it is the pattern over the whole record, not one place"
 
 
 def _spoken(model: Model, index: int) -> Spoken:
     joint = model.machine.modelled_joints[index]
     own = model.machine.joint(joint)
-    turns = own.kind == "revolute"
-    speed = "/s" if own.sensor is not None and own.sensor.measures == "velocity" else ""
+    turns, velocity = own.kind == "revolute", own.sensor is not None and own.sensor.measures == "velocity"
+    place = "°" if turns else "mm"
     return Spoken(
-        math.degrees(1.0) if turns else 1e3, f"°{speed}" if turns else f"mm{speed}", drive_units(model)[index],
-        "N·m" if turns else "N",
+        factor=math.degrees(1.0) if turns else 1e3, unit=f"{place}/s" if velocity else place, place_unit=place,
+        drive_unit=drive_units(model)[index], torque_unit="N·m" if turns else "N",
+        least=0.0 if own.sensor is None or velocity else LEAST_COUNTS * resolution(own.sensor), turns=turns,
     )  # fmt: skip
 
 
@@ -197,8 +262,8 @@ def _size(effect: str, parameters: Mapping[str, FoundValue], joint: int) -> str:
     )
     interval = ""
     if value.low is not None and value.high is not None:
-        interval = f" ({value.low * factor:.3g} to {value.high * factor:.3g})"
-    return f", {value.value * factor:.3g}{unit}{interval}"
+        interval = f" ({plain(value.low * factor, 3)} to {plain(value.high * factor, 3)})"
+    return f", {plain(value.value * factor, 3)}{unit}{interval}"
 
 
 def _named(effect: str, joints: Sequence[int]) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.discrepancy.phases import CREEPING_SPEED, TURNING
+from model.discrepancy.reasons_numbers import Spoken, plain
 from model.discrepancy.reasons_samples import Samples
 
 Floats = NDArray[np.float64]
@@ -27,28 +28,6 @@ FULL = 0.6
 """Share of the largest drive from which it counts as high."""
 LOW = 0.15
 """Share of the largest drive below which it counts as low."""
-
-
-@dataclass(frozen=True)
-class Spoken:
-    """How a joint's numbers are said: factor and unit of its residual (°, mm), and of its position."""
-
-    factor: float
-    unit: str
-    drive_unit: str
-    torque_unit: str
-
-    def size(self, value: float) -> str:
-        """How large a residual is, with its unit."""
-        return f"{abs(value) * self.factor:.2g}{self._gap}{self.unit}"
-
-    def place(self, value: float) -> str:
-        """A position with its unit."""
-        return f"{value * self.factor:.3g}{self._gap}{self.unit}"
-
-    @property
-    def _gap(self) -> str:
-        return "" if self.unit.startswith("°") else " "
 
 
 @dataclass(frozen=True)
@@ -70,9 +49,11 @@ def lags_alike(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | No
     if min(slow.sum(), fast.sum()) < s.rate / 5:
         if s.moving.sum() < s.rate / 5:
             return None
-        return Observation(f"{_behind(_mean(lag, s.moving), say)} whenever it moves", _share(s, s.direction * s.moving))
-    text = f"{_behind(_mean(lag, slow), say)} in slow motion and {_by(_mean(lag, fast), say)} in fast"
-    return Observation(f"{text}, always against the motion", _share(s, s.direction * s.moving))
+        mean = _mean(lag, s.moving)
+        return Observation(f"{say.behind(mean, mean)[0]} whenever it moves", _share(s, s.direction * s.moving))
+    one, two = say.behind(_mean(lag, slow), _mean(lag, fast))
+    text = f"{one} in slow motion and {two} in fast{_always(_mean(lag, slow), _mean(lag, fast), say)}"
+    return Observation(text, _share(s, s.direction * s.moving))
 
 
 def lags_with_speed(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | None:
@@ -84,8 +65,8 @@ def lags_with_speed(s: Samples, say: Spoken, _: dict[str, float]) -> Observation
     slow = 0.5 * CREEPING_SPEED
     word = "lag" if seconds > 0 else "lead"
     text = (
-        f"shows a {word} that grows with speed, {say.size(seconds * slow)} at {say.size(slow)}/s and "
-        f"{say.size(seconds * fastest)} at {say.size(fastest)}/s"
+        f"shows a {word} that grows with speed, {say.size(seconds * slow)} at {say.speed(slow)} and "
+        f"{say.size(seconds * fastest)} at {say.speed(fastest)}"
     )
     return Observation(text, _share(s, s.speed))
 
@@ -97,8 +78,8 @@ def lags_when_slow(s: Samples, say: Spoken, _: dict[str, float]) -> Observation 
     if min(slow.sum(), fast.sum()) < s.rate / 5:
         return None
     lag = _lag(s)
-    text = f"{_behind(_mean(lag, slow), say)} in slow motion but {_by(_mean(lag, fast), say)} when it moves fast"
-    return Observation(text, _share(s, s.direction * slow))
+    one, two = say.behind(_mean(lag, slow), _mean(lag, fast))
+    return Observation(f"{one} in slow motion but {two} when it moves fast", _share(s, s.direction * slow))
 
 
 def lags_after_turns(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | None:
@@ -111,11 +92,10 @@ def lags_after_turns(s: Samples, say: Spoken, _: dict[str, float]) -> Observatio
     lag, begin = _lag(s), _worst_after_turn(s)
     then = after & (s.since_turn >= begin) & (s.since_turn < begin + SLICE)
     count = f"each of {turns} reversals" if turns > 1 else "its reversal"
-    text = (
-        f"{_behind(_mean(lag, then), say)} {begin + SLICE / 2:.2g} s after {count} and "
-        f"{_by(_mean(lag, before), say)} before"
+    one, two = say.behind(_mean(lag, then), _mean(lag, before))
+    return Observation(
+        f"{one} {plain(begin + SLICE / 2)} s after {count} and {two} before", _share(s, s.direction * then)
     )
-    return Observation(text, _share(s, s.direction * then))
 
 
 def lags_one_way(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | None:
@@ -124,8 +104,8 @@ def lags_one_way(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | 
     if min(forward.sum(), backward.sum()) < s.rate / 5:
         return None
     lag = _lag(s)
-    text = f"{_behind(_mean(lag, forward), say)} moving forwards and {_by(_mean(lag, backward), say)} backwards"
-    return Observation(text, _share(s, np.where(s.moving, 1.0, 0.0)))
+    one, two = say.behind(_mean(lag, forward), _mean(lag, backward))
+    return Observation(f"{one} moving forwards and {two} backwards", _share(s, np.where(s.moving, 1.0, 0.0)))
 
 
 def sticks(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | None:
@@ -135,8 +115,8 @@ def sticks(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | None:
     if min(starting.sum(), running.sum()) < s.rate / 10:
         return None
     lag = _lag(s)
-    text = f"{_behind(_mean(lag, starting), say)} in the first 0.3 s of each motion and {_by(_mean(lag, running), say)}"
-    return Observation(f"{text} later", _share(s, s.direction * starting))
+    one, two = say.behind(_mean(lag, starting), _mean(lag, running))
+    return Observation(f"{one} in the first 0.3 s of each motion and {two} later", _share(s, s.direction * starting))
 
 
 def stops_short(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | None:
@@ -148,8 +128,8 @@ def stops_short(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | N
     if min(low.sum(), (~low).sum()) < s.rate / 5:
         return None
     text = (
-        f"is off by {say.size(_rms(s.without[low]))} rms while its drive is below {LOW * largest:.2g} {say.drive_unit} "
-        f"and by {say.size(_rms(s.without[~low]))} above it"
+        f"is off by {say.size(_rms(s.without[low]))} rms while its drive is below {plain(LOW * largest)} "
+        f"{say.drive_unit} and by {say.size(_rms(s.without[~low]))} above it"
     )
     return Observation(text, _share(s, s.direction * low))
 
@@ -162,8 +142,8 @@ def fails_at_high_drive(s: Samples, say: Spoken, known: dict[str, float]) -> Obs
     if not high.any() or high.all():
         return None
     text = (
-        f"is off by {say.size(_rms(s.without[high]))} rms where more than {limit:.2g} {say.drive_unit} are asked for, "
-        f"and by {say.size(_rms(s.without[~high]))} elsewhere"
+        f"is off by {say.size(_rms(s.without[high]))} rms where more than {plain(limit)} {say.drive_unit} are "
+        f"asked for, and by {say.size(_rms(s.without[~high]))} elsewhere"
     )
     return Observation(text, _energy(s, high))
 
@@ -188,8 +168,8 @@ def goes_with_weight(s: Samples, say: Spoken, _: dict[str, float]) -> Observatio
         return None
     few, many = s.gravity <= low, s.gravity >= high
     text = (
-        f"is off by {_signed(_mean(s.without, few), say)} where gravity takes {low:.2g} {say.torque_unit} and by "
-        f"{_signed(_mean(s.without, many), say)} where it takes {high:.2g} {say.torque_unit}"
+        f"is off by {say.signed(_mean(s.without, few))} where gravity takes {plain(low)} {say.torque_unit} and by "
+        f"{say.signed(_mean(s.without, many))} where it takes {plain(high)} {say.torque_unit}"
     )
     return Observation(text, _share(s, s.gravity))
 
@@ -200,8 +180,8 @@ def goes_with_position(s: Samples, say: Spoken, _: dict[str, float]) -> Observat
     if high - low < 1e-6:
         return None
     text = (
-        f"is off by {_signed(_mean(s.without, s.asked <= low), say)} below {say.place(low)} and by "
-        f"{_signed(_mean(s.without, s.asked >= high), say)} above {say.place(high)}, in all it does"
+        f"is off by {say.signed(_mean(s.without, s.asked <= low))} below {say.place(low)} and by "
+        f"{say.signed(_mean(s.without, s.asked >= high))} above {say.place(high)}, in all it does"
     )
     return Observation(text, _share(s, s.asked - s.asked.mean()))
 
@@ -225,7 +205,7 @@ def swings_with_position(s: Samples, say: Spoken, known: dict[str, float]) -> Ob
         return None
     sine, cosine = np.sin(cycles * s.asked), np.cos(cycles * s.asked)
     curve = _fitted(s.without, np.stack([sine, cosine], axis=1))
-    text = f"swings by {say.size(float(curve.max()))} with its angle, {cycles:.3g} times a turn, whichever way it moves"
+    text = f"swings by {say.size(float(curve.max()))} with its position, {say.cycles(cycles)}, whichever way it moves"
     return Observation(text, _share(s, sine, cosine))
 
 
@@ -238,7 +218,7 @@ def swings_with_time(s: Samples, say: Spoken, known: dict[str, float]) -> Observ
     curve = _fitted(s.without, np.stack([sine, cosine], axis=1))
     at_rest = ~s.moving
     rest = ", at rest too" if at_rest.sum() > s.rate and _rms(curve[at_rest]) > 0.5 * _rms(curve) else ""
-    text = f"swings by {say.size(float(curve.max()))} at {frequency:.3g} Hz, whatever it is asked to do{rest}"
+    text = f"swings by {say.size(float(curve.max()))} at {plain(frequency, 3)} Hz, whatever it is asked to do{rest}"
     return Observation(text, _share(s, sine, cosine))
 
 
@@ -249,10 +229,8 @@ def grows_with_time(s: Samples, say: Spoken, _: dict[str, float]) -> Observation
     if min(first.sum(), last.sum()) < s.rate / 5:
         return None
     lag = _lag(s)
-    text = (
-        f"{_behind(_mean(lag, first), say)} in motion during the first third of the record and "
-        f"{_by(_mean(lag, last), say)} during the last"
-    )
+    one, two = say.behind(_mean(lag, first), _mean(lag, last))
+    text = f"{one} in motion during the first third of the record and {two} during the last"
     return Observation(text, _share(s, s.time * s.speed, s.time * s.direction * s.moving))
 
 
@@ -263,10 +241,9 @@ def lags_under_load(s: Samples, say: Spoken, _: dict[str, float]) -> Observation
         return None
     low, high = np.quantile(load[s.moving], [0.25, 0.75])
     lag = _lag(s)
-    text = (
-        f"{_behind(_mean(lag, s.moving & (load >= high)), say)} where it carries over {high:.2g} {say.torque_unit} and "
-        f"{_by(_mean(lag, s.moving & (load <= low)), say)} under {low:.2g} {say.torque_unit}"
-    )
+    one, two = say.behind(_mean(lag, s.moving & (load >= high)), _mean(lag, s.moving & (load <= low)))
+    unit = say.torque_unit
+    text = f"{one} where it carries over {plain(high)} {unit} and {two} under {plain(low)} {unit}"
     return Observation(text, _share(s, s.direction * s.moving * load))
 
 
@@ -277,10 +254,9 @@ def lags_under_drive(s: Samples, say: Spoken, _: dict[str, float]) -> Observatio
         return None
     low, high = np.quantile(work[s.moving], [0.25, 0.75])
     lag = _lag(s)
-    text = (
-        f"{_behind(_mean(lag, s.moving & (work >= high)), say)} where its motor takes over {high:.2g} {say.drive_unit} "
-        f"and {_by(_mean(lag, s.moving & (work <= low)), say)} under {low:.2g} {say.drive_unit}"
-    )
+    one, two = say.behind(_mean(lag, s.moving & (work >= high)), _mean(lag, s.moving & (work <= low)))
+    unit = say.drive_unit
+    text = f"{one} where its motor takes over {plain(high)} {unit} and {two} under {plain(low)} {unit}"
     return Observation(text, _share(s, s.direction * work))
 
 
@@ -289,7 +265,7 @@ def drives_otherwise(s: Samples, say: Spoken, _: dict[str, float]) -> Observatio
     if not np.any(s.drive):
         return None
     ratio = _coefficient(s.drive, s.error) / _coefficient(s.expected_drive, s.expected_error)
-    text = f"gets {ratio:.3g} times the {say.drive_unit} that its controller's gain gives for the same error"
+    text = f"gets {plain(ratio, 3)} times the {say.drive_unit} that its controller's gain gives for the same error"
     return Observation(text, min(1.0, 20 * abs(ratio - 1)))
 
 
@@ -301,10 +277,10 @@ def jolts(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | None:
     if total <= 0.0 or not s.moving.any():
         return None
     needed = int(np.searchsorted(np.cumsum(ranked), 0.5 * total)) + 1
-    largest = float(np.abs(s.without[s.moving]).max())
+    largest, share = float(np.abs(s.without[s.moving]).max()), 100 * needed / len(ranked)
     text = (
-        f"is off in single moments, up to {say.size(largest)}: {100 * needed / len(ranked):.2g} % of the record hold "
-        "half of what it explains, all in motion"
+        f"is off in single moments, up to {say.size(largest)}: {plain(share)} % of the record hold half of what it "
+        "explains, all in motion"
     )
     return Observation(text, float(max(0.0, 1 - 10 * needed / len(ranked))))
 
@@ -312,7 +288,7 @@ def jolts(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | None:
 def stays_off(s: Samples, say: Spoken, _: dict[str, float]) -> Observation | None:
     """Off by the same throughout."""
     middle = float(s.without.mean())
-    return Observation(f"is off by {_signed(middle, say)} throughout", _share(s, np.ones(len(s.without))))
+    return Observation(f"is off by {say.signed(middle)} throughout", _share(s, np.ones(len(s.without))))
 
 
 def _lag(s: Samples) -> Floats:
@@ -320,16 +296,11 @@ def _lag(s: Samples) -> Floats:
     return np.asarray(-s.direction * s.without)
 
 
-def _behind(value: float, say: Spoken) -> str:
-    return f"{'lags' if value >= 0 else 'leads'} by {say.size(value)}"
-
-
-def _by(value: float, say: Spoken) -> str:
-    return f"by {'' if value >= 0 else '−'}{say.size(value)}"
-
-
-def _signed(value: float, say: Spoken) -> str:
-    return f"{'+' if value >= 0 else '−'}{say.size(value)}"
+def _always(slow: float, fast: float, say: Spoken) -> str:
+    """What two lags have in common, where they have a sign in common that can be read."""
+    if say.unread(slow) or say.unread(fast) or (slow >= 0) != (fast >= 0):
+        return ""
+    return f", always {'against' if slow >= 0 else 'with'} the motion"
 
 
 def _mean(signal: Floats, where: Mask) -> float:

@@ -39,10 +39,11 @@ def step_of(case: Case, current: Judged, ranking: Ranking, decision: Decision) -
     group = _still_close(best, chosen, ranking, case.thresholds)
     candidates = tuple(listed(best if r is chosen else r) for r in ranking.fitted)
     candidates += only_probed(ranking, observation)
+    where = case.where(before)
     reason = reasons.reason(
         best.candidate.name, best.candidate.joints, values, best.evidence, margin, model=with_point(after),
         before=with_point(before), records=observation.records, runner_up=runner_up(listed(best), candidates),
-        left=_left(observation, after),
+        left=_left(observation, after), where=where,
     )  # fmt: skip
     step = Step(
         effect=best.candidate.name, joints=best.candidate.joints, parameters=values, evidence=best.evidence,
@@ -50,7 +51,7 @@ def step_of(case: Case, current: Judged, ranking: Ranking, decision: Decision) -
         rmse_fit=case.fitted_errors(before, after), rmse_holdout=held_errors,
         excess_removed_holdout=excess_removed(held_errors),
         sum_lambda2_before=_sum_lambda2(before, before), sum_lambda2_after=_sum_lambda2(after, before),
-        where=case.where(before), reason=reason, adopted=refused is None, rejected_because=refused,
+        where=where, reason=reason, adopted=refused is None, rejected_because=refused,
     )  # fmt: skip
     return step, current if refused is not None else best.judged
 

@@ -13,7 +13,7 @@ from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.discrepancy import reasons
-from model.discrepancy.answer import Diagnosis, RemainingShape, Step, Verdict
+from model.discrepancy.answer import Candidate, Diagnosis, RemainingShape, SignalError, Step, Verdict, Where
 from model.discrepancy.case import Case, with_point
 from model.discrepancy.controller_check import (
     ControllerFinding,
@@ -23,11 +23,12 @@ from model.discrepancy.controller_check import (
     with_used_set_points,
 )
 from model.discrepancy.decision import Added, decide
+from model.discrepancy.estimates import listed, only_probed
 from model.discrepancy.holdout import HeldOut, held_out
 from model.discrepancy.last_fit import as_last_fitted
 from model.discrepancy.next_experiment import Asked, Asker, rivals_of
 from model.discrepancy.noise_floor import noise_floor
-from model.discrepancy.notes import ERRORS_FOLLOW, NOTHING_HELD_OUT, on_unfinished, on_what_is_stated
+from model.discrepancy.notes import ERRORS_FOLLOW, NOTHING_HELD_OUT, on_tolerances, on_unfinished, on_what_is_stated
 from model.discrepancy.observation import FOLLOWING_FOR_ERRORS, Observation, observed
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.probing import Probed
@@ -56,7 +57,7 @@ class _Found:
 
     first: the fit before any effect was added. current: the fit now. steps: one a turn that had something to say.
     before: where each of them began. rivals: answers that came close to the last effect added. probes: all so far.
-    ended: whether there is nothing more to look for.
+    tried: the ranking of the last turn, where it added nothing. ended: whether there is nothing more to look for.
     """
 
     first: Judged
@@ -65,6 +66,7 @@ class _Found:
     before: tuple[Judged, ...] = ()
     rivals: tuple[Refitted, ...] = ()
     probes: tuple[Probed, ...] = ()
+    tried: Ranking | None = None
     ended: bool = False
 
     @property
@@ -116,27 +118,29 @@ def _answer(
     holdout: tuple[Trace, ...],
 ) -> Diagnosis:  # fmt: skip
     """What the turns have come to, and what is taken back of it. The time that it took is not known here."""
-    left = _unexplained(case, found)
+    looked = None if found.added else case.where(found.current.point)
+    left = _unexplained(case, found, looked)
     answered = verdict((*proved, *found.steps), left)
     if answered == "unknown-effect":
         found = _taken_back(found, left)
     current, steps = as_last_fitted(case.observation, found.current, found.steps)
     found, end = replace(found, current=current, steps=steps), current.point
+    where = case.where(end, moving=False) if looked is None else looked  # nothing was added: it is the same point
     remaining = case.remaining(end) if answered == "unknown-effect" else ()
     asked = Asked(None) if ask is None else ask.after(answered, case.observation, end, found.rivals, case.traces)
     notes = (
-        f"tolerance parameters: {len(case.traces)} trace(s), priors as the machine file states them", ERRORS_FOLLOW,
         *on_what_is_stated(_stated(end), {u.name: float(v) for u, v in zip(end.unknowns, end.values, strict=True)}),
+        on_tolerances(len(case.traces)), ERRORS_FOLLOW,
         *on_unfinished((*case.traces, *holdout)), *(() if holdout else (NOTHING_HELD_OUT,)),
         *(() if asked.note is None else (asked.note,)),
     )  # fmt: skip
+    held = case.held_errors(end.model, *case.held_residuals(given, end))
     return Diagnosis(
-        verdict=answered, summary=_summary(case, found, answered, proved, remaining, left),
-        steps=(*proved, *found.steps), remaining=remaining,
+        verdict=answered, summary=_summary(found, answered, proved, where, remaining, left, held),
+        steps=(*proved, *found.steps), where=where, candidates=_candidates(case, found), remaining=remaining,
         model_before=model, model_after=_with_lineage(model, end, case.names),
         traces=case.names, holdout=tuple(t.record.trace_id for t in holdout),
-        rmse_fit=case.fitted_errors(given, end),
-        rmse_holdout=case.held_errors(end.model, *case.held_residuals(given, end)),
+        rmse_fit=case.fitted_errors(given, end), rmse_holdout=held,
         significant=case.thresholds.significant, seconds=0.0,
         robot_seconds=float(sum(t.time[-1] - t.time[0] for t in case.traces)),
         notes=notes, next_experiment=asked.experiment,
@@ -204,7 +208,7 @@ def _searched(case: Case, begun: Judged, progress: Progress, cancel: Cancel) -> 
 def _after_turn(case: Case, found: _Found, progress: Progress, cancel: Cancel) -> _Found:
     """The best that held-out traces do not refuse, of the first few that fitted ones speak for."""
     turn, current = _ranked(case, found, progress, cancel)
-    found = replace(found, current=current, probes=(*found.probes, *turn.probed))
+    found = replace(found, current=current, probes=(*found.probes, *turn.probed), tried=turn)
     if not found.added:
         found = replace(found, first=current)
     for _ in range(CHANCES):
@@ -215,7 +219,7 @@ def _after_turn(case: Case, found: _Found, progress: Progress, cancel: Cancel) -
         found = replace(found, steps=(*found.steps, step), before=(*found.before, current))
         if step.adopted:
             rivals = rivals_of(turn, decision)
-            return replace(found, current=following, rivals=rivals, ended=bool(step.group))
+            return replace(found, current=following, rivals=rivals, tried=None, ended=bool(step.group))
         turn = replace(turn, fitted=tuple(f for f in turn.fitted if f is not decision.best))
     return replace(found, ended=True)
 
@@ -233,9 +237,10 @@ def _ranked(case: Case, found: _Found, progress: Progress, cancel: Cancel) -> tu
     return ranked(observation, better, case.options, case.excluded, case.thresholds, progress, cancel), better
 
 
-def _unexplained(case: Case, found: _Found) -> tuple[int, ...]:
-    """Joints on which something is left, on fitted or held-out traces."""
-    before, after, named = found.first.point, found.current.point, bool(found.added)
+def _unexplained(case: Case, found: _Found, where: Where | None) -> tuple[int, ...]:
+    """Joints on which something is left, on fitted or held-out traces. where: of the current point, while no effect has
+    been added."""
+    before, after, named = found.first.point, found.current.point, where is None
     if named:
         case = case.with_floors_of(after)
     held_errors = case.held_errors(after.model, *case.held_residuals(before, after))
@@ -243,12 +248,11 @@ def _unexplained(case: Case, found: _Found) -> tuple[int, ...]:
     judged = 0 if case.held is None else case.held.observation.samples
     counts = case.observation.samples // joints, judged // joints
     left = unexplained(case.fitted_errors(before, after), held_errors, case.thresholds, named=named, samples=counts)
-    if named:
+    if where is None:
         return left
     closer = unexplained(case.errors_of_fits(after), (), case.thresholds, named=False, samples=counts)
-    cells = case.where(after).cells
-    line = chance_significance(len(cells), case.thresholds.place)
-    places = [c.joint for c in cells if c.significance >= line]
+    line = chance_significance(len(where.cells), case.thresholds.place)
+    places = [c.joint for c in where.cells if c.significance >= line]
     return tuple(sorted({*left, *closer, *places}))
 
 
@@ -258,7 +262,13 @@ def _taken_back(found: _Found, left: Sequence[int]) -> _Found:
     if wrong is None:
         return found
     steps = (*found.steps[:wrong], *(withdrawn(s, left) for s in found.steps[wrong:]))
-    return replace(found, current=found.before[wrong], steps=steps)
+    return replace(found, current=found.before[wrong], steps=steps, tried=None)  # it was tried against another point
+
+
+def _candidates(case: Case, found: _Found) -> tuple[Candidate, ...]:
+    """What was tried against what is left: fitted candidates by evidence, then those that were only probed."""
+    tried = found.tried
+    return () if tried is None else (*map(listed, tried.fitted), *only_probed(tried, case.observation))
 
 
 def _stated(point: Point) -> list[Unknown]:
@@ -274,8 +284,8 @@ def _with_lineage(model: Model, point: Point, names: tuple[str, ...]) -> Model:
 
 
 def _summary(
-    case: Case, found: _Found, answered: Verdict, proved: Sequence[Step], remaining: Sequence[RemainingShape],
-    left: Sequence[int],
+    found: _Found, answered: Verdict, proved: Sequence[Step], where: Where, remaining: Sequence[RemainingShape],
+    left: Sequence[int], held: Sequence[SignalError],
 ) -> str:  # fmt: skip
     steps = (*proved, *found.steps)
     if answered == "nothing-significant":
@@ -284,4 +294,4 @@ def _summary(
         return "; ".join(s.reason for s in steps if s.adopted)
     if answered == "ambiguous":
         return reasons.undecided(steps[-1].group, steps[-1].where)
-    return reasons.unexplained(case.where(found.current.point), remaining, left)
+    return reasons.unexplained(where, remaining, left, held=held)

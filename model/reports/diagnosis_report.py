@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from model.comparison.compare import Comparison
-from model.discrepancy.answer import Candidate, Diagnosis, FoundValue, NextExperiment, SignalError, Step, Where
-from model.reports.diagnosis_pictures import (
-    QUANTITIES,
-    candidate_name,
-    dependence_picture,
-    error_picture,
-    evidence_picture,
-    map_picture,
-    remaining_picture,
-)
+from model.discrepancy.answer import Acquired, Diagnosis, NextExperiment, RemainingShape, Step
+from model.discrepancy.candidate_order import in_order
+from model.discrepancy.remaining import FEWEST_BINS, clear_shape, filled_bins
+from model.reports.diagnosis_map import map_picture
+from model.reports.diagnosis_pictures import evidence_picture, remaining_picture
+from model.reports.diagnosis_steps import error_blocks, step_sections, where_blocks
+from model.reports.diagnosis_words import Compared, compared, headline
+from model.reports.effect_names import capitalised, effect_name, placed
 from model.reports.motion import motion_section
-from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, cells, html, listed, spoken
-from model.reports.units import shown_unit, with_unit
+from model.reports.numbers import whole
+from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, html, listed, spoken
 
 VERDICTS = {
     "nothing-significant": "nothing significant: the model explains these traces within their noise",
@@ -25,8 +23,6 @@ VERDICTS = {
     "ambiguous": "ambiguous: the data cannot tell several effects apart",
     "unknown-effect": "an effect that is not among the known ones",
 }
-NOTABLE = 1.5
-"""Times the noise from which an error is large enough to ask for the share that is gone."""
 LABELS = ("before", "after")
 """Of the models that a comparison for this report is made with."""
 
@@ -38,26 +34,37 @@ def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> 
         comparison: of the models before and after (labelled `LABELS`), on the traces fitted to and held out; overlays
             are left out without it.
     """
+    of = compared(found)
     sections: list[Section] = []
-    for number, step in enumerate(found.steps, start=1):
-        sections += _step_sections(number, len(found.steps), step)
+    for number in range(1, len(found.steps) + 1):
+        sections += step_sections(number, found.steps, of)
+    if not any(s.adopted for s in found.steps):
+        sections += _nothing_added(found, of)
     if comparison is not None:
-        sections.append(_overlays(comparison))
-    sections.append(_remaining(found))
+        sections.append(_overlays(comparison, found.steps))
+    elif of.overlays:
+        sections.append(Section("Overlays", (Text(of.overlays, "quiet"),)))
+    sections.append(_remaining(found, of))
+    if found.acquired:
+        sections.append(_acquired(found.acquired))
     sections.append(_next(found.next_experiment, found.verdict))
     if found.notes:
         sections.append(Section("What to know about this answer", (Points(found.notes),)))
+    answer = f"{capitalised(found.summary).rstrip('.')}."
+    return Report(headline(found), answer, _facts(found), tuple(sections), f"Error and residual: {of.residual}.")
+
+
+def _facts(found: Diagnosis) -> tuple[tuple[str, str], ...]:
     machine = found.model_after.machine
-    facts = (
+    return (
+        ("diagnosis of", machine.title),
         ("verdict", VERDICTS[found.verdict]),
-        ("machine", machine.title),
         ("model before", f"{found.model_before.identity}, {spoken([u.name for u in found.model_before.effects])}"),
         ("model after", f"{found.model_after.identity}, {spoken([u.name for u in found.model_after.effects])}"),
         ("fitted to", listed(found.traces)),
         ("held out", listed(found.holdout) if found.holdout else "none: nothing below was judged on other data"),
         ("time", f"{found.seconds:.1f} s of computing; {found.robot_seconds:.0f} s of motion"),
     )
-    return Report(f"Diagnosis of {machine.title}", found.summary, facts, tuple(sections))
 
 
 def diagnosis_page(found: Diagnosis, comparison: Comparison | None = None) -> str:
@@ -65,158 +72,98 @@ def diagnosis_page(found: Diagnosis, comparison: Comparison | None = None) -> st
     return html(diagnosis_report(found, comparison))
 
 
-def _step_sections(number: int, count: int, step: Step) -> list[Section]:
-    turn = f"Step {number}: " if count > 1 else ""
-    found = [Section(f"{turn}where they disagree", _where(step))]
-    found.append(Section(f"{turn}what is missing", _what(step)))
-    if step.effect is not None:
-        found.append(Section(f"{turn}what adding it did", _shown(step)))
-    return [Section(s.title[0].upper() + s.title[1:], s.blocks) for s in found]
+def _nothing_added(found: Diagnosis, of: Compared) -> list[Section]:
+    """What proves an answer in which no effect was added: the map, what was tried, and errors beside the noise."""
+    sections = []
+    if not found.steps:
+        if found.where is not None:
+            sections.append(Section("Where they disagree", where_blocks(found.where, found.rmse_fit, of)))
+        if found.candidates:
+            sections.append(Section("What was tried", _tried(found)))
+    errors = error_blocks(found.rmse_fit, found.rmse_holdout, of, "as given", "fitted")
+    if errors:
+        text = "No effect was added. Before is the model as it was given; after, its tolerance parameters are fitted."
+        sections.append(Section("Errors beside the noise", (Text(text), *errors)))
+    return sections
 
 
-def _where(step: Step) -> tuple[Block, ...]:
-    where = step.where
-    summary = where.summary[0].upper() + where.summary[1:]
-    blocks: list[Block] = [Text(f"{summary}.", "plain" if where.joint is None else "warning")]
-    if where.cells:
-        blocks += [map_picture(where, trace) for trace in sorted({c.trace for c in where.cells})]
-    joint = where.joint if where.joint is not None else _most_dependent(where)
-    unit = next((e.unit for e in step.rmse_fit if e.joint == joint), "rad")
-    if joint is not None and (picture := dependence_picture(where, joint, unit)) is not None:
-        blocks.append(picture)
-    if where.moving:
-        blocks.append(_moving(where))
-    return tuple(blocks)
-
-
-def _most_dependent(where: Where) -> int | None:
-    return max(where.dependences, key=lambda d: d.significance).joint if where.dependences else None
-
-
-def _moving(where: Where) -> Table:
-    rows = tuple(
-        (
-            Cell(m.parameter), Cell(f"{100 * m.relative_range:.3g} %", number=True),
-            Cell("–" if m.moves_with is None else f"{QUANTITIES[m.moves_with]} ({m.correlation:+.2f})"),
-        )
-        for m in where.moving
-    )  # fmt: skip
-    return Table(
-        ("parameter", "would have to range over", "and moves with"), rows,
-        "The distortion method in time: which parameter alone, moving with time, would explain most, and what it would "
-        "move with (correlation). A parameter that moves with something stands for a term that the model lacks.",
-    )  # fmt: skip
-
-
-def _what(step: Step) -> tuple[Block, ...]:
-    reason = step.reason[0].upper() + step.reason[1:]
-    blocks: list[Block] = [Text(f"{reason}.")]
-    chosen = list(step.group)
-    if step.effect is not None:
-        chosen.append(Candidate(effect=step.effect, joints=step.joints, evidence=step.evidence))
-    if step.candidates:
-        blocks.append(evidence_picture(step.candidates, chosen))
-    if step.group:
-        told = ", ".join(candidate_name(c) for c in step.group)
-        blocks.append(Text(f"These traces cannot tell apart: {told}.", "warning"))
-    return tuple(blocks)
-
-
-def _shown(step: Step) -> tuple[Block, ...]:
-    blocks: list[Block] = []
-    if step.adopted:
-        blocks.append(Text(_gap(step), "good"))
+def _tried(found: Diagnosis) -> tuple[Block, ...]:
+    """The candidates, none of which was added, beside what one needs."""
+    fitted, probed = in_order(found.candidates)
+    needed, count = found.significant, len(found.candidates)
+    best = (fitted or probed)[0]
+    name, evidence = placed(best.effect, best.joints), whole(best.evidence)
+    if fitted:
+        told = f"The best of {count} candidates, {name}, has an evidence of {evidence}"
     else:
-        because = step.rejected_because or "it did not lower the held-out error"
-        blocks.append(Text(f"Not taken into the model: {because}.", "warning"))
-    if step.parameters:
-        blocks.append(_parameters(step.parameters))
-    blocks += [error_picture(step.rmse_fit, step.rmse_holdout), _errors(step)]
-    if step.sum_lambda2_before is not None and step.sum_lambda2_after is not None:
-        blocks.append(Text(_distortion(step.sum_lambda2_before, step.sum_lambda2_after)))
-    return tuple(blocks)
+        told = f"None of {count} candidates promised enough to be fitted. The best, {name}, promises {evidence}"
+    if needed is None:
+        told += "."
+    elif fitted and best.evidence >= needed:
+        told += f". It is above the {needed:g} from which an effect is named, but takes off no more than noise."
+    else:
+        told += f"; an effect is named from {needed:g}."
+    return Text(told), evidence_picture(found.candidates, needed=needed)
 
 
-def _gap(step: Step) -> str:
-    if step.excess_removed_holdout is None:
-        return "Taken into the model. No trace was held out to judge it by."
-    share = 100 * step.excess_removed_holdout
-    return f"Taken into the model: on traces it was not fitted to, {share:.1f} % of the variance beyond noise is gone."
-
-
-def _distortion(before: float, after: float) -> str:
-    told = f"Σλ² of the distortion method goes from {before:.3g} to {after:.3g}. "
-    if before >= 1.0:
-        return told + (
-            "Above 1 already before: judged by the size of the error alone, deviations of the parameters as large "
-            "as expected would explain it. What speaks for the effect is the pattern, which they cannot make."
-        )
-    if after >= 1.0:
-        return told + "At 1 or more, deviations of the parameters as large as expected explain all that is left."
-    return told + "Below 1 the expected deviations of the parameters do not explain all that is left."
-
-
-def _parameters(parameters: dict[str, FoundValue]) -> Table:
-    rows = []
-    for name, v in parameters.items():
-        interval = "not bounded by these traces" if v.low is None or v.high is None else f"{v.low:.4g} to {v.high:.4g}"
-        rows.append((Cell(name), Cell(f"{v.value:.4g}", number=True), Cell(interval, number=True), Cell(v.unit)))
-    return Table(("parameter", "value", "95 % interval", "unit"), tuple(rows))
-
-
-def _errors(step: Step) -> Table:
-    rows = [_error_row("fitted to", e) for e in step.rmse_fit] + [_error_row("held out", e) for e in step.rmse_holdout]
-    caption = (
-        "Root mean square of measured − simulated with tolerance parameters fitted, without the effect and with it. "
-        "Gone: share of the variance beyond noise that the effect took off."
+def _overlays(comparison: Comparison, steps: Sequence[Step]) -> Section:
+    motion = motion_section(comparison.signals, [m.label for m in comparison.models], closer=True)
+    taken = any(s.adopted for s in steps)
+    text = "Before is the model as it was given; after, its tolerance parameters are fitted" + (
+        " as well. What the effects brought by themselves stands in the tables above. "
+        if taken
+        else ", and no effect was added. "
     )
-    return Table(("traces", "joint", "before", "after", "noise floor", "gone"), tuple(rows), caption)
-
-
-def _error_row(kind: str, e: SignalError) -> tuple[Cell, ...]:
-    factor, unit = shown_unit(e.unit)
-    sizes = (with_unit(f"{v * factor:.4g}", unit) for v in (e.before, e.after, e.floor))
-    return (Cell(kind), *cells(str(e.joint), *sizes, _gone(e)))
-
-
-def _gone(e: SignalError) -> str:
-    """Share of the excess variance; a dash where there was hardly any."""
-    if e.before < NOTABLE * e.floor:
-        return "–"
-    return f"{100 * (e.before**2 - e.after**2) / (e.before**2 - e.floor**2):.0f} %"
-
-
-def _overlays(comparison: Comparison) -> Section:
-    motion = motion_section(comparison.signals, [m.label for m in comparison.models])
-    text = (
-        "Before is the model as it was given; after, its tolerance parameters are fitted as well. What the effects "
-        "brought by themselves stands in the tables above."
+    text += (
+        "The simulations here are of the closed loop alone: they are given the set points and the start, and nothing "
+        "else of the record. So their errors are other ones than those of the tables."
     )
     return Section("Measured, before and after", (Text(text), *motion.blocks))
 
 
-def _remaining(found: Diagnosis) -> Section:
-    if not found.remaining:
-        return Section(
-            "What remains", (Text("Nothing that goes with time, position, speed, direction or drive.", "good"),)
+def _remaining(found: Diagnosis, of: Compared) -> Section:
+    blocks: list[Block] = []
+    if found.where is not None and any(s.adopted for s in found.steps):
+        told = f"With what was added: {found.where.summary}."
+        blocks.append(Text(told, "good" if found.where.joint is None else "plain"))
+        traces = sorted({c.trace for c in found.where.cells})
+        blocks += [map_picture(found.where, of.residual, trace, small=True) for trace in traces]
+    if found.remaining:
+        blocks += [_shape_in_words(found.remaining), remaining_picture(found.remaining), _shapes(found.remaining)]
+    elif found.verdict == "unknown-effect":
+        text = "What is left has no shape that these traces show against time, position, speed, direction or drive."
+        blocks.append(Text(text, "warning"))
+    else:
+        blocks.append(Text("No torque that none of the known effects explains.", "good"))
+    return Section("What remains", tuple(blocks))
+
+
+def _shape_in_words(shapes: Sequence[RemainingShape]) -> Text:
+    clear = clear_shape(shapes)
+    if clear is None:
+        best = shapes[0]
+        told = (
+            f"No clear shape: the best, a torque at joint {best.joint} that goes with {best.against}, explains "
+            f"{100 * best.explained:.0f} % of what is left there"
         )
-    first = found.remaining[0]
-    text = (
-        f"A torque at joint {first.joint} that goes with {QUANTITIES[first.against]} would explain "
-        f"{100 * first.explained:.0f} % of what is left there. None of the candidates explains it. An effect "
-        "of your own with this shape can be tried with --effect-file."
+        few = f", and is known at {filled_bins(best)} values only" if filled_bins(best) < FEWEST_BINS else ""
+        return Text(f"{told}{few}.", "warning")
+    return Text(
+        f"A torque at joint {clear.joint} that goes with {clear.against} would explain "
+        f"{100 * clear.explained:.0f} % of what is left there. None of the candidates explains it. An effect "
+        "of your own with this shape can be tried with --effect-file.",
+        "warning",
     )
-    return Section("What remains", (Text(text, "warning"), remaining_picture(found.remaining), _shapes(found)))
 
 
-def _shapes(found: Diagnosis) -> Table:
+def _shapes(shapes: Sequence[RemainingShape]) -> Table:
     rows = tuple(
         (
-            Cell(f"joint {s.joint}"), Cell(QUANTITIES[s.against]),
+            Cell(f"joint {s.joint}"), Cell(s.against),
             Cell(_span([t for t in s.torque if t is not None], s.torque_unit), number=True),
             Cell(f"{100 * s.explained:.0f} %", number=True),
         )
-        for s in found.remaining
+        for s in shapes
     )  # fmt: skip
     return Table(("joint", "goes with", "torque", "explains"), rows)
 
@@ -225,17 +172,30 @@ def _span(torques: Sequence[float], unit: str) -> str:
     return f"{min(torques):.3g} to {max(torques):.3g} {unit}" if torques else "–"
 
 
+def _acquired(runs: Sequence[Acquired]) -> Section:
+    rows = tuple(
+        (
+            Cell(r.experiment), Cell(f"{r.duration:.1f} s", number=True),
+            Cell(r.outcome, "plain" if r.outcome == "complete" else "warning"), Cell(r.trace), Cell(r.reason),
+        )
+        for r in runs
+    )  # fmt: skip
+    caption = (
+        "In the order in which they were asked for. Only complete runs are used, and are among what was fitted to."
+    )
+    return Section("What was run", (Table(("experiment", "robot time", "outcome", "trace", "why"), rows, caption),))
+
+
 def _next(experiment: NextExperiment | None, verdict: str) -> Section:
     title = "What to run next"
     if experiment is None:
         text = "No further experiment is asked for." if verdict == "named" else "Nothing is left to tell apart."
         return Section(title, (Text(text, "quiet"),))
-    apart = [name.replace("_", " ") for name in experiment.separates]
-    reason = experiment.reason[0].upper() + experiment.reason[1:]
-    rows = (
-        ("on the arm", f"{experiment.duration:.1f} s"),
-        ("would tell apart", " and ".join(apart) if len(apart) <= 2 else listed(apart)),
-        ("predicted separation", f"{experiment.predicted_separation:.1f} standard deviations, tolerances fitted again"),
-    )
+    rows = [("on the arm", f"{experiment.duration:.1f} s")]
+    if experiment.separates:
+        apart = [effect_name(name) for name in experiment.separates]
+        separation = f"{experiment.predicted_separation:.1f} standard deviations, tolerances fitted again"
+        rows.append(("would tell apart", " and ".join(apart) if len(apart) <= 2 else listed(apart)))
+        rows.append(("predicted separation", separation))
     table = Table(("experiment", experiment.name), tuple((Cell(a), Cell(b)) for a, b in rows))
-    return Section(title, (Text(f"{reason.rstrip('.')}."), table))
+    return Section(title, (Text(f"{capitalised(experiment.reason).rstrip('.')}."), table))

@@ -67,6 +67,19 @@ def thinned(time: Floats, *signals: Floats, most: int = 1500) -> tuple[Floats, .
     return (time[::stride], *(s[::stride] for s in signals))
 
 
+def band(axes: Axes, time: Floats, signal: Floats, colour: str, most: int = 300) -> None:
+    """A signal as a line; of many samples the mean of each of `most` stretches, and a shade from least to largest."""
+    if len(time) <= 2 * most or not np.isfinite(signal).all():
+        axes.plot(time, signal, color=colour, lw=0.8)
+        return
+    begins = np.linspace(0, len(time), most, endpoint=False).astype(np.int64)
+    counts = np.diff([*begins, len(time)])
+    middle = np.add.reduceat(time, begins) / counts
+    least, largest = np.minimum.reduceat(signal, begins), np.maximum.reduceat(signal, begins)
+    axes.fill_between(middle, least, largest, color=colour, alpha=0.25, lw=0)
+    axes.plot(middle, np.add.reduceat(signal, begins) / counts, color=colour, lw=0.8)
+
+
 def panels(figure: Figure, rows: int, columns: int, **options: Any) -> Any:
     """Axes (rows, columns), never squeezed."""
     return figure.subplots(rows, columns, squeeze=False, **options)

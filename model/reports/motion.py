@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from model.comparison.agreement import JointAgreement, ModelAgreement
 from model.comparison.compare import TraceSignals
 from model.reports.figures import (
@@ -12,26 +14,40 @@ from model.reports.figures import (
     INK,
     MODEL_COLOURS,
     QUIET,
+    band,
     baseline,
     drawn,
     panels,
     thinned,
 )  # fmt: skip
+from model.reports.motion_closer import closer_picture
 from model.reports.page import Cell, Picture, Section, Table, cells
-from model.reports.units import shown_unit
+from model.reports.units import shown_unit, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ABREAST = 3
 """Joints beside each other."""
+USUAL = 2.5
+"""Times the residual that 99.5 % of the samples stay below, to which its picture reaches at most."""
 ROLES = {True: "held out", False: "fitted to", None: "all"}
 """What a trace was to a model."""
 
 
-def motion_section(signals: Sequence[TraceSignals], labels: Sequence[str], most: int = 8) -> Section:
-    """A figure a trace: position above, residual below, a column a joint; of many traces the first ones."""
-    pictures = [_picture(one, labels) for one in signals[:most]]
+def motion_section(
+    signals: Sequence[TraceSignals], labels: Sequence[str], most: int = 8, *, closer: bool = False
+) -> Section:
+    """A figure a trace: position above, residual below, a column a joint; of many traces the first ones.
+
+    Args:
+        closer: also the stretch in which the first model is furthest off.
+    """
+    pictures: list[Picture] = []
+    for one in signals[:most]:
+        pictures.append(_picture(one, labels))
+        if closer and (near := closer_picture(one, labels)) is not None:
+            pictures.append(near)
     return Section("Traces", tuple(pictures))
 
 
@@ -39,6 +55,8 @@ def _picture(one: TraceSignals, labels: Sequence[str]) -> Picture:
     bands = -(-len(one.joints) // ABREAST)
 
     alike = len(set(one.units)) == 1
+    reach, widest = _reach(one)
+    factor, unit = shown_unit(one.units[0])
 
     def draw(figure: Figure) -> None:
         columns = min(ABREAST, len(one.joints))
@@ -47,20 +65,32 @@ def _picture(one: TraceSignals, labels: Sequence[str]) -> Picture:
             band, place = divmod(column, ABREAST)
             first = column == 0 or not alike
             _joint(axes[2 * band][place], axes[2 * band + 1][place], one, column, joint, labels, first=first)
-        widest = max(float(abs(one.measured - s).max()) for s in one.simulated) * shown_unit(one.units[0])[0]
         if alike:
             for row in axes[1::2].flat:
-                row.set_ylim(-1.08 * widest, 1.08 * widest)
+                row.set_ylim(-1.08 * reach * factor, 1.08 * reach * factor)
         handles, names = axes[0][0].get_legend_handles_labels()
         figure.legend(handles, names, loc="outside upper right", ncols=len(names), handlelength=2.0)
         for empty in axes[-2:, len(one.joints) - (bands - 1) * ABREAST :].flat:
             empty.set_visible(False)
 
     role = "" if one.held_out is None else f" ({ROLES[one.held_out]})"
+    most = with_unit(f"{widest * factor:.2g}", unit)
+    cut = f" For a moment it is {most}, beyond the picture." if alike and reach < widest else ""
     return Picture(
         drawn(draw, 3.4 * bands),
-        f"{one.trace}{role}. Above: measured, set point and simulated. Below: measured − simulated.",
+        f"{one.trace}{role}. Above: measured, set point and simulated. Below: measured − simulated; where there are "
+        "more samples than a page resolves, the line is their mean, and the shade goes from the least to the "
+        f"largest.{cut}",
     )
+
+
+def _reach(one: TraceSignals) -> tuple[float, float]:
+    """How far the picture of a residual reaches, and its largest size: the first is less where a moment, like a start
+    posture that is off, would leave nothing to be seen of the rest."""
+    sizes = [np.abs(one.measured - s) for s in one.simulated]
+    widest = max(float(s.max()) for s in sizes)
+    usual = max(float(np.quantile(s, 0.995, axis=0).max()) for s in sizes)
+    return min(widest, USUAL * usual) if usual > 0.0 else widest, widest
 
 
 def _joint(
@@ -76,17 +106,15 @@ def _joint(
     if one.set_point is not None:
         time, wanted = thinned(one.time, one.set_point[:, column] * factor)
         above.plot(time, wanted, color=QUIET, lw=0.9, ls=(0, (4, 2)), drawstyle="steps-post", label="set point")
-    time, measured = thinned(one.time, one.measured[:, column] * factor)
-    above.plot(time, measured, color=INK, lw=1.0, label="measured")
     baseline(below)
     for place, (label, simulated) in enumerate(zip(labels, one.simulated, strict=True)):
         shade = colour if len(labels) == 1 else MODEL_COLOURS[place % len(MODEL_COLOURS)]
-        time, own, left = thinned(
-            one.time, simulated[:, column] * factor, (one.measured - simulated)[:, column] * factor
-        )
-        above.plot(time, own, color=shade, lw=1.1, ls="-" if len(labels) == 1 else ("-", "--", "-.", ":")[place % 4],
+        time, own = thinned(one.time, simulated[:, column] * factor)
+        above.plot(time, own, color=shade, lw=1.4, ls="-" if len(labels) == 1 else ("-", "--", "-.", ":")[place % 4],
                    label=label)  # fmt: skip
-        below.plot(time, left, color=shade, lw=0.9)
+        band(below, one.time, (one.measured - simulated)[:, column] * factor, shade)
+    time, measured = thinned(one.time, one.measured[:, column] * factor)
+    above.plot(time, measured, color=INK, lw=0.6, label="measured")  # thin and on top: neither hides the other
     below.set_xlabel("time / s")
     for axes in (above, below):
         axes.margins(x=0.01)

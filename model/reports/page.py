@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from daq.contracts.errors import SpecError
+from model.reports.effect_names import effect_name
 
 Tone = Literal["plain", "good", "warning", "quiet"]
 
@@ -75,12 +76,14 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """A page: what it is of, the answer in one or two sentences, facts in two columns, and sections."""
+    """A page: what it is of, the answer in one or two sentences, facts in two columns, and sections; at its foot, what
+    its errors are."""
 
     title: str
     answer: str
     facts: tuple[tuple[str, str], ...]
     sections: tuple[Section, ...]
+    errors: str = "Error and residual: measured − simulated."
 
 
 def cells(*texts: str, tone: Tone = "plain") -> tuple[Cell, ...]:
@@ -118,4 +121,4 @@ def listed(names: Sequence[str], most: int = 6) -> str:
 
 def spoken(effects: Sequence[str]) -> str:
     """Effects in words."""
-    return ", ".join(e.replace("_", " ") for e in effects) or "no effects"
+    return ", ".join(effect_name(e) for e in effects) or "no effects"

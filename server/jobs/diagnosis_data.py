@@ -29,6 +29,7 @@ def diagnosis_data(found: Diagnosis, comparison: Comparison | None, given: Given
         **{
             **dict(found),
             "steps": tuple(_step(step) for step in found.steps),
+            "candidates": tuple(one.model_dump() for one in found.candidates),
             "models": () if comparison is None else comparison.models,
             "signals": () if comparison is None else overlays(comparison),
             "differences": differences((found.model_before, found.model_after)),

@@ -91,6 +91,7 @@ class DiagnosisData(Diagnosis):
     model disagreed with the traces as it was given, before anything was fitted."""
 
     steps: tuple[DiagnosisStep, ...]
+    candidates: tuple[TriedEffect, ...] = ()
     models: tuple[ModelAgreement, ...] = ()
     signals: tuple[Overlay, ...] = ()
     differences: tuple[ParameterDifference, ...] = ()

@@ -79,11 +79,11 @@ def measured_signal(trace: Trace, machine: Machine) -> RawSignal:
     """
     name = trace.record.trace_id
     if trace.drive is None:
-        raise TraceError(f"trace {name}: has no recorded drive, which torque space needs")
+        raise TraceError(f"trace {name}: has no recorded drive, which a diagnosis in torques needs")
     if trace.record.machine is not None and trace.record.machine.name != machine.name:
         raise TraceError(f"trace {name}: made on {trace.record.machine.name}, the model describes {machine.name}")
     if len(trace) < 32:
-        raise TraceError(f"trace {name}: {len(trace)} samples; torque space needs at least 32")
+        raise TraceError(f"trace {name}: {len(trace)} samples; a diagnosis in torques needs at least 32")
     columns = [trace.column(j) for j in machine.modelled_joints]
     steps = np.diff(trace.time)
     period = float(np.median(steps))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
-from model.discrepancy.answer import Candidate, Diagnosis, FoundValue, Step, Verdict
+from model.discrepancy.answer import Candidate, Diagnosis, FoundValue, SignalError, Step, Verdict
 from model.discrepancy.notes import on_unfinished, on_what_is_stated
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.torque_space import judging
@@ -24,7 +24,7 @@ from model.discrepancy.torque_space.likelihood import stretches_of
 from model.discrepancy.torque_space.locating import located, remaining_shapes
 from model.discrepancy.torque_space.noise_floor import noise_floor
 from model.discrepancy.torque_space.options import TorqueOptions, torque_options
-from model.discrepancy.torque_space.reasons import reason
+from model.discrepancy.torque_space.reasons import reason, with_sizes
 from model.discrepancy.torque_space.records import TorqueRecord, acts_until_next_sample, torque_records
 from model.discrepancy.torque_space.search import Fitted, Turn, evidence, look
 from model.discrepancy.torque_space.tolerances import tolerances
@@ -80,7 +80,7 @@ def _refuse_unseen(options: TorqueOptions) -> None:
 
 @dataclass
 class _Workflow:
-    """State of a diagnosis: the model so far, its fit, and the steps taken."""
+    """State of a diagnosis: the model so far, its fit, the steps taken, and what was tried in a turn that took none."""
 
     model: Model
     records: tuple[TorqueRecord, ...]
@@ -91,6 +91,7 @@ class _Workflow:
     cancel: Cancel
     added: frozenset[str] = frozenset()
     steps: list[Step] = field(default_factory=list)
+    tried: tuple[Candidate, ...] = ()
     notes: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -107,6 +108,7 @@ class _Workflow:
             self._tell(0.1, "what is missing")
             turn = look(self.model, self.now, self.data, self.options, self._tell, self.cancel)
             if not self._decide(turn):
+                self.tried = self._candidates(turn)
                 break
             self._tell(0.9, "what is not needed any more")
             self._prune(done)
@@ -252,7 +254,12 @@ class _Workflow:
         for step in self.steps:
             own = [self.model.parameter(name) for name in step.parameters] if step.adopted else []
             last = judging.found_values(self.now, own, self.data)
-            steps.append(step.model_copy(update={"parameters": last}) if own else step)
+            if not own:
+                steps.append(step)
+                continue
+            slides = self._slides(step.joints)
+            told = with_sizes(step.reason, step.joints, step.parameters, last, slides=slides)
+            steps.append(step.model_copy(update={"parameters": last, "reason": told}))
         return tuple(steps)
 
     def _shares(self) -> str:
@@ -262,12 +269,21 @@ class _Workflow:
         after = judging.relative_torque_error(self.model.with_values(self.now.values), records)
         return f"torque left unexplained on {where}: {before:.1%} of the recorded before, {after:.1%} after"
 
+    def _errors(self, records: tuple[TorqueRecord, ...]) -> tuple[SignalError, ...]:
+        """Of every joint on these records, from the model as it was given to the one that comes out."""
+        if not records:
+            return ()
+        before = judging.held_out_squares(self.begin, {}, records)
+        after = judging.held_out_squares(self.model, self.now.values, records)
+        return judging.signal_errors(self.model, before, after, self.floor)
+
     def answer(
         self, before: Model, traces: list[str], holdout: list[str], seconds: float, robot: float, cutoff: float
     ) -> Diagnosis:
         """The whole answer."""
         shapes = remaining_shapes(self.model, self.records, self.now.residual, self.data.stretches, self.floor)
-        adopted = [s for s in self.steps if s.adopted]
+        steps = self._as_last_fitted()
+        adopted = [s for s in steps if s.adopted]
         verdict: Verdict = "nothing-significant"
         if any(s.group for s in adopted):
             verdict = "ambiguous"
@@ -281,11 +297,13 @@ class _Workflow:
             note="; ".join(s.reason for s in adopted),
         )  # fmt: skip
         after = self.model.with_values(self.now.values).with_lineage(lineage)
+        left = located(self.model, self.records, self.now.residual, self.data.stretches, self.floor)
         return Diagnosis(
-            verdict=verdict, summary=_summary(adopted, bool(shapes)), steps=self._as_last_fitted(), remaining=shapes,
-            model_before=before, model_after=after, traces=tuple(traces), holdout=tuple(holdout), seconds=seconds,
-            robot_seconds=robot, significant=self.options.least_evidence,
-            notes=(self._shares(), *stated, *_assumptions(cutoff), *self.notes),
+            verdict=verdict, summary=_summary(adopted, bool(shapes)), steps=steps,
+            rmse_fit=self._errors(self.records), rmse_holdout=self._errors(self.held), where=left,
+            candidates=self.tried, remaining=shapes, model_before=before, model_after=after, traces=tuple(traces),
+            holdout=tuple(holdout), seconds=seconds, robot_seconds=robot, significant=self.options.least_evidence,
+            notes=(*stated, self._shares(), *_assumptions(cutoff), *self.notes),
         )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.discrepancy.answer import AgainstWhat, Dependence, Phase, PhaseCell, RemainingShape, Where
+from model.discrepancy.reasons_numbers import plain
 from model.discrepancy.torque_space.judging import torque_unit
 from model.discrepancy.torque_space.likelihood import Stretches
 from model.discrepancy.torque_space.records import TorqueRecord
@@ -91,7 +92,7 @@ def located(
     ratio, joint, where = worst
     unit = torque_unit(model, joint)
     rms = ratio * floor[model.machine.modelled_joints.index(joint)]
-    summary = f"joint {joint}, mostly {SPOKEN[where]}: {rms:.3g} {unit} rms, {ratio:.2g} times its noise"
+    summary = f"joint {joint}, mostly {SPOKEN[where]}: {plain(rms, 3)} {unit} rms, {plain(ratio)} times its noise"
     return Where(joint=joint, phase=where, summary=summary, cells=tuple(cells), dependences=tuple(dependences))
 
 

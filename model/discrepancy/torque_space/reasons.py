@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 
 from daq.contracts.effects import effect_names
 from model.discrepancy.answer import FoundValue
+from model.discrepancy.reasons_numbers import plain
 from model.effects.library import effect
 
 SHAPES = {
@@ -43,7 +45,7 @@ SLIDING = {
     "torque": "force",
     "angles": "positions",
     "angle": "position",
-    "a turn": "a metre, over 2π",
+    "a turn": "a metre",
 }
 """The same words for a joint that slides."""
 
@@ -57,12 +59,27 @@ def reason(
     seen = SHAPES.get(name) or (effect_names()[name].line if name in effect_names() else effect(name).physics)
     for word, other in SLIDING.items() if slides else ():
         seen = seen.replace(word, other)
-    sizes = ", ".join(_size(n, v, several=len(joints) > 1) for n, v in values.items())
-    return f"{where}{seen} ({sizes}); it takes {removed:.0%} off the mean square on records not fitted to"
+    sizes = _sizes(joints, values, slides=slides)
+    return f"{where}{seen}{sizes}; it takes {removed:.0%} off the mean square on records not fitted to"
 
 
-def _size(name: str, value: FoundValue, *, several: bool) -> str:
+def with_sizes(
+    text: str, joints: Sequence[int], before: Mapping[str, FoundValue], after: Mapping[str, FoundValue],
+    *, slides: bool = False,
+) -> str:  # fmt: skip
+    """A reason that was given with the parameters `before`, with the numbers of `after`."""
+    return text.replace(_sizes(joints, before, slides=slides), _sizes(joints, after, slides=slides), 1)
+
+
+def _sizes(joints: Sequence[int], values: Mapping[str, FoundValue], *, slides: bool) -> str:
+    """“ (torque 8.01 N)”."""
+    return f" ({', '.join(_size(n, v, several=len(joints) > 1, slides=slides) for n, v in values.items())})"
+
+
+def _size(name: str, value: FoundValue, *, several: bool, slides: bool) -> str:
     group, last = name.partition(".")[0], name.rpartition(".")[2]
     on = f" of {group}" if several and "joint" in group else ""
     unit = "" if value.unit == "1" else f" {value.unit}"
-    return f"{last}{on} {value.value:.3g}{unit}"
+    if last == "cycles":  # rad of phase a rad (m): cycles a turn, or 2π times those a metre
+        unit = f" rad/m, {plain(value.value / (2 * math.pi), 3)} a metre" if slides else " a turn"
+    return f"{last}{on} {plain(value.value, 3)}{unit}"

@@ -92,7 +92,7 @@ def low_passed(signal: Floats, cutoff: float, period: float) -> Floats:
 
 
 def torque_records(traces: Sequence[Trace], machine: Machine, cutoff: float) -> tuple[TorqueRecord, ...]:
-    """Traces as torque space needs them.
+    """Traces as a diagnosis in torques needs them.
 
     Raises:
         TraceError: for a trace without drive, of another machine, too short, or too sparse for the cutoff.
@@ -110,7 +110,7 @@ def _record(trace: Trace, machine: Machine, cutoff: float) -> TorqueRecord:
     duration = float(raw.time[-1] - raw.time[0])
     if duration < max(SHORTEST, 4 * EDGE / cutoff):
         raise TraceError(
-            f"trace {raw.name}: lasts {duration:.3g} s; torque space needs {max(SHORTEST, 4 / cutoff):.3g} s"
+            f"trace {raw.name}: lasts {duration:.3g} s; a diagnosis in torques needs {max(SHORTEST, 4 / cutoff):.3g} s"
         )
     thin = max(1, int(1 / (GRID * cutoff * raw.period)))
     wide = min(WIDER * cutoff, 0.4 / raw.period)

@@ -9,8 +9,8 @@ import pytest
 
 from daq.acquisition.messages import Finished
 from daq.cli.context import Invocation
-from daq.cli.diagnose_acquire import acquired
-from daq.contracts.errors import SafetyError, SpecError
+from daq.cli.diagnose_acquire import Ended, acquired
+from daq.contracts.errors import ReachError, SafetyError, SpecError, TraceError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Outcome, Trace
@@ -103,7 +103,9 @@ def test_the_robot_time_that_is_left_bounds_what_is_asked(outcomes: list[Outcome
     outcomes += ["complete"] * 9
     answers = Answers(duration)
     call = Invocation(port_option=PORT)
-    found, every = acquired(call, load_machine("ma2000"), [trace], None, 2.5 * duration, False, answers)
+    ended = acquired(call, load_machine("ma2000"), [trace], None, 2.5 * duration, False, answers)
+    found, every = ended.found, ended.traces
+    assert ended.failure is None
     assert len(found.acquired) == 2
     assert len(every) == 3
     assert [count for count, _ in answers.given] == [1, 2, 3]
@@ -114,9 +116,9 @@ def test_a_run_that_is_stopped_ends_it_and_is_not_used(outcomes: list[Outcome], 
     outcomes += ["stopped"]
     answers = Answers(3.0)
     call = Invocation(port_option=PORT)
-    found, every = acquired(call, load_machine("ma2000"), [read_trace(ramp)], None, 60.0, False, answers)
-    assert [run.outcome for run in found.acquired] == ["stopped"]
-    assert len(every) == len(answers.given) == 1
+    ended = acquired(call, load_machine("ma2000"), [read_trace(ramp)], None, 60.0, False, answers)
+    assert [run.outcome for run in ended.found.acquired] == ["stopped"]
+    assert len(ended.traces) == len(answers.given) == 1
 
 
 def test_another_machine_than_the_configured_one_is_refused(ramp: Path) -> None:
@@ -156,11 +158,56 @@ def test_the_answer_is_given_and_the_exit_code_is_the_last_runs(
 ) -> None:
     run = Acquired(experiment="ramp", trace="abc", file="abc.mcap", outcome=outcome, duration=3.0, reason="")
 
-    def made(_call: object, _machine: object, traces: list[Trace], *_: object) -> tuple[Diagnosis, list[Trace]]:
+    def made(_call: object, _machine: object, traces: list[Trace], *_: object) -> Ended:
         found = Answers(3.0)(traces, Asker((), lambda _: pytest.fail("nothing is planned")))
-        return found.model_copy(update={"acquired": (run,)}), traces
+        return Ended(found.model_copy(update={"acquired": (run,)}), traces)
 
     monkeypatch.setattr("daq.cli.diagnose_acquire.acquired", made)
     said = daq("diagnose", ramp, "--acquire", "--json")
     assert said.code == code
     assert Diagnosis.model_validate(json.loads(said.out)).acquired == (run,)
+
+
+def test_a_robot_that_is_not_there_is_said_before_anything_is_computed(
+    daq: CommandLine, ramp: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("model.discrepancy.workflow.diagnose", lambda *_, **__: pytest.fail("it was computed"))
+    nowhere = daq("--port", "serial:///dev/ttyNOPE", "diagnose", ramp, "--acquire", "--yes", "--json")
+    nowhere.complains(3, "/dev/ttyNOPE does not exist")
+    daq("--port", "mock://?modify=gremlin", "diagnose", ramp, "--acquire").complains(3, "mock controller did not start")
+
+
+def test_the_answer_is_not_lost_to_a_run_that_cannot_be_begun(
+    daq: CommandLine, ramp: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(*_: object) -> Finished:
+        raise ReachError("the arm is gone")
+
+    def answers(_model: object, traces: list[Trace], *_: object, ask: Asker) -> Diagnosis:
+        return Answers(3.0)(traces, ask)
+
+    monkeypatch.setattr("daq.cli.diagnose_acquire.acquire", gone)
+    monkeypatch.setattr("model.discrepancy.workflow.diagnose", answers)
+    monkeypatch.setattr("daq.cli.diagnose._written", lambda *given: given[-1])
+    said = daq("--port", PORT, "diagnose", ramp, "--acquire", "--json", "-o", "so_far.json", "--report", "page.html")
+    assert said.code == 3
+    assert Diagnosis.model_validate(json.loads(said.out)).next_experiment is not None
+    assert said.err.splitlines()[-1] == "daq: the arm is gone"
+    assert "report: page.html" in said.err
+    assert Path("so_far.json").exists()
+
+
+def test_the_answer_is_not_lost_to_a_trace_that_cannot_be_used(outcomes: list[Outcome], ramp: Path) -> None:
+    outcomes += ["complete"]
+    answers = Answers(3.0)
+
+    def once(traces: list[Trace], ask: Asker) -> Diagnosis:
+        if len(traces) > 1:
+            raise TraceError("trace abc: cannot be used")
+        return answers(traces, ask)
+
+    call = Invocation(port_option=PORT)
+    ended = acquired(call, load_machine("ma2000"), [read_trace(ramp)], None, 60.0, False, once)
+    assert isinstance(ended.failure, TraceError)
+    assert len(ended.traces) == 1
+    assert [run.outcome for run in ended.found.acquired] == ["complete"]

@@ -73,8 +73,8 @@ def test_a_trace_is_found_by_its_path(folder: Path) -> None:
     ("wanted", "complaint"),
     [
         ("a", "2 traces in .* begin so: .*aa1111.*ab2222.*; give more of it"),
-        ("ff", "is not a file, and no trace in"),
-        ("", "is not a file, and no trace in"),
+        ("ff", "is not a file, and the folder .* has none"),
+        ("", "is not a file, and the folder .* has none"),
     ],
 )
 def test_what_names_no_trace_or_several_is_one_line(folder: Path, wanted: str, complaint: str) -> None:

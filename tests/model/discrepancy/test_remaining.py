@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from model.discrepancy.answer import AgainstWhat, RemainingShape
 from model.discrepancy.phases import asked_motion
-from model.discrepancy.remaining import shapes, torque_of
+from model.discrepancy.remaining import CLEAR_SHAPE, clear_shape, shapes, torque_of
 from model.fitting.records import Record, noise_floor, records_of
 from model.machine_model.model import Model
 from model.simulation.simulate import Options, simulate
@@ -49,3 +50,35 @@ def test_nothing_remains_of_an_arm_that_is_the_model(arm: Model) -> None:
     records = records_of([trace_of(arm)], arm.machine, "position")
     deviations = 1.3 * noise_floor(records, arm.machine, "position")
     assert shapes(arm, records, [left(arm, records[0])], deviations) == ()
+
+
+@pytest.mark.parametrize(
+    ("against", "torque", "explained", "clear"),
+    [
+        ("time", (0.1, 0.2), 0.64, False),
+        ("position", (0.1, None, 0.2, 0.3, 0.4), 0.64, False),
+        ("position", (0.1, None, 0.2, 0.3, 0.4, 0.5), 0.64, True),
+        ("speed", (0.1, 0.2, 0.3, 0.4, 0.5), CLEAR_SHAPE - 0.01, False),
+        ("speed", (0.1, 0.2, 0.3, 0.4, 0.5), CLEAR_SHAPE, True),
+        ("direction", (-0.1, None, 0.1), 0.64, True),
+    ],
+)
+def test_a_shape_is_clear_where_it_explains_enough_in_enough_bins(
+    against: AgainstWhat, torque: tuple[float | None, ...], explained: float, clear: bool
+) -> None:
+    shape = RemainingShape(
+        joint=1, against=against, unit="1", torque_unit="N·m", centres=(0.0,) * len(torque), torque=torque,
+        deviation=torque, explained=explained,
+    )  # fmt: skip
+    assert (clear_shape([shape]) is not None) == clear
+
+
+def test_the_clearest_shape_is_what_explains_most_whatever_the_order() -> None:
+    """Torques without a controller are listed by joint."""
+    shape = RemainingShape(
+        joint=1, against="speed", unit="rad/s", torque_unit="N·m", centres=(0.0,) * 5, torque=(0.1,) * 5,
+        deviation=(0.1,) * 5, explained=0.4,
+    )  # fmt: skip
+    better = shape.model_copy(update={"joint": 2, "explained": 0.7})
+    assert clear_shape([shape, better]) == better
+    assert clear_shape([]) is None

@@ -46,12 +46,15 @@ def test_the_next_candidate_has_its_chance(monkeypatch: pytest.MonkeyPatch) -> N
     found = turned(monkeypatch, [fit("backlash", 90.0), fit("stiction", 40.0)], "stiction")
     assert [(s.effect, s.adopted) for s in found.steps] == [("backlash", False), ("stiction", True)]
     assert not found.ended
+    assert found.tried is None, "something was added"
 
 
 def test_what_is_not_significant_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
     found = turned(monkeypatch, [fit("backlash", 90.0), fit("stiction", 8.0)], "stiction")
     assert [s.effect for s in found.steps] == ["backlash"]
     assert found.ended
+    assert found.tried is not None
+    assert [f.candidate.name for f in found.tried.fitted] == ["backlash", "stiction"], "also what was refused"
 
 
 def test_the_chances_come_to_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -86,6 +89,29 @@ def test_what_a_later_effect_explains_is_taken_out_again(monkeypatch: pytest.Mon
     assert steps[0].rejected_because == SUPERFLUOUS
     assert gone == ["a"]
     assert now is without, "the answer's errors and its model are those of the fit without it"
+
+
+def test_a_reason_and_the_parameters_beside_it_say_one_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a step that is taken; one that is refused keeps both from its turn."""
+    name = "joint2.dead_zone.width"
+    turn, last = (
+        FoundValue(value=value, low=low, high=high, unit="V")
+        for value, low, high in ((0.747, 0.724, 0.77), (0.7475, 0.6732, 0.8217))
+    )
+    told = "joint 2 lags by 0.13° whenever it moves: a dead zone of the amplifier, 0.747 V (0.724 to 0.77), which takes"
+    step = Step(
+        effect="dead_zone", joints=(2,), parameters={name: turn}, evidence=50.0, margin=50.0, candidates=(),
+        rmse_fit=(), where=Where(joint=2, phase=None, summary="", cells=(), dependences=()), reason=told, adopted=True,
+    )  # fmt: skip
+    refused = step.model_copy(update={"adopted": False})
+    known = {name: SimpleNamespace(name=name, null=0.0, low=0.0)}
+    current = cast(Any, SimpleNamespace(point=SimpleNamespace(model=SimpleNamespace(by_name=known))))
+    monkeypatch.setattr(last_fit, "moved_by_noise", lambda *_: 0.0)
+    monkeypatch.setattr(last_fit, "found_values", lambda _o, _c, own, _m: {p.name: last for p in own})
+    _, steps = as_last_fitted(cast(Any, None), current, [step, refused])
+    assert steps[0].parameters == {name: last}
+    assert steps[0].reason == told.replace("0.747 V (0.724 to 0.77)", "0.748 V (0.673 to 0.822)")
+    assert steps[1] == refused
 
 
 @pytest.mark.parametrize(("low", "nothing"), [(1e-7, True), (2e-3, False)])

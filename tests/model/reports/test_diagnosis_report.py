@@ -7,9 +7,10 @@ import re
 import pytest
 
 from model.comparison.compare import Comparison
-from model.discrepancy.answer import Diagnosis, SignalError
+from model.discrepancy.answer import Acquired, Diagnosis, SignalError
 from model.reports.diagnosis_report import diagnosis_page, diagnosis_report
-from model.reports.page import Table, html
+from model.reports.diagnosis_words import TORQUES, compared, gap, gone, headline
+from model.reports.page import Picture, Report, Table, Text, html
 from tests.model.discrepancy.answers import EFFECT, an_answer
 
 
@@ -21,7 +22,7 @@ def answer() -> tuple[Diagnosis, Comparison]:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures cost seconds; what the words say does not need them."""
-    for module in ("diagnosis_pictures", "motion"):
+    for module in ("diagnosis_map", "diagnosis_pictures", "motion", "motion_closer"):
         monkeypatch.setattr(f"model.reports.{module}.drawn", lambda *_: "<svg></svg>")
 
 
@@ -43,8 +44,8 @@ def test_the_page_tells_the_whole_story_in_order(answer: tuple[Diagnosis, Compar
     assert "joint2.coulomb_friction.torque" in text
     assert "98.2 % of the variance beyond noise is gone" in text
     assert "6.4 standard deviations" in text
-    # map, dependences, evidence, errors, two overlays, remaining torque
-    assert page.count("<svg") == 7
+    # map, dependences, evidence, errors, two overlays and a closer look at each, remaining torque
+    assert page.count("<svg") == 9
     assert "<script" not in page
 
 
@@ -65,8 +66,12 @@ def test_errors_stand_beside_the_noise_and_say_how_much_is_gone(answer: tuple[Di
 def test_a_step_that_was_not_taken_says_why(answer: tuple[Diagnosis, Comparison]) -> None:
     found, _ = answer
     step = found.steps[0].model_copy(update={"adopted": False, "rejected_because": "the held-out error rises"})
-    text = words(diagnosis_page(found.model_copy(update={"steps": (step,)})))
+    report = diagnosis_report(found.model_copy(update={"verdict": "unknown-effect", "steps": (step,)}))
+    text = words(html(report))
     assert "Not taken into the model: the held-out error rises." in text
+    assert "What adding it would have done" in [s.title for s in report.sections]
+    assert "Not in the model: what the fit with this effect came to." in text
+    assert "Σλ²" not in text
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -75,7 +80,7 @@ def test_a_group_is_named_as_one_that_cannot_be_told_apart(answer: tuple[Diagnos
     step = found.steps[0]
     grouped = step.model_copy(update={"effect": None, "group": step.candidates[:2]})
     text = words(diagnosis_page(found.model_copy(update={"verdict": "ambiguous", "steps": (grouped,)})))
-    assert "These traces cannot tell apart: coulomb friction, joint 2, stiction, joint 2." in text
+    assert "These traces cannot tell apart: Coulomb friction, joint 2; stiction, joint 2." in text
     assert "What adding it did" not in text
 
 
@@ -86,9 +91,162 @@ def test_an_answer_without_steps_has_a_page(answer: tuple[Diagnosis, Comparison]
         update={"verdict": "nothing-significant", "steps": (), "remaining": (), "next_experiment": None, "holdout": ()}
     )
     text = words(diagnosis_page(bare))
+    assert text.split()[:2] == ["Nothing", "significant"]
     assert "the model explains these traces within their noise" in text
     assert "none: nothing below was judged on other data" in text
     assert EFFECT not in text.split("model after")[0]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_that_nothing_is_significant_is_proved(answer: tuple[Diagnosis, Comparison]) -> None:
+    found, comparison = answer
+    step = found.steps[0]
+    best = step.candidates[0].model_copy(update={"evidence": 3.0})
+    sound = found.model_copy(
+        update={
+            "verdict": "nothing-significant", "steps": (), "remaining": (), "where": step.where, "significant": 10.0,
+            "candidates": (best, *step.candidates[3:]), "rmse_fit": step.rmse_fit, "rmse_holdout": step.rmse_holdout,
+        }
+    )  # fmt: skip
+    report = diagnosis_report(sound, comparison)
+    titles = [s.title for s in report.sections]
+    assert titles[:4] == [
+        "Where they disagree", "What was tried", "Errors beside the noise", "Measured, before and after",
+    ]  # fmt: skip
+    assert all(any(isinstance(b, Picture) for b in s.blocks) for s in report.sections[:4])
+    text = words(html(report))
+    assert (
+        "The best of 5 candidates, Coulomb friction, joint 2, has an evidence of 3; an effect is named from 10." in text
+    )
+    assert "and no effect was added" in text
+    assert "tables above" not in text
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_what_is_left_after_the_steps_has_a_map(answer: tuple[Diagnosis, Comparison]) -> None:
+    found, _ = answer
+    left = found.steps[0].where.model_copy(update={"joint": None, "phase": None, "summary": "no joint is off"})
+    report = diagnosis_report(found.model_copy(update={"where": left, "remaining": ()}))
+    blocks = next(s for s in report.sections if s.title == "What remains").blocks
+    assert blocks[0] == Text("With what was added: no joint is off.", "good")
+    assert isinstance(blocks[1], Picture)
+    assert "What was tried" not in [s.title for s in report.sections]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_the_same_map_is_shown_once(answer: tuple[Diagnosis, Comparison]) -> None:
+    found, _ = answer
+    step = found.steps[0].model_copy(update={"adopted": False})
+    page = words(diagnosis_page(found.model_copy(update={"steps": (step, step), "verdict": "unknown-effect"})))
+    assert page.count("in windows of 0.3 s") == 1
+    assert "As before step 1: nothing was added in between." in page
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_what_was_fitted_and_refused_is_no_promise_of_a_later_step(
+    answer: tuple[Diagnosis, Comparison], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found, _ = answer
+    shown: list[list[tuple[str, bool]]] = []
+
+    def picture(candidates: object, *_: object) -> Picture:
+        shown.append([(c.effect, c.refitted) for c in candidates])  # type: ignore[attr-defined]
+        return Picture("<svg></svg>", "")
+
+    monkeypatch.setattr("model.reports.diagnosis_steps.evidence_picture", picture)
+    step = found.steps[0]
+    refused = step.model_copy(update={"adopted": False})
+    again = step.candidates[0].model_copy(update={"refitted": False})
+    later = step.model_copy(update={"effect": "stiction", "candidates": (again, *step.candidates[1:])})
+    diagnosis_report(found.model_copy(update={"steps": (refused, later)}))
+    assert shown[1] == shown[0][1:]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_what_the_controllers_numbers_prove_has_no_candidates_and_no_errors(
+    answer: tuple[Diagnosis, Comparison],
+) -> None:
+    found, _ = answer
+    step = found.steps[0]
+    zero = tuple(e.model_copy(update={"before": 0.0, "after": 0.0}) for e in step.rmse_fit)
+    proof = step.candidates[0].model_copy(update={"refitted": False, "misfit": None})
+    shown = step.model_copy(
+        update={"rmse_fit": zero, "rmse_holdout": (), "candidates": (proof,), "sum_lambda2_before": None}
+    )
+    text = words(diagnosis_page(found.model_copy(update={"steps": (shown,)})))
+    assert "the recorded numbers of the controller prove it, and nothing was fitted for it." in text
+    assert "probe" not in text
+    assert "noise floor" not in text
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_experiments_that_were_run_are_listed(answer: tuple[Diagnosis, Comparison]) -> None:
+    run = Acquired(experiment="ramp", trace="abc", file="f", outcome="stopped", duration=8.25, reason="tells most")
+    report = diagnosis_report(answer[0].model_copy(update={"acquired": (run,)}))
+    table = next(s for s in report.sections if s.title == "What was run").blocks[0]
+    assert isinstance(table, Table)
+    assert [c.text for c in table.rows[0]] == ["ramp", "8.2 s", "stopped", "abc", "tells most"]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_an_experiment_that_separates_nothing_promises_no_separation(answer: tuple[Diagnosis, Comparison]) -> None:
+    found, _ = answer
+    assert found.next_experiment is not None
+    asked = found.next_experiment.model_copy(update={"separates": (), "predicted_separation": 0.0})
+    text = words(diagnosis_page(found.model_copy(update={"next_experiment": asked})))
+    assert "12.0 s" in text
+    assert "would tell apart" not in text
+    assert "predicted separation" not in text
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_page_about_torques_does_not_speak_of_a_simulation(answer: tuple[Diagnosis, Comparison]) -> None:
+    found, _ = answer
+    step = found.steps[0]
+    errors = tuple(e.model_copy(update={"unit": "N·m"}) for e in step.rmse_fit)
+    torques = found.model_copy(update={"steps": (step.model_copy(update={"rmse_fit": errors, "rmse_holdout": ()}),)})
+    assert compared(torques) is TORQUES
+    report: Report = diagnosis_report(torques)
+    text = words(html(report))
+    assert "measured − simulated" not in text
+    assert "torque that the model needs − torque that was applied" in text
+    assert "There is no overlay" in text
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_what_has_no_clear_shape_is_not_told_as_one(answer: tuple[Diagnosis, Comparison]) -> None:
+    found, _ = answer
+    shape = found.remaining[0]
+    few = shape.model_copy(
+        update={"against": "time", "centres": (1.0, 2.0), "torque": (0.1, 0.2), "deviation": (0.1, 0.1)}
+    )
+    for one, said in ((shape.model_copy(update={"explained": 0.08}), "explains 8 % of what is left there."),
+                      (few.model_copy(update={"explained": 0.64}), "and is known at 2 values only.")):  # fmt: skip
+        text = words(diagnosis_page(found.model_copy(update={"remaining": (one,)})))
+        assert "No clear shape" in text
+        assert said in text
+        assert "--effect-file" not in text
+    nothing = found.model_copy(update={"verdict": "unknown-effect", "remaining": ()})
+    assert "What is left has no shape that these traces show" in words(diagnosis_page(nothing))
+
+
+def test_never_more_than_all_of_it_is_gone(answer: tuple[Diagnosis, Comparison]) -> None:
+    below = SignalError(joint=1, unit="rad", before=10e-3, after=0.9e-3, floor=1e-3)
+    nearly = below.model_copy(update={"after": 1.002e-3, "before": 1.0})
+    assert (gone(below), gone(nearly)) == ("all of it", "99.9 %")
+    step = answer[0].steps[0].model_copy(update={"excess_removed_holdout": 1.002})
+    assert gap(step).endswith("all of the variance beyond noise is gone.")
+
+
+def test_the_headline_is_what_was_found(answer: tuple[Diagnosis, Comparison]) -> None:
+    found, _ = answer
+    assert headline(found) == "Coulomb friction, joint 2, 8.0 N·m (7.8 to 8.2)"
+    grouped = found.steps[0].model_copy(update={"group": found.steps[0].candidates[:2]})
+    undecided = found.model_copy(update={"verdict": "ambiguous", "steps": (grouped,)})
+    assert headline(undecided) == "One of: Coulomb friction, joint 2 or stiction, joint 2"
+    nothing_known = found.model_copy(update={"verdict": "unknown-effect", "steps": ()})
+    assert headline(nothing_known) == "None of the known effects explains what is left"
+    assert diagnosis_report(nothing_known).answer[0].isupper()
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -59,6 +59,13 @@ def test_nothing_is_named_on_a_sound_rig(rig: str) -> None:
     found = diagnosed(rig, {})
     assert found.verdict == "nothing-significant", found.summary
     assert found.model_after.effects == found.model_before.effects
+    assert found.where is not None
+    assert found.where.cells
+    assert found.candidates
+    assert found.significant is not None
+    assert max(c.evidence for c in found.candidates if c.refitted) < found.significant
+    assert [e.joint for e in (*found.rmse_fit, *found.rmse_holdout)] == [1, 1]
+    assert all(e.after <= e.before for e in found.rmse_fit)
 
 
 @pytest.mark.parametrize(

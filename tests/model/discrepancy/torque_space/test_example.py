@@ -68,3 +68,5 @@ def test_a_sliding_axis_names_its_guides_and_its_magnets_and_nothing_else(tmp_pa
     assert found.model_after.parameter("link1.mass").value == pytest.approx(6.0, rel=0.01)
     error = found.steps[-1].rmse_holdout[0]
     assert error.after < 0.05 * found.steps[0].rmse_holdout[0].before
+    value = found.steps[0].parameters["joint1.coulomb_friction.torque"].value
+    assert f"(torque {value:.3g} N)" in found.steps[0].reason, "the reason has the last fit's number too"

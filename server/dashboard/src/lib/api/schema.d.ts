@@ -1676,6 +1676,12 @@ export interface components {
              * @default []
              */
             rmse_holdout?: components["schemas"]["SignalError"][];
+            where?: components["schemas"]["Where"] | null;
+            /**
+             * Candidates
+             * @default []
+             */
+            candidates?: components["schemas"]["TriedEffect"][];
             /**
              * Remaining
              * @default []
@@ -4750,7 +4756,7 @@ export interface components {
         };
         /**
          * Where
-         * @description Where simulation and measurement disagree, before the step: a one-line summary, and the numbers behind it.
+         * @description Where simulation and measurement disagree, of a step before it: a one-line summary, and the numbers behind it.
          */
         Where: {
             /** Joint */

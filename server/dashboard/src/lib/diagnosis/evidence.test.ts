@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import type { DiagnosisStep, TriedEffect } from '../api/types';
-import { evidenceBars } from './evidence';
+import type { DiagnosisData, DiagnosisStep, TriedEffect } from '../api/types';
+import { evidenceBars, turnOf, turnWithoutStep } from './evidence';
 import { viewsOf } from './views';
 import { candidateName, effectName, listed, proper, sentence, verdictTitle } from './words';
 
@@ -31,7 +31,7 @@ const step = (group: TriedEffect[]): DiagnosisStep =>
 
 describe('candidates', () => {
   it('are ranked, with the named one marked and every one explained', () => {
-    const bars = evidenceBars(step([]), 10);
+    const bars = evidenceBars(turnOf(step([])), 10);
     expect(bars.map((one) => [one.name, one.width, one.chosen])).toEqual([
       ['Coulomb friction, joint 2', 1, true],
       ['Stribeck friction, joint 2', 0.8, false],
@@ -42,13 +42,44 @@ describe('candidates', () => {
       'leads by 20 over the next other answer',
       'explains 20 less than the best',
       'explains less than its parameters cost',
-      'a probe promised too little for a fit',
+      'promised by a probe alone, not fitted',
     ]);
   });
 
   it('of a group are all marked', () => {
-    const bars = evidenceBars(step(candidates.slice(0, 2)), 3);
+    const bars = evidenceBars(turnOf(step(candidates.slice(0, 2))), 3);
     expect(bars.map((one) => one.chosen)).toEqual([true, true, false]);
+  });
+});
+
+describe('candidates that are not comparable', () => {
+  it('come after those that were fitted, and set no scale', () => {
+    const probed = tried('stiction', 1, 5000, false);
+    const bars = evidenceBars(turnOf({ ...step([]), candidates: [probed, ...candidates] }), 4);
+    expect(bars.map((one) => [one.name, one.width])).toEqual([
+      ['Coulomb friction, joint 2', 1],
+      ['Stribeck friction, joint 2', 0.8],
+      ['backlash, joint 2', 0],
+      ['stiction, joint 1', 1],
+    ]);
+  });
+});
+
+describe('an answer without a step', () => {
+  const answer = (fields: object): DiagnosisData =>
+    ({ steps: [], candidates: [], significant: 10, ...fields }) as unknown as DiagnosisData;
+
+  it('shows how far its best candidates stay below what is needed', () => {
+    const turn = turnWithoutStep(answer({ candidates: [tried('backlash', 2, 4), tried('stiction', 1, -2)] }));
+    expect(turn === null ? [] : evidenceBars(turn, 9).map((one) => [one.width, one.reason])).toEqual([
+      [0.4, '10 are needed'],
+      [0, 'explains less than its parameters cost'],
+    ]);
+  });
+
+  it('has nothing to show where nothing was tried, or a step was taken', () => {
+    expect(turnWithoutStep(answer({}))).toBeNull();
+    expect(turnWithoutStep(answer({ steps: [step([])], candidates }))).toBeNull();
   });
 });
 

@@ -1,13 +1,13 @@
 /** Candidates as bars of evidence. */
 
-import type { DiagnosisStep, TriedEffect } from '../api/types';
+import type { DiagnosisData, DiagnosisStep, TriedEffect } from '../api/types';
 import { candidateName } from './words';
 
 export interface EvidenceBar {
   name: string;
   joint: number | null;
   evidence: number;
-  /** 0 to 1, of the best. */
+  /** 0 to 1, of the best that was fitted; a probe's promise beyond it is cut off there. */
   width: number;
   misfit: number | null;
   refitted: boolean;
@@ -16,32 +16,58 @@ export interface EvidenceBar {
   reason: string;
 }
 
-/** The best `most` candidates of a step, best first. */
-export function evidenceBars(step: DiagnosisStep, most: number): EvidenceBar[] {
-  const ranked = [...step.candidates].sort((one, other) => other.evidence - one.evidence).slice(0, most);
-  const best = Math.max(1, ranked[0]?.evidence ?? 1);
-  const named = new Set(step.group.map(key));
-  if (step.effect !== null) named.add(key({ effect: step.effect, joints: step.joints }));
-  return ranked.map((one) => ({
+/** What was tried in one turn, and what it led to: an effect, or none. */
+export type Turn = Pick<
+  DiagnosisStep,
+  'candidates' | 'group' | 'effect' | 'joints' | 'evidence' | 'margin'
+> & {
+  /** Evidence from which an effect would have been named; null where one was, or where it is not told. */
+  needed: number | null;
+};
+
+/** The turn of a step. */
+export function turnOf(step: DiagnosisStep): Turn {
+  return { ...step, needed: null };
+}
+
+/** The last turn of a diagnosis that added nothing; null where something was added, or nothing was tried. */
+export function turnWithoutStep(found: DiagnosisData): Turn | null {
+  if (found.steps.length > 0 || found.candidates.length === 0) return null;
+  const { candidates, significant: needed } = found;
+  return { candidates, group: [], effect: null, joints: [], evidence: 0, margin: 0, needed };
+}
+
+/**
+ * The first `most` candidates of a turn: those that were fitted, best first, then those that a probe promises
+ * something of. The two are not comparable: a fit shows what a candidate takes off, a probe what it might.
+ */
+export function evidenceBars(turn: Turn, most: number): EvidenceBar[] {
+  const best = [...turn.candidates].sort((one, other) => other.evidence - one.evidence);
+  const ranked = [...best.filter((one) => one.refitted), ...best.filter((one) => !one.refitted)];
+  const widest = Math.max(1, turn.needed ?? 1, ranked[0]?.evidence ?? 1);
+  const named = new Set(turn.group.map(key));
+  if (turn.effect !== null) named.add(key({ effect: turn.effect, joints: turn.joints }));
+  return ranked.slice(0, most).map((one) => ({
     name: candidateName(one),
     joint: one.joints[0] ?? null,
     evidence: one.evidence,
-    width: Math.max(0, one.evidence) / best,
+    width: Math.min(1, Math.max(0, one.evidence) / widest),
     misfit: one.misfit,
     refitted: one.refitted,
     chosen: named.has(key(one)),
-    reason: reasonOf(one, step, named.has(key(one))),
+    reason: reasonOf(one, turn, named.has(key(one))),
   }));
 }
 
 /** Why a candidate stands where it stands, in one line. */
-function reasonOf(one: TriedEffect, step: DiagnosisStep, chosen: boolean): string {
-  const behind = step.evidence - one.evidence;
-  if (chosen && step.group.length > 1) return 'these traces cannot tell it from the others of its group';
-  if (chosen) return `leads by ${Math.round(step.margin)} over the next other answer`;
-  if (!one.refitted) return 'a probe promised too little for a fit';
+function reasonOf(one: TriedEffect, turn: Turn, chosen: boolean): string {
+  if (chosen && turn.group.length > 1) return 'these traces cannot tell it from the others of its group';
+  if (chosen) return `leads by ${Math.round(turn.margin)} over the next other answer`;
+  if (!one.refitted) return 'promised by a probe alone, not fitted';
   if (one.evidence <= 0) return 'explains less than its parameters cost';
-  return `explains ${Math.round(behind)} less than the best`;
+  if (turn.needed !== null && one.evidence < turn.needed) return `${Math.round(turn.needed)} are needed`;
+  if (turn.effect === null) return 'not taken';
+  return `explains ${Math.round(turn.evidence - one.evidence)} less than the best`;
 }
 
 function key(one: { effect: string; joints: readonly number[] }): string {

@@ -12,7 +12,7 @@ export const PHASE_NAMES: Record<Phase, string> = {
   ramp_start: 'start',
   steady_ramp: 'steady',
   reversal: 'reversal',
-  creep: 'slow',
+  creep: 'creep',
   hold: 'hold',
 };
 

@@ -1,0 +1,146 @@
+"""Sections of a diagnosis's page about one step, and their blocks: where, what, and what adding it did."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from model.discrepancy.answer import Candidate, Dependence, FoundValue, SignalError, Step, Where
+from model.reports.diagnosis_map import dependence_picture, map_picture
+from model.reports.diagnosis_pictures import error_picture, evidence_picture
+from model.reports.diagnosis_words import Compared, distortion, gap, gone, proved
+from model.reports.effect_names import capitalised, placed
+from model.reports.numbers import column, estimate
+from model.reports.page import Block, Cell, Section, Table, Text, cells
+from model.reports.units import shown_unit, with_unit
+
+WITHOUT_AND_WITH = "without the effect", "with it"
+"""Errors of a step; the tolerance parameters are fitted both times."""
+
+
+def step_sections(number: int, steps: Sequence[Step], of: Compared) -> list[Section]:
+    """What a step, counted from 1, says. Where nothing was added by the step before it, its map is the same."""
+    step, before = steps[number - 1], steps[: number - 1]
+    turn = f"Step {number}: " if len(steps) > 1 else ""
+    if before and before[-1].where == step.where:
+        where: tuple[Block, ...] = (Text(f"As before step {number - 1}: nothing was added in between.", "quiet"),)
+    else:
+        where = where_blocks(step.where, step.rmse_fit, of)
+    found = [Section(f"{turn}where they disagree", where)]
+    found.append(Section(f"{turn}{'what is missing' if step.adopted else 'what was tried'}", _what(step, before)))
+    if step.effect is not None and step.adopted:
+        found.append(Section(f"{turn}what adding it did", _shown(step, of)))
+    elif step.effect is not None:
+        found.append(Section(f"{turn}what adding it would have done", _refused(step, of)))
+    return [Section(capitalised(s.title), s.blocks) for s in found]
+
+
+def where_blocks(where: Where, errors: Sequence[SignalError], of: Compared) -> tuple[Block, ...]:
+    """The place in words, the map of every trace, what the residual goes with, and what would have to move."""
+    blocks: list[Block] = [Text(f"{capitalised(where.summary)}.", "plain" if where.joint is None else "warning")]
+    if where.cells:
+        blocks.append(Text(of.errors, "quiet"))
+        blocks += [map_picture(where, of.residual, trace) for trace in sorted({c.trace for c in where.cells})]
+    joint = where.joint if where.joint is not None else _most_dependent(where.dependences)
+    unit = next((e.unit for e in errors if e.joint == joint), "rad")
+    if joint is not None and (picture := dependence_picture(where, joint, of.residual, unit)) is not None:
+        blocks.append(picture)
+    if where.moving:
+        blocks.append(_moving(where))
+    return tuple(blocks)
+
+
+def _most_dependent(dependences: Sequence[Dependence]) -> int | None:
+    return max(dependences, key=lambda d: d.significance).joint if dependences else None
+
+
+def _moving(where: Where) -> Table:
+    ranges = [f"{v} %" for v in column([100 * m.relative_range for m in where.moving], digits=2)]
+    rows = tuple(
+        (
+            Cell(m.parameter), Cell(told, number=True),
+            Cell("–" if m.moves_with is None else f"{m.moves_with} ({m.correlation:+.2f})"),
+        )
+        for m, told in zip(where.moving, ranges, strict=True)
+    )  # fmt: skip
+    return Table(
+        ("parameter", "would have to range over", "and moves with"), rows,
+        "The distortion method in time: which parameter alone, moving with time, would explain most, and what it would "
+        "move with (correlation; a dash: with nothing). A parameter that moves with something stands for a term that "
+        "the model lacks.",
+    )  # fmt: skip
+
+
+def _what(step: Step, before: Sequence[Step]) -> tuple[Block, ...]:
+    blocks: list[Block] = [Text(f"{capitalised(step.reason).rstrip('.')}.")]
+    chosen = list(step.group)
+    if step.effect is not None:
+        chosen.append(Candidate(effect=step.effect, joints=step.joints, evidence=step.evidence))
+    refused = {(s.effect, s.joints) for s in before if not s.adopted}  # fitted and refused, so no promise any more
+    candidates = [c for c in step.candidates if c.refitted or (c.effect, c.joints) not in refused]
+    if candidates and not proved(step):
+        blocks.append(evidence_picture(candidates, chosen))
+    if step.group:
+        told = "; ".join(placed(c.effect, c.joints) for c in step.group)
+        blocks.append(Text(f"These traces cannot tell apart: {told}.", "warning"))
+    return tuple(blocks)
+
+
+def _shown(step: Step, of: Compared) -> tuple[Block, ...]:
+    blocks: list[Block] = [Text(gap(step), "good")]
+    if step.parameters:
+        caption = "As the record has it." if proved(step) else "As the last fit has them."
+        blocks.append(_parameters(step.parameters, caption))
+    if proved(step):
+        return tuple(blocks)
+    blocks += error_blocks(step.rmse_fit, step.rmse_holdout, of, *WITHOUT_AND_WITH)
+    if step.sum_lambda2_before is not None and step.sum_lambda2_after is not None:
+        blocks.append(Text(distortion(step.sum_lambda2_before, step.sum_lambda2_after)))
+    return tuple(blocks)
+
+
+def _refused(step: Step, of: Compared) -> tuple[Block, ...]:
+    because = step.rejected_because or "it did not lower the held-out error"
+    blocks: list[Block] = [Text(f"Not taken into the model: {because}.", "warning")]
+    if step.parameters:
+        blocks.append(_parameters(step.parameters, "Not in the model: what the fit with this effect came to."))
+    return (*blocks, *error_blocks(step.rmse_fit, step.rmse_holdout, of, *WITHOUT_AND_WITH))
+
+
+def _parameters(parameters: dict[str, FoundValue], caption: str) -> Table:
+    rows = []
+    for name, v in parameters.items():
+        value, interval = estimate(v.value, v.low, v.high)
+        told = "not bounded by these traces" if interval is None else interval
+        rows.append((Cell(name), Cell(value, number=True), Cell(told, number=True), Cell(v.unit)))
+    return Table(("parameter", "value", "95 % interval", "unit"), tuple(rows), caption)
+
+
+def error_blocks(
+    fit: Sequence[SignalError], held: Sequence[SignalError], of: Compared, before: str, after: str
+) -> tuple[Block, ...]:
+    """Picture and table of errors before and after; what these two are, in words."""
+    if not fit and not held:
+        return ()
+    told = [("fitted to", e) for e in fit] + [("held out", e) for e in held]
+    sizes = _sizes([e for _, e in told])
+    rows = tuple((Cell(kind), *cells(str(e.joint), *own, gone(e))) for (kind, e), own in zip(told, sizes, strict=True))
+    caption = (
+        f"Root mean square of {of.residual}, {before} and {after}. "
+        f"{of.errors} Gone: share of the variance beyond noise that was taken off; a dash where there was hardly any. "
+        "An error may lie a little below the noise floor: the floor is what noise leaves on the average, and the noise "
+        "of one record may be less."
+    )
+    table = Table(("traces", "joint", before, after, "noise floor", "gone"), rows, caption)
+    return error_picture(fit, held, of.residual), table
+
+
+def _sizes(errors: Sequence[SignalError]) -> list[tuple[str, ...]]:
+    """Before, after and floor of each, with the same decimals for all of one unit."""
+    found: dict[int, tuple[str, ...]] = {}
+    for unit in dict.fromkeys(e.unit for e in errors):
+        factor, shown = shown_unit(unit)
+        own = [k for k, e in enumerate(errors) if e.unit == unit]
+        texts = column([factor * v for k in own for v in (errors[k].before, errors[k].after, errors[k].floor)])
+        for place, k in enumerate(own):
+            found[k] = tuple(with_unit(text, shown) for text in texts[3 * place : 3 * place + 3])
+    return [found[k] for k in range(len(errors))]

@@ -1,0 +1,65 @@
+"""A closer look at the stretch of a trace where a simulation and the measurement differ most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.comparison.compare import TraceSignals
+from model.reports.figures import INK, MODEL_COLOURS, QUIET, baseline, drawn, panels
+from model.reports.page import Picture
+from model.reports.units import shown_unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+
+STRETCH = 4.0
+"""s that are shown."""
+
+
+def stretch_of_most(residual: Floats, period: float) -> tuple[slice, int]:
+    """The samples and the column in which `STRETCH` of a residual (m, n) has the largest sum of squares."""
+    size = min(len(residual), max(2, round(STRETCH / period)))
+    sums = np.cumsum(np.vstack([np.zeros(residual.shape[1]), residual**2]), axis=0)
+    squares = sums[size:] - sums[:-size]
+    begin, column = np.unravel_index(int(np.argmax(squares)), squares.shape)
+    return slice(int(begin), int(begin) + size), int(column)
+
+
+def closer_picture(one: TraceSignals, labels: Sequence[str]) -> Picture | None:
+    """Position and residual of one joint there; None where the first simulation does not stay finite."""
+    left = one.measured - one.simulated[0]
+    if len(one.time) < 2 or not np.isfinite(left).all():
+        return None
+    window, column = stretch_of_most(left, float(np.median(np.diff(one.time))))
+    factor, unit = shown_unit(one.units[column])
+    time = one.time[window]
+
+    def draw(figure: Figure) -> None:
+        above, below = panels(figure, 1, 2, sharex=True)[0]
+        if one.set_point is not None:
+            above.plot(time, one.set_point[window, column] * factor, color=QUIET, lw=0.9, ls=(0, (4, 2)),
+                       drawstyle="steps-post", label="set point")  # fmt: skip
+        baseline(below)
+        for place, (label, simulated) in enumerate(zip(labels, one.simulated, strict=True)):
+            colour = MODEL_COLOURS[place % len(MODEL_COLOURS)]
+            above.plot(time, simulated[window, column] * factor, color=colour, lw=1.3, label=label)
+            below.plot(time, (one.measured - simulated)[window, column] * factor, color=colour, lw=0.8)
+        above.plot(time, one.measured[window, column] * factor, color=INK, lw=0.7, label="measured")
+        for axes, what in ((above, "position" if not unit.endswith("/s") else "speed"), (below, "residual")):
+            axes.set_ylabel(f"{what} / {unit}")
+            axes.set_xlabel("time / s")
+            axes.margins(x=0.01)
+        above.set_title(f"joint {one.joints[column]}")
+        figure.legend(*above.get_legend_handles_labels(), loc="outside upper right", ncols=len(labels) + 2)
+
+    return Picture(
+        drawn(draw, 2.2),
+        f'{one.trace}, joint {one.joints[column]}, {time[0]:.1f} to {time[-1]:.1f} s: where "{labels[0]}" is '
+        "furthest off. Left: measured, set point and simulated. Right: measured − simulated.",
+    )

@@ -1,0 +1,42 @@
+"""Numbers as a column or an interval shows them: with the same decimals throughout."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+MOST_DECIMALS = 8
+
+
+def decimals(size: float, digits: int) -> int:
+    """Decimals that show so many digits of a size; none where it is 0 or not finite."""
+    if size == 0.0 or not math.isfinite(size):
+        return 0
+    return min(MOST_DECIMALS, max(0, digits - 1 - math.floor(math.log10(abs(size)))))
+
+
+def column(values: Sequence[float], digits: int = 3) -> list[str]:
+    """Numbers of one unit with the same decimals: so many digits of the smallest, or one less where the largest has
+    more digits than that without it."""
+    sizes = [abs(v) for v in values if v]
+    least, largest = (decimals(f(sizes, default=0.0), digits) for f in (min, max))
+    places = min(least, max(largest + 1, least - 1))
+    return [f"{v:.{places}f}" for v in values]
+
+
+def estimate(value: float, low: float | None, high: float | None, digits: int = 2) -> tuple[str, str | None]:
+    """A value and its interval, to so many digits of the interval's half width; no interval where there is none."""
+    if low is None or high is None:
+        return fixed(value, decimals(value, 3)), None
+    places = decimals((high - low) / 2.0, digits)
+    return fixed(value, places), f"{fixed(low, places)} to {fixed(high, places)}"
+
+
+def fixed(value: float, places: int) -> str:
+    """A number with so many decimals, with the minus sign that print has, and never −0."""
+    return f"{round(value, places) + 0.0:.{places}f}".replace("-", "−")
+
+
+def whole(value: float) -> str:
+    """A number without decimals."""
+    return fixed(value, 0)
