@@ -7,8 +7,8 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from daq.cli.diagnosis_candidates import best_of, candidates_lines, effect_on
+from model.discrepancy.clear_shape import clear_shape
 from model.discrepancy.notes import is_warning
-from model.discrepancy.remaining import clear_shape
 from model.reports.units import shown_unit
 
 if TYPE_CHECKING:

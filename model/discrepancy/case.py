@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from daq.contracts.trace import Trace
 from model.discrepancy.answer import RemainingShape, SignalError, Where
 from model.discrepancy.excess import excess_removed
+from model.discrepancy.following import FOLLOWING_FOR_ERRORS
 from model.discrepancy.holdout import HeldOut, errors
 from model.discrepancy.noise_floor import noise_floor
-from model.discrepancy.observation import FOLLOWING_FOR_ERRORS, Observation, Signals
+from model.discrepancy.observation import Observation, Signals
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.refitting import Refitted
 from model.discrepancy.remaining import shapes

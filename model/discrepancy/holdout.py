@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from daq.contracts.trace import Trace
 from model.discrepancy.answer import SignalError
+from model.discrepancy.following import FOLLOWING_FOR_ERRORS
 from model.discrepancy.noise_floor import noise_floor
-from model.discrepancy.observation import FOLLOWING_FOR_ERRORS, Observation, Signals, observed
+from model.discrepancy.observation import Observation, Signals, observed
 from model.discrepancy.search import Point, point_at, searched
 from model.fitting.simulated import INITIAL
 from model.fitting.unknowns import Unknown

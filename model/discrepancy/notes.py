@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
 from daq.contracts.trace import Trace
-from model.discrepancy.observation import FOLLOWING_FOR_ERRORS
+from model.discrepancy.following import FOLLOWING_FOR_ERRORS
 
 NOTHING_HELD_OUT = "no held-out trace was given: nothing here has been shown on data it was not fitted to"
 ERRORS_FOLLOW = (

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
+from model.discrepancy.following import FOLLOWING
 from model.fitting.fit import fit_problem
 from model.fitting.options import FitOptions
 from model.fitting.records import Record
@@ -33,12 +34,6 @@ Floats = NDArray[np.float64]
 Signals = tuple[Floats, ...]
 """One array (m, n) a record."""
 
-FOLLOWING = 0.8
-"""Share of the way to the recorded reading that the simulated controller is given where models are fitted and
-compared. More finds less, for the laws of an arm are never exactly a model's, and a torque that is a little wrong adds
-up; with less, what noise has moved looks like torque."""
-FOLLOWING_FOR_ERRORS = 0.5
-"""The same where errors are told and judged, held-out ones above all: nearer to what the model alone would do."""
 STEP, COARSE_STEP = 2e-3, 7e-3
 """s; longest step of integration: ten a control period of 20 ms, and three for derivatives and probes, which are
 differences and need no more. With longer ones than the first a delay explains an inductance as well."""

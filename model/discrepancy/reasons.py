@@ -9,12 +9,12 @@ import numpy as np
 
 from daq.contracts.errors import SpecError
 from model.discrepancy.answer import Candidate, FoundValue, RemainingShape, SignalError, Step, Where
+from model.discrepancy.clear_shape import CLEAR_SHAPE, FEWEST_BINS, clear_shape, filled_bins
 from model.discrepancy.excess import LEAST_EXCESS
 from model.discrepancy.reasons_numbers import Spoken, from_to, plain
 from model.discrepancy.reasons_observations import Observation
 from model.discrepancy.reasons_samples import Left, Motions, Samples, motions
 from model.discrepancy.reasons_table import telling
-from model.discrepancy.remaining import CLEAR_SHAPE, FEWEST_BINS, clear_shape, filled_bins
 from model.discrepancy.where import spoken_unit
 from model.discrepancy.where_dependence import drive_units
 from model.fitting.records import Record, Signal, resolution

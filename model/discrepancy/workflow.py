@@ -24,12 +24,13 @@ from model.discrepancy.controller_check import (
 )
 from model.discrepancy.decision import Added, decide
 from model.discrepancy.estimates import listed, only_probed
+from model.discrepancy.following import FOLLOWING_FOR_ERRORS
 from model.discrepancy.holdout import HeldOut, held_out
 from model.discrepancy.last_fit import as_last_fitted
 from model.discrepancy.next_experiment import Asked, Asker, rivals_of
 from model.discrepancy.noise_floor import noise_floor
 from model.discrepancy.notes import ERRORS_FOLLOW, NOTHING_HELD_OUT, on_tolerances, on_unfinished, on_what_is_stated
-from model.discrepancy.observation import FOLLOWING_FOR_ERRORS, Observation, observed
+from model.discrepancy.observation import Observation, observed
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.probing import Probed
 from model.discrepancy.proved import proved_step

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from model.comparison.compare import Comparison
 from model.discrepancy.answer import Acquired, Diagnosis, NextExperiment, RemainingShape, Step
 from model.discrepancy.candidate_order import in_order
-from model.discrepancy.remaining import FEWEST_BINS, clear_shape, filled_bins
+from model.discrepancy.clear_shape import FEWEST_BINS, clear_shape, filled_bins
 from model.reports.diagnosis_map import map_picture
 from model.reports.diagnosis_pictures import evidence_picture, remaining_picture
 from model.reports.diagnosis_steps import error_blocks, step_sections, where_blocks

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from model.discrepancy.answer import AgainstWhat, RemainingShape
+from model.discrepancy.clear_shape import CLEAR_SHAPE, clear_shape
 from model.discrepancy.phases import asked_motion
-from model.discrepancy.remaining import CLEAR_SHAPE, clear_shape, shapes, torque_of
+from model.discrepancy.remaining import shapes, torque_of
 from model.fitting.records import Record, noise_floor, records_of
 from model.machine_model.model import Model
 from model.simulation.simulate import Options, simulate
