@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from daq.contracts.errors import TraceError
+from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
@@ -183,13 +183,24 @@ def _given(observation: Observation, model: Model, unknowns: Sequence[Unknown]) 
 
 def _tolerances(observation: Observation, given: Point) -> Point:
     """The tolerance parameters fitted to the end: what they leave undone would look like an effect. In closed loop
-    first, where a model that is far off does not run away from the record."""
+    first, where a model that is far off does not run away from the record; from where that came to the brink of
+    instability, as a strong effect can bring it, from the model as it was given."""
     near = given
     for share in NEARER:
-        here = observation.following(share)
-        near = searched(here, point_at(here, near.model, near.unknowns, near.values), FIRST_STEPS)
-    begun = point_at(observation, near.model, near.unknowns, near.values)
-    return settled(observation, searched(observation, begun, FIRST_STEPS), LAST_STEPS)
+        near = _followed(observation.following(share), near) or near
+    begun = _followed(observation, near) or _followed(observation, given)
+    if begun is None:
+        raise SpecError("the simulation does not stay finite: the loop is unstable")
+    return settled(observation, begun, LAST_STEPS)
+
+
+def _followed(observation: Observation, point: Point) -> Point | None:
+    """Where a search from a point's values leads; None where no simulation there stays finite."""
+    try:
+        begun = point_at(observation, point.model, point.unknowns, point.values)
+        return searched(observation, begun, FIRST_STEPS) if np.isfinite(begun.weighted).all() else None
+    except SpecError:
+        return None
 
 
 def _searched(case: Case, begun: Judged, progress: Progress, cancel: Cancel) -> _Found:
