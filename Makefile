@@ -75,15 +75,24 @@ distclean: clean ## the same, and .venv
 
 # ---- the virtual environment
 
-$(FOR_USE): requirements.txt pyproject.toml | $(BIN)/pip
+# uv installs in a seventh of pip's time. It does not read pip's configuration, so that where packages come from a place
+# that only pip is told of, pip takes its turn.
+INSTALL = $(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes --requirement $(1) \
+	|| { echo "uv could not install them; trying pip"; $(PIP) install --require-hashes --requirement $(1); }
+
+$(FOR_USE): requirements.txt pyproject.toml | $(BIN)/uv
 	@echo "Installing the pinned requirements into .venv"
-	@$(PIP) install --require-hashes --requirement requirements.txt
+	@$(call INSTALL,requirements.txt)
 	@$(PIP) install --no-deps --no-build-isolation --editable .
 	@touch $@
 
 $(FOR_DEVELOPMENT): requirements-dev.txt $(FOR_USE)
 	@echo "Installing the pinned requirements of development into .venv"
-	@$(PIP) install --require-hashes --requirement requirements-dev.txt
+	@$(call INSTALL,requirements-dev.txt)
+	@touch $@
+
+$(BIN)/uv: requirements-installer.txt | $(BIN)/pip
+	@$(PIP) install --require-hashes --requirement requirements-installer.txt
 	@touch $@
 
 # ensurepip writes pip last: a .venv whose making was interrupted, or that uv made, has none and is made again.
@@ -97,9 +106,10 @@ $(BIN)/pip:
 
 UPGRADE ?=
 COMPILE = $(BIN)/uv pip compile --quiet $(UPGRADE) --universal --python-version 3.11 --generate-hashes \
-	--no-emit-index-url --custom-compile-command "make requirements" pyproject.toml --group build
+	--no-emit-index-url --custom-compile-command "make requirements"
 
 requirements: $(FOR_DEVELOPMENT) ## pin what pyproject.toml asks for (UPGRADE=--upgrade: the newest of everything)
-	@$(COMPILE) --output-file requirements.txt
-	@$(COMPILE) --group dev --constraint requirements.txt --output-file requirements-dev.txt
+	@$(COMPILE) --group installer --output-file requirements-installer.txt
+	@$(COMPILE) pyproject.toml --group build --output-file requirements.txt
+	@$(COMPILE) pyproject.toml --group build --group dev --constraint requirements.txt --output-file requirements-dev.txt
 	@$(MAKE) --no-print-directory $(FOR_DEVELOPMENT)

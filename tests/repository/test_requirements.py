@@ -11,7 +11,12 @@ from tests.repository.tracked import ROOT
 
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 FOR_USE = [*PYPROJECT["project"]["dependencies"], *PYPROJECT["dependency-groups"]["build"]]
-FOR_DEVELOPMENT = [*FOR_USE, *PYPROJECT["dependency-groups"]["dev"]]
+FOR_INSTALLING = PYPROJECT["dependency-groups"]["installer"]
+FOR_DEVELOPMENT = [
+    *FOR_USE,
+    *FOR_INSTALLING,
+    *(line for line in PYPROJECT["dependency-groups"]["dev"] if line != {"include-group": "installer"}),
+]
 
 
 def pinned(name: str) -> dict[str, list[tuple[str, int]]]:
@@ -29,8 +34,12 @@ def pinned(name: str) -> dict[str, list[tuple[str, int]]]:
 
 @pytest.mark.parametrize(
     ("name", "asked"),
-    [("requirements.txt", FOR_USE), ("requirements-dev.txt", FOR_DEVELOPMENT)],
-    ids=["for use", "for development"],
+    [
+        ("requirements-installer.txt", FOR_INSTALLING),
+        ("requirements.txt", FOR_USE),
+        ("requirements-dev.txt", FOR_DEVELOPMENT),
+    ],
+    ids=["for installing", "for use", "for development"],
 )
 def test_each_direct_dependency_is_pinned_to_versions_that_pyproject_allows(name: str, asked: list[str]) -> None:
     pins = pinned(name)
@@ -42,16 +51,17 @@ def test_each_direct_dependency_is_pinned_to_versions_that_pyproject_allows(name
         )
 
 
-@pytest.mark.parametrize("name", ["requirements.txt", "requirements-dev.txt"])
+@pytest.mark.parametrize("name", ["requirements-installer.txt", "requirements.txt", "requirements-dev.txt"])
 def test_each_pin_has_a_hash(name: str) -> None:
     assert [package for package, pins in pinned(name).items() for _, hashes in pins if hashes == 0] == []
 
 
-def test_users_and_developers_get_the_same_versions() -> None:
+@pytest.mark.parametrize("name", ["requirements-installer.txt", "requirements.txt"])
+def test_users_and_developers_get_the_same_versions(name: str) -> None:
     for_development = {
         package: {version for version, _ in pins} for package, pins in pinned("requirements-dev.txt").items()
     }
-    for package, pins in pinned("requirements.txt").items():
+    for package, pins in pinned(name).items():
         assert {version for version, _ in pins} == for_development[package]
 
 
