@@ -14,9 +14,7 @@ WORKERS ?= -n 2 --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-# Also with -j: `lint` and `page` both install the page's packages, into the same folder.
-.NOTPARALLEL:
-.PHONY: help serve demo page test test-all lint format types requirements bench clean distclean
+.PHONY: help serve demo page test test-all lint lint-python lint-page format types requirements bench clean distclean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -28,22 +26,25 @@ serve: $(FOR_USE) ## the dashboard and the service, on the mock controller unles
 demo: $(FOR_USE) ## record a ramp-step on joints 1-3 of the mock controller, and show it
 	@$(BIN)/daq demo
 
-page: $(FOR_USE) ## build the dashboard's page where it is out of date
+page: | $(FOR_USE) ## build the dashboard's page where it is out of date
 	@$(BIN)/python hatch_build.py
 
-test: lint page ## lint, types, import contracts, then the tests
+test: lint ## lint, types, import contracts, then the tests
 	@echo "== tests of the page's modules"
 	@$(BIN)/python hatch_build.py test
 	@echo "== tests"
 	@$(BIN)/python -m pytest -q $(WORKERS) -m "not slow"
 
-test-all: lint page ## the same, with the slow tests
+test-all: lint ## the same, with the slow tests
 	@echo "== tests of the page's modules"
 	@$(BIN)/python hatch_build.py test
 	@echo "== tests, the slow ones too"
 	@$(BIN)/python -m pytest -q $(WORKERS)
 
-lint: $(FOR_DEVELOPMENT) ## lint, format, types and import contracts, without the tests
+lint: $(FOR_DEVELOPMENT) page ## lint, format, types and import contracts, without the tests
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target lint-python lint-page
+
+lint-python: $(FOR_DEVELOPMENT)
 	@echo "== lint"
 	@$(BIN)/ruff check --quiet
 	@echo "== format"
@@ -52,6 +53,9 @@ lint: $(FOR_DEVELOPMENT) ## lint, format, types and import contracts, without th
 	@$(BIN)/mypy --no-error-summary
 	@echo "== import contracts"
 	@$(BIN)/lint-imports >.venv/import-contracts.log 2>&1 || { cat .venv/import-contracts.log; exit 1; }
+
+# After the page, for both install its packages, into the same folder.
+lint-page: page
 	@echo "== page"
 	@$(BIN)/python hatch_build.py check
 
