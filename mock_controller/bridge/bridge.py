@@ -102,7 +102,7 @@ class Bridge:
         self._session = Session()
         self._advances = AdvanceOrder()
         self._next_number = first_number
-        self._newest_stop = 0
+        self._newest_stop = self._fresh() if self._board.frozen else 0
         self._sample: _WaitingSample | None = None
         self._advance: _WaitingAdvance | None = None
         self._boots_greeted = 0
