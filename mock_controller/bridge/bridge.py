@@ -89,12 +89,15 @@ class Bridge:
     `first_number` is where the numbers of sessions and stops begin, which are to be others at every start.
     """
 
+    routines: type[MemoryRoutines] = MemoryRoutines
+    """How the memory is accessed."""
+
     def __init__(
         self, timeline: Timeline, *, sees_period: bool = True, lock_step: bool = False, first_number: int = 1
     ) -> None:
         self._timeline = timeline
         self._board = timeline.board
-        self._routines = MemoryRoutines(timeline, sees_period)
+        self._routines = self.routines(timeline, sees_period)
         self._sees_period = sees_period
         self._lock_step = lock_step
         capable = {Sample.OPCODE: sees_period, Advance.OPCODE: lock_step}

@@ -121,7 +121,15 @@ class MemoryRoutines:
             before = positions
 
     def _read_positions(self) -> tuple[int, ...]:
-        return tuple(self._value("position", index) for index in range(JOINTS))
+        """Positions (ADC counts) from one reading of the memory: they may be torn."""
+        register = self._map["position"]
+        first, last = min(register.addresses), max(register.addresses)
+        block = self._read(first, last - first + 1)
+        highs = register.high or register.low
+        return tuple(
+            register.decode(block[low - first], block[high - first] if register.high else 0)
+            for low, high in zip(register.low, highs, strict=True)
+        )
 
     def gains(self) -> Reply:
         """PID gains of all joints."""
