@@ -23,7 +23,7 @@ from firmware_protocol.commands import (
     to_frame,
 )
 from firmware_protocol.dialect import FramedDialect
-from firmware_protocol.framing import FrameDecoder, encode_frame
+from firmware_protocol.framing import HEADER, FrameDecoder, encode_frame, unstuff
 
 starts = st.integers(0, 0xFFFF)
 numbers = st.integers(1, 0xFFFFFFFF)
@@ -132,6 +132,24 @@ def test_commands_are_stamped_with_the_session_and_counted_in_it() -> None:
     assert next(stamped) == Stamp(71, 1)
     dialect.reset()
     assert next(stamped) == UNSTAMPED, "a new connection has no session"
+
+
+def test_all_sequence_numbers_come_round_and_no_command_becomes_new_again() -> None:
+    dialect, session = FramedDialect(), greeted(number=70)
+    conversation(dialect, 7, 70)
+    request, commands = SetGripper(1), []
+    for sequence in range(0x10000):
+        line = dialect.encode(sequence, request)
+        commands.append(line)
+        assert session.judge(stamp_in(line)) is Arrival.NEW
+    for sequence, recorded in enumerate(commands[::509]):
+        assert session.judge(stamp_in(recorded)) is Arrival.STALE
+        assert session.judge(stamp_in(dialect.encode(sequence, request))) is Arrival.NEW
+
+
+def stamp_in(line: bytes) -> Stamp:
+    """Read from the line's bytes, without the CRC that other tests check."""
+    return Stamp.parse(unstuff(line[1:-1])[HEADER:])
 
 
 def test_a_recorded_answer_to_a_greeting_begins_no_session() -> None:
