@@ -69,10 +69,12 @@ class AdvanceOrder:
         self._number: int | None = None
 
     def judge(self, sequence: int, request: Request) -> Arrival:
-        """What to do with a request that has just arrived; of those that are no `Advance` only the number counts."""
+        """What to do with a request that has just arrived; of those that let no time pass only the number counts."""
         if isinstance(request, Hello):
             self._number = None
             return Arrival.NEW
+        if isinstance(request, Advance) and request.microseconds == 0:
+            return Arrival.AGAIN  # asks for the time
         ahead = 0 if self._number is None else (sequence - self._number) & 0xFFFF
         if not isinstance(request, Advance):
             if WINDOW < ahead < 0x8000:

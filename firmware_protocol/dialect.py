@@ -87,7 +87,8 @@ class FramedDialect:
         """Takes the session of a greeting's first answer; a later one may be of a greeting that was only delayed."""
         if reply.session != NO_SESSION and reply.nonce == self._greeted_with:
             self._greeted_with = None
-            self._last = Stamp(reply.session, 0)
+            if reply.session != self._last.session:
+                self._last = Stamp(reply.session, 0)
 
     def reset(self) -> None:
         """Forgets an unfinished frame and the session; counters stay."""

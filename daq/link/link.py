@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable
@@ -17,7 +18,18 @@ from daq.link.timed_exchange import TimedExchange
 from daq.link.timing import CLEAN_TRANSACTIONS, LinkTiming
 from daq.link.turn_exchange import TurnExchange
 from daq.transport import Endpoint, ReconnectDelay, TransportError, open_endpoint
-from firmware_protocol.commands import PROTOCOL_VERSION, Hello, HelloReply, Refused, Reply, Request, Stop, Stopped
+from firmware_protocol.commands import (
+    PROTOCOL_VERSION,
+    Advance,
+    Advanced,
+    Hello,
+    HelloReply,
+    Refused,
+    Reply,
+    Request,
+    Stop,
+    Stopped,
+)
 from firmware_protocol.dialect import FramedDialect, LinkDialect
 
 R = TypeVar("R", bound=Reply)
@@ -48,7 +60,7 @@ class Link:
     number until it is answered or its budget is used up, and then the link is lost. `stop` goes ahead of everything
     that is not yet written.
 
-    `chance` draws the first sequence number and the nonces of greetings.
+    `chance` draws the first sequence number and, but on the bench, the nonces of greetings.
     """
 
     def __init__(
@@ -58,7 +70,7 @@ class Link:
         now: Callable[[], float] = time.monotonic,
         chance: Random | None = None,
     ) -> None:
-        # On the bench a run repeats to the bit; there the end of a connection ends the session.
+        # On the bench a run repeats to the bit.
         self._chance = chance or (Random(0) if endpoint.lock_step else SystemRandom())
         self.tally = Tally()
         self._endpoint = endpoint
@@ -153,7 +165,14 @@ class Link:
 
         Raises RequestRefusedError by a controller of version 1, LinkTimeoutError, LinkLostError.
         """
-        return self.request(Hello(PROTOCOL_VERSION, self._chance.getrandbits(32)), HelloReply)
+        return self.request(Hello(PROTOCOL_VERSION, self._nonce()), HelloReply)
+
+    def _nonce(self) -> int:
+        """Another one for each greeting. On the bench a run repeats to the bit: there it is the bench's own time."""
+        if self.lock_step:
+            with contextlib.suppress(RequestRefusedError):
+                return self.request(Advance(0), Advanced).time_us & 0xFFFFFFFF
+        return self._chance.getrandbits(32)
 
     def stop(self) -> Stopped:
         """Freezes the arm. Written twice at once, ahead of all that waits. Raises LinkTimeoutError, LinkLostError."""

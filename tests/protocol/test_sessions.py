@@ -130,6 +130,8 @@ def test_commands_are_stamped_with_the_session_and_counted_in_it() -> None:
     assert next(stamped) == Stamp(70, 4)
     conversation(dialect, 8, 71)
     assert next(stamped) == Stamp(71, 1)
+    conversation(dialect, 8, 71)
+    assert next(stamped) == Stamp(71, 2), "a repeated greeting begins nothing"
     dialect.reset()
     assert next(stamped) == UNSTAMPED, "a new connection has no session"
 

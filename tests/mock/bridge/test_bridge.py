@@ -288,3 +288,5 @@ def test_an_advance_lets_time_pass_once(host: LockStepHost) -> None:
     assert host.ask(Advance(123_456), sequence=5) == Advanced(123_456, 7)
     assert host.ask(Advance(123_456), sequence=5) == Advanced(123_456, 7)
     assert host.ask(Advance(0), sequence=6) == Advanced(123_456, 7)
+    assert host.ask(Advance(0), sequence=4) == Advanced(123_456, 7), "the time may always be asked for"
+    assert refusal(host.ask(Advance(1), sequence=4)) is Refusal.STALE
