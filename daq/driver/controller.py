@@ -169,10 +169,20 @@ class Controller:
         return StopConfirmation(sent=True, acknowledged=True, tick=stopped.tick, frozen=frozen)
 
     def release(self) -> None:
-        """Ends the freeze; the set points stay where the stop put them.
+        """Ends the freeze; the set points stay where the stop put them. Takes the control back from another host.
 
-        Raises RequestRefusedError when another stop arrives meanwhile: that one holds.
+        Raises RequestRefusedError when another stop arrives meanwhile: that one holds. Raises ControllerRestartedError.
         """
+        try:
+            self._release_newest()
+        except RequestRefusedError as error:
+            if error.reason != Refusal.BAD_SESSION:
+                raise
+            self._deliveries.check_restart(self.link.request(ReadStatus(), Status).status)
+            self.hello()
+            self._release_newest()
+
+    def _release_newest(self) -> None:
         newest = self.link.request(ReadStatus(), Status).stop
         self.link.request(Release(newest), Released)
 
@@ -252,7 +262,7 @@ class Controller:
         )
 
     def _make_sampling(self) -> Sampling:
-        deliveries = Deliveries(self.link, self.clock, self.period_s, self._watch)
+        self._deliveries = deliveries = Deliveries(self.link, self.clock, self.period_s, self._watch)
         if Capability.SAMPLE in self.identity.capabilities:
             return RingSampling(deliveries)
         return MemorySampling(deliveries, DoubleReader(self.link, self.memory_map, self.clock, self.period_s))

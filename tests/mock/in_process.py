@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from mock_controller.bridge.bridge import Bridge
 from mock_controller.bridge.link import Link as BridgeLink
 from mock_controller.lock_step import LockStepPace
@@ -20,8 +22,8 @@ class InProcess:
     def __init__(self, kind: type[Bridge], *, sample: bool = False) -> None:
         device = make_device(lock_step=True, sample=sample, seed=3)
         self.board = device.board
-        bridge = kind(Timeline(device.board, device.faults), sees_period=sample, lock_step=True)
-        self._pace = LockStepPace(BridgeLink(bridge, device.faults))
+        self.bridge: Any = kind(Timeline(device.board, device.faults), sees_period=sample, lock_step=True)
+        self._pace = LockStepPace(BridgeLink(self.bridge, device.faults))
 
     def connect(self) -> InProcess:
         return self

@@ -15,6 +15,8 @@ from firmware_protocol.commands import (
     GainsSet,
     Hello,
     HelloReply,
+    Refusal,
+    Refused,
     Reply,
     ReportGains,
     Request,
@@ -22,6 +24,8 @@ from firmware_protocol.commands import (
     SetGains,
     Snapshot,
     Status,
+    Stop,
+    Stopped,
 )
 from firmware_protocol.joints import JointReading
 from tests.daq.link.scripted import frame_of, scripted_link
@@ -44,6 +48,19 @@ def test_another_protocol_is_refused_with_both_versions() -> None:
     newer = HelloReply(3, Capability.SAMPLE, 20_000, 8, 1)
     with pytest.raises(ProtocolVersionError, match="speaks protocol 3, this software 2: update this software"):
         controller_that(lambda _: None, newer)
+
+
+def test_a_bridge_of_version_1_is_refused_in_one_line_and_can_be_stopped_all_the_same() -> None:
+    stopped = Stopped(7, (500,) * 6)
+
+    def version_1(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        reply = stopped if isinstance(request, Stop) else Refused(request.OPCODE, Refusal.BAD_LENGTH)
+        return [(0.001, frame_of(sequence, reply))]
+
+    link, _ = scripted_link(version_1)
+    with pytest.raises(ProtocolVersionError, match="protocol 1, this software 2: update the controller's bridge"):
+        Controller(link)
+    assert link.stop() == stopped
 
 
 def test_a_controller_in_lock_step_must_be_named_so() -> None:
