@@ -380,6 +380,8 @@ DIALOGUES = (
             *kept_from_writing(7, "$s", 3, BAD_SESSION),
             *stopped(8),
             *status(9, 3, "$k"),
+            board("reset"),
+            *status(9, 3, "$k"),
             *greeting("$n", "$t", 10),
             *status(11, 1, "$k"),
             *kept_from_writing(12, "$s", 4, BAD_SESSION),

@@ -71,9 +71,9 @@ class PurePartner:
         return list(self._said)
 
 
-def second_bridge() -> PurePartner:
+def second_bridge(kind: type[SecondBridge] = SecondBridge) -> PurePartner:
     """The second implementation, on its own board."""
-    bridge = SecondBridge()
+    bridge = kind()
     return PurePartner(bridge.receive, {"period": bridge.period, "reset": bridge.reset, "bridge": bridge.start_again})
 
 
