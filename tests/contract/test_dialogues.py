@@ -21,7 +21,7 @@ from tests.protocol.make_vectors import FILE
 from tests.protocol.play import play
 
 REPLY_S = 5.0
-QUIET_S = 0.05
+QUIET_S = 0.02
 DIALOGUES: list[dict[str, Any]] = json.loads(FILE.read_text("utf-8"))["dialogues"]
 pytestmark = pytest.mark.motion
 
