@@ -24,6 +24,7 @@ from firmware_protocol.commands import (
     Sample,
     SetPointsTaken,
     Snapshot,
+    Stamp,
     WriteBlock,
     WriteSetPoints,
     joints_of,
@@ -72,9 +73,10 @@ def traffic(seed: int) -> dict[int, Bytes]:
     rng = np.random.default_rng(seed)
     pools: dict[int, list[bytes]] = {}
     while not pools or min(map(len, pools.values())) < POOL:
-        sequence = int(rng.integers(0, 0x10000))
+        sequence, session = int(rng.integers(0, 0x10000)), int(rng.integers(1, 1 << 32))
         for i, message in enumerate(_messages(rng)):
-            wire = encode_frame(to_frame((sequence + i) & 0xFFFF, message))
+            stamp = Stamp(session, int(rng.integers(1, 100_000)))
+            wire = encode_frame(to_frame((sequence + i) & 0xFFFF, message, stamp))
             pools.setdefault(len(wire), []).append(wire)
     return {
         length: np.frombuffer(b"".join(pool[:POOL]), np.uint8).reshape(POOL, length) for length, pool in pools.items()

@@ -1,68 +1,87 @@
-"""Which requests come too late: the bridge's half of the rule about sequence numbers."""
+"""Which commands are obeyed: the bridge's half of the rules about sessions, and about time in lock-step."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import Enum
 
+from firmware_protocol.codes import NO_SESSION
 from firmware_protocol.message import Request
-from firmware_protocol.requests import Advance, Hello, Stop
+from firmware_protocol.requests import Advance, Hello
+from firmware_protocol.stamp import Stamp
 
 WINDOW = 0x4000
-"""A remembered number is never left more than this far behind the newest request. Without it, half a circle of reads
-after a write (11 minutes at 50 Hz) would make the next write look old."""
+"""The number of the last `Advance` is never left more than this far behind the newest request. Without it, half a
+circle of other requests would make the next `Advance` look old."""
 
 
 class Arrival(Enum):
     """What a bridge does with a request."""
 
     NEW = "carry out, and answer"
-    AGAIN = "a repeat: answer again; carry out again only where that changes nothing"
-    STALE = "refuse: a later state-changing request has been carried out"
+    AGAIN = "a repeat: answer again, and let no time pass"
+    STALE = "refuse: a later one has been carried out"
+    FOREIGN = "refuse: it belongs to no session, or to another than the present one"
 
 
-class _Newest:
-    """The newest sequence number of one kind of request, on a circle of 2^16."""
+class Session:
+    """The session of the host that greeted last: twelve bytes of state.
+
+    Within a session commands are numbered upwards and never wrap, so that nothing recorded is ever new again.
+    """
+
+    def __init__(self) -> None:
+        self.number = NO_SESSION
+        self._nonce = 0
+        self._newest = 1
+
+    def greet(self, nonce: int, fresh: Callable[[], int]) -> bool:
+        """Takes a `Hello`; whether a new session has begun, under the number that `fresh` gives.
+
+        The nonce of the present session is a repeat of its own greeting, and changes nothing.
+        """
+        if self.number != NO_SESSION and nonce == self._nonce:
+            return False
+        self.number, self._nonce, self._newest = fresh(), nonce, 1
+        return True
+
+    def end(self) -> None:
+        """No command is obeyed until the next greeting."""
+        self.number = NO_SESSION
+
+    def judge(self, stamp: Stamp) -> Arrival:
+        """What to do with a command: NEW, STALE or FOREIGN. A repeat is NEW: it changes nothing."""
+        if self.number == NO_SESSION or stamp.session != self.number:
+            return Arrival.FOREIGN
+        if stamp.number < self._newest:
+            return Arrival.STALE
+        self._newest = stamp.number
+        return Arrival.NEW
+
+
+class AdvanceOrder:
+    """Lock-step only: which `Advance` lets time pass, by sequence numbers on a circle of 2^16.
+
+    Time passes on the bench alone, where no arm is: a circle is enough, and lets an `Advance` go without a session.
+    """
 
     def __init__(self) -> None:
         self._number: int | None = None
 
-    def judge(self, sequence: int) -> Arrival:
-        ahead = self._ahead(sequence)
+    def judge(self, sequence: int, request: Request) -> Arrival:
+        """What to do with a request that has just arrived; of those that let no time pass only the number counts."""
+        if isinstance(request, Hello):
+            self._number = None
+            return Arrival.NEW
+        if isinstance(request, Advance) and request.microseconds == 0:
+            return Arrival.AGAIN  # asks for the time
+        ahead = 0 if self._number is None else (sequence - self._number) & 0xFFFF
+        if not isinstance(request, Advance):
+            if WINDOW < ahead < 0x8000:
+                self._number = (sequence - WINDOW) & 0xFFFF
+            return Arrival.NEW
         if ahead > 0x8000:
             return Arrival.STALE
         again = self._number == sequence
         self._number = sequence
         return Arrival.AGAIN if again else Arrival.NEW
-
-    def keep_near(self, sequence: int) -> None:
-        """Moves the number on when a request of another kind is more than WINDOW ahead of it."""
-        if WINDOW < self._ahead(sequence) < 0x8000:
-            self._number = (sequence - WINDOW) & 0xFFFF
-
-    def _ahead(self, sequence: int) -> int:
-        return 0 if self._number is None else (sequence - self._number) & 0xFFFF
-
-
-class ArrivalOrder:
-    """Remembers the newest sequence numbers, and says what a request's number makes of it.
-
-    State-changing requests and `Advance` have an order each: letting time pass makes no command before it obsolete.
-    """
-
-    def __init__(self) -> None:
-        self._changes = _Newest()
-        self._advances = _Newest()
-
-    def judge(self, sequence: int, request: Request) -> Arrival:
-        """What to do with a request that has just arrived. `Stop` is never STALE; `Hello` forgets everything."""
-        if isinstance(request, Hello):
-            self._changes, self._advances = _Newest(), _Newest()
-            return Arrival.NEW
-        self._changes.keep_near(sequence)
-        self._advances.keep_near(sequence)
-        if isinstance(request, Advance):
-            return self._advances.judge(sequence)
-        if not request.CHANGES_STATE:
-            return Arrival.NEW
-        arrival = self._changes.judge(sequence)
-        return Arrival.NEW if arrival is Arrival.STALE and isinstance(request, Stop) else arrival

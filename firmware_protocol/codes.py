@@ -2,7 +2,9 @@
 
 from enum import IntEnum, IntFlag
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION = 2
+NO_SESSION = 0
+"""In place of a session's number: there is none. No bridge gives it to a session."""
 
 
 class Capability(IntFlag):
@@ -22,7 +24,7 @@ class StatusFlag(IntFlag):
     FROZEN = 1
     """Stopped: set points are held at the posture where the stop found the arm, until `Release`."""
     RESTARTED = 2
-    """The board has been reset since the last `Hello`."""
+    """The board has been reset since the last `Hello` that began a session; commands are refused until the next."""
     SET_POINT_MISSED = 4
     """In this period the controller wanted the memory while the host had it, and took no set points."""
 
@@ -40,3 +42,7 @@ class Refusal(IntEnum):
     """The controller has begun no new period for so long that waiting on is of no use."""
     STALE = 8
     """A command that arrived after a later one: obeying it would undo the later one."""
+    BAD_SESSION = 9
+    """A command of no session, or of one that has ended: recorded, delayed, or of a host that another has replaced."""
+    OTHER_STOP = 10
+    """A `Release` that names a stop which is not the newest: the newest one holds."""

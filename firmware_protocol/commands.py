@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import struct
 
-from firmware_protocol.arrival import Arrival, ArrivalOrder
-from firmware_protocol.codes import PROTOCOL_VERSION, Capability, Refusal, StatusFlag
-from firmware_protocol.errors import PayloadLengthError, ProtocolError, UnknownOpcodeError
+from firmware_protocol.arrival import AdvanceOrder, Arrival, Session
+from firmware_protocol.codes import NO_SESSION, PROTOCOL_VERSION, Capability, Refusal, StatusFlag
+from firmware_protocol.errors import BlockAddressError, PayloadLengthError, ProtocolError, UnknownOpcodeError
 from firmware_protocol.framing import Frame
 from firmware_protocol.joints import ALL_JOINTS, JointReading, JointReadings, joints_of, mask_of
 from firmware_protocol.message import Message, Reply, Request
@@ -55,19 +55,22 @@ from firmware_protocol.requests import (
     WriteOutputs,
     WriteSetPoints,
 )
+from firmware_protocol.stamp import STAMP_BYTES, UNSTAMPED, Stamp
 
 __all__ = [
     "AFTER_NEWEST",
     "ALL_JOINTS",
     "MAX_READ",
     "MAX_WRITE",
+    "NO_SESSION",
     "PROTOCOL_VERSION",
     "REPLIES",
     "REQUESTS",
+    "UNSTAMPED",
     "Advance",
+    "AdvanceOrder",
     "Advanced",
     "Arrival",
-    "ArrivalOrder",
     "Block",
     "BlockWritten",
     "Capability",
@@ -94,10 +97,12 @@ __all__ = [
     "ReportGains",
     "Request",
     "Sample",
+    "Session",
     "SetGains",
     "SetGripper",
     "SetPointsTaken",
     "Snapshot",
+    "Stamp",
     "Status",
     "StatusFlag",
     "Stop",
@@ -110,24 +115,36 @@ __all__ = [
     "parse_reply",
     "parse_request",
     "refusal_of",
+    "stamp_of",
     "to_frame",
 ]
 
 
-def to_frame(sequence: int, message: Message) -> Frame:
-    """The frame that carries a message. Raises ProtocolError when a value is not an integer."""
+def to_frame(sequence: int, message: Message, stamp: Stamp = UNSTAMPED) -> Frame:
+    """The frame that carries a message, a command behind its stamp. Raises ProtocolError when a value is no integer."""
     try:
-        return Frame(sequence, message.OPCODE, message.pack())
+        payload = message.pack()
+        if isinstance(message, Request) and message.IS_COMMAND:
+            payload = stamp.pack() + payload
+        return Frame(sequence, message.OPCODE, payload)
     except struct.error as error:
         raise ProtocolError(f"{type(message).__name__}: {error}") from error
 
 
 def parse_request(frame: Frame) -> Request:
-    """The request in a frame. Raises ProtocolError when opcode or payload are not a request's."""
+    """The request in a frame, without its stamp. Raises ProtocolError when opcode or payload are not a request's."""
     kind = REQUESTS.get(frame.opcode)
     if kind is None:
         raise UnknownOpcodeError(f"opcode {frame.opcode:#04x} is no request")
-    return kind.parse(frame.payload)
+    if not kind.IS_COMMAND:
+        return kind.parse(frame.payload)
+    Stamp.parse(frame.payload)
+    return kind.parse(frame.payload[STAMP_BYTES:])
+
+
+def stamp_of(frame: Frame) -> Stamp:
+    """The stamp in a frame that holds a command. Raises PayloadLengthError when there is none."""
+    return Stamp.parse(frame.payload)
 
 
 def parse_reply(frame: Frame) -> Reply:
@@ -145,5 +162,7 @@ def refusal_of(error: ProtocolError) -> Refusal:
             return Refusal.UNKNOWN_OPCODE
         case PayloadLengthError():
             return Refusal.BAD_LENGTH
+        case BlockAddressError():
+            return Refusal.BAD_ADDRESS
         case _:
             return Refusal.BAD_VALUE

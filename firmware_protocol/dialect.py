@@ -8,7 +8,17 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from firmware_protocol.commands import Reply, Request, parse_reply, to_frame
+from firmware_protocol.commands import (
+    NO_SESSION,
+    UNSTAMPED,
+    Hello,
+    HelloReply,
+    Reply,
+    Request,
+    Stamp,
+    parse_reply,
+    to_frame,
+)
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import FrameDecoder, encode_frame
 
@@ -21,7 +31,8 @@ class LinkDialect(Protocol):
     """Turns requests into bytes and bytes into numbered replies. Holds the state of one connection, no more."""
 
     def encode(self, sequence: int, request: Request) -> bytes:
-        """Bytes that ask `request` under a sequence number (0–65535)."""
+        """Bytes that ask `request` under a sequence number (0–65535). Called once a request: a repeat is the same
+        bytes again."""
         ...
 
     def feed(self, data: bytes) -> list[tuple[int, Reply]]:
@@ -39,29 +50,51 @@ class LinkDialect(Protocol):
 
 
 class FramedDialect:
-    """The dialect of PROTOCOL.md: binary frames with length, sequence number and CRC-16."""
+    """The dialect of PROTOCOL.md: binary frames with length, sequence number and CRC-16.
+
+    Holds the session: commands are stamped with it. The first answer to the last greeting begins it.
+    """
 
     def __init__(self) -> None:
         self._decoder = FrameDecoder()
         self._unparsable = 0
+        self._greeted_with: int | None = None
+        self._last = UNSTAMPED
 
     def encode(self, sequence: int, request: Request) -> bytes:
-        """One frame."""
-        return encode_frame(to_frame(sequence, request))
+        """One frame. Raises ProtocolError when the session's numbers are used up."""
+        if isinstance(request, Hello):
+            self._greeted_with = request.nonce
+        elif request.IS_COMMAND and self._last.session != NO_SESSION:
+            self._last = Stamp(self._last.session, self._last.number + 1)
+        return encode_frame(to_frame(sequence, request, self._last))
 
     def feed(self, data: bytes) -> list[tuple[int, Reply]]:
         """Replies in the order of their arrival."""
         replies: list[tuple[int, Reply]] = []
         for frame in self._decoder.feed(data):
             try:
-                replies.append((frame.sequence, parse_reply(frame)))
+                reply = parse_reply(frame)
             except ProtocolError:
                 self._unparsable += 1
+                continue
+            if isinstance(reply, HelloReply):
+                self._begin(reply)
+            replies.append((frame.sequence, reply))
         return replies
 
+    def _begin(self, reply: HelloReply) -> None:
+        """Takes the session of a greeting's first answer; a later one may be of a greeting that was only delayed."""
+        if reply.session != NO_SESSION and reply.nonce == self._greeted_with:
+            self._greeted_with = None
+            if reply.session != self._last.session:
+                self._last = Stamp(reply.session, 0)
+
     def reset(self) -> None:
-        """Forgets an unfinished frame; counters stay."""
+        """Forgets an unfinished frame and the session; counters stay."""
         self._decoder.reset()
+        self._greeted_with = None
+        self._last = UNSTAMPED
 
     @property
     def damaged(self) -> int:

@@ -13,6 +13,10 @@ class PayloadLengthError(ProtocolError):
     """A payload that is shorter or longer than its message."""
 
 
+class BlockAddressError(ProtocolError):
+    """A block that reaches beyond the address space."""
+
+
 class UnitsError(ProtocolError):
     """A value that its register, or the joint's range, cannot hold."""
 

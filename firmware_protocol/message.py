@@ -78,8 +78,8 @@ def _ranges_of(kind: type[Message]) -> tuple[tuple[str, int, int], ...]:
 class Request(Message):
     """Host to controller."""
 
-    CHANGES_STATE: ClassVar[bool] = False
-    """Refused as STALE when its sequence number is behind that of a later state-changing request."""
+    IS_COMMAND: ClassVar[bool] = False
+    """Changes something, and travels with a `Stamp`: refused in another session, or after a later command."""
 
 
 class Reply(Message):

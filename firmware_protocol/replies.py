@@ -6,6 +6,7 @@ import struct
 from dataclasses import dataclass
 from typing import Self
 
+from firmware_protocol.codes import NO_SESSION
 from firmware_protocol.errors import PayloadLengthError, ProtocolError
 from firmware_protocol.framing import MAX_PAYLOAD
 from firmware_protocol.joints import JointReadings, check_ascending, pack_readings, parse_readings
@@ -15,19 +16,42 @@ from firmware_protocol.units import POSTURE_UNITS
 
 _TICK_AND_STATUS = 5
 """Bytes of a snapshot before its joints."""
+_SHORT_HELLO = 10
+"""Bytes of a greeting's answer in version 1, and where no session has begun."""
 
 
 @dataclass(frozen=True)
 class HelloReply(Reply):
-    """Protocol version, capabilities, control period (µs), depth of the snapshot ring, count of board resets."""
+    """Protocol version, capabilities, control period (µs), depth of the snapshot ring, count of board resets; then the
+    nonce of the `Hello` and the number of the session.
+
+    To a host of another version the bridge answers without the last two, as version 1 did: no session has begun.
+    """
 
     OPCODE = 0x81
-    LAYOUT = "<BHIBH"
+    LAYOUT = "<BHIBHII"
     version: int
     capabilities: int
     period_us: int
     ring_depth: int
     boots: int
+    nonce: int = 0
+    session: int = NO_SESSION
+
+    def pack(self) -> bytes:
+        """Eighteen bytes; ten without a session."""
+        packed = super().pack()
+        return packed[:_SHORT_HELLO] if self.session == NO_SESSION else packed
+
+    @classmethod
+    def parse(cls, payload: bytes) -> Self:
+        """Either form. Raises ProtocolError for the long one without a session."""
+        if len(payload) == _SHORT_HELLO:
+            return super().parse(payload + bytes(8))
+        reply = super().parse(payload)
+        if reply.session == NO_SESSION:
+            raise ProtocolError("HelloReply: a session has another number than 0")
+        return reply
 
 
 @dataclass(frozen=True)
@@ -211,14 +235,18 @@ class GripperSet(Reply):
 
 @dataclass(frozen=True)
 class Status(Reply):
-    """Tick, status flags, count of board resets, periods whose set points were missed."""
+    """Tick, status flags, count of board resets, periods whose set points were missed, number of the newest stop.
+
+    `stop` is 0 while the bridge has obeyed none since it started.
+    """
 
     OPCODE = 0xB3
-    LAYOUT = "<IBHI"
+    LAYOUT = "<IBHII"
     tick: int
     status: int
     boots: int
     missed: int
+    stop: int
 
 
 @dataclass(frozen=True)

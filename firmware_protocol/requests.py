@@ -1,6 +1,7 @@
 """Requests: what the host asks of the controller.
 
-Every one but `Advance` may be repeated without harm: reads change nothing, writes name absolute values.
+Every one but `Advance` may be repeated without harm: reads change nothing, commands name absolute values. A command
+travels with a `Stamp`, which `to_frame` puts before its payload; `Stop` needs none.
 """
 
 from __future__ import annotations
@@ -9,18 +10,20 @@ import struct
 from dataclasses import dataclass
 from typing import Self
 
-from firmware_protocol.errors import PayloadLengthError, ProtocolError
+from firmware_protocol.codes import PROTOCOL_VERSION
+from firmware_protocol.errors import BlockAddressError, PayloadLengthError, ProtocolError
 from firmware_protocol.framing import MAX_PAYLOAD
 from firmware_protocol.joints import check_ascending, check_mask, mask_of, split_mask
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.message import Request, check_range, unpack
+from firmware_protocol.stamp import STAMP_BYTES
 from firmware_protocol.units import GAIN_MAX, POSTURE_UNITS
 
 AFTER_NEWEST = 0xFFFFFFFF
 """SAMPLE(after=AFTER_NEWEST) waits for the next snapshot to be made, whatever has been seen."""
 MAX_READ = MAX_PAYLOAD
 """Most bytes that one `ReadBlock` asks for."""
-MAX_WRITE = MAX_PAYLOAD - 2
+MAX_WRITE = MAX_PAYLOAD - STAMP_BYTES - 2
 """Most bytes that one `WriteBlock` carries."""
 
 
@@ -28,14 +31,34 @@ def _check_block(what: str, address: int, count: int, most: int) -> None:
     check_range(f"{what}: address", address, 0, 0xFFFF)
     check_range(f"{what}: number of bytes", count, 1, most)
     if address + count > 0x10000:
-        raise ProtocolError(f"{what}: {count} bytes from {address:04X}: the address space ends at FFFF")
+        raise BlockAddressError(f"{what}: {count} bytes from {address:04X}: the address space ends at FFFF")
 
 
 @dataclass(frozen=True)
 class Hello(Request):
-    """Who is there? Clears the RESTARTED flag and forgets the sequence numbers seen so far."""
+    """Who is there? With a nonce that is not the present session's, a new session begins.
+
+    nonce: chosen by the host at random, another one for each greeting that is not a repeat.
+    A host of version 1 sends no payload at all, and one of a later version may send more: both begin no session.
+    """
 
     OPCODE = 0x01
+    LAYOUT = "<BI"
+    version: int
+    nonce: int
+
+    def pack(self) -> bytes:
+        """Version and nonce; nothing for version 1."""
+        return b"" if self.version == 1 else super().pack()
+
+    @classmethod
+    def parse(cls, payload: bytes) -> Self:
+        """Of another version's greeting only the version is read. Raises PayloadLengthError."""
+        if not payload:
+            return cls(1, 0)
+        if payload[0] != PROTOCOL_VERSION:
+            return cls(payload[0], 0)
+        return super().parse(payload)
 
 
 @dataclass(frozen=True)
@@ -53,10 +76,10 @@ class ReadBlock(Request):
 
 @dataclass(frozen=True)
 class WriteBlock(Request):
-    """Poke: `data` (1–46 bytes) to shared memory from `address` on, in one access."""
+    """Poke: `data` (1–38 bytes) to shared memory from `address` on, in one access."""
 
     OPCODE = 0x03
-    CHANGES_STATE = True
+    IS_COMMAND = True
     address: int
     data: bytes
 
@@ -80,7 +103,7 @@ class WriteSetPoints(Request):
     """Set points of some joints (posture units), taken together (DRIVESA, SAMOVE, CONTPATH; section 6.4)."""
 
     OPCODE = 0x04
-    CHANGES_STATE = True
+    IS_COMMAND = True
     postures: tuple[tuple[int, int], ...]
     """(joint, posture units 0–999), joints ascending."""
 
@@ -117,7 +140,7 @@ class SetGains(Request):
 
     OPCODE = 0x07
     LAYOUT = "<BBBB"
-    CHANGES_STATE = True
+    IS_COMMAND = True
     joint: int
     p: int
     i: int
@@ -164,18 +187,22 @@ class Sample(Request):
 
 @dataclass(frozen=True)
 class Stop(Request):
-    """Set points := measured posture, at once, and held until `Release`. Obeyed at any moment, in any state."""
+    """Set points := measured posture, at once, and held until `Release`. Obeyed at any moment, in any state.
+
+    Needs no session and no stamp, and is the same in every version: whoever can write a frame can stop the arm.
+    """
 
     OPCODE = 0x20
-    CHANGES_STATE = True
 
 
 @dataclass(frozen=True)
 class Release(Request):
-    """Ends the freeze of `Stop`. Set points stay where the stop put them."""
+    """Ends the freeze, if `stop` is the newest stop's number (`Status`). Set points stay where the stop put them."""
 
     OPCODE = 0x21
-    CHANGES_STATE = True
+    LAYOUT = "<I"
+    IS_COMMAND = True
+    stop: int
 
 
 @dataclass(frozen=True)
@@ -187,11 +214,11 @@ class ReadProcess(Request):
 
 @dataclass(frozen=True)
 class WriteOutputs(Request):
-    """Process outputs in `mask` take the bits of `values`; the others stay."""
+    """Process outputs in `mask` (bit 0 is output 1; any, or none) take the bits of `values`; the others stay."""
 
     OPCODE = 0x31
     LAYOUT = "<BB"
-    CHANGES_STATE = True
+    IS_COMMAND = True
     mask: int
     values: int
 
@@ -202,7 +229,7 @@ class SetGripper(Request):
 
     OPCODE = 0x32
     LAYOUT = "<B"
-    CHANGES_STATE = True
+    IS_COMMAND = True
     closed: int
 
     def __post_init__(self) -> None:

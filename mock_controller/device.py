@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from random import Random, SystemRandom
 from typing import Any
 
 from firmware_protocol.memory_map import MemoryMap, default_memory_map, parse_memory_map
@@ -56,11 +57,21 @@ def build_device(options: Options, disconnect: Callable[[float], None]) -> Devic
         plant = Plant(plant_parameters, modifications, [scale.posture_to_rad(posture) for scale, posture in pairs])
     board = Board(parameters, _memory_map(options), plant, options.seed, modifications, arm_seed)
     faults = FaultSet(FaultyBoard(board, disconnect), options.seed)
-    bridge = Bridge(Timeline(board, faults), sees_period=options.sample, lock_step=options.lock_step)
+    bridge = Bridge(
+        Timeline(board, faults),
+        sees_period=options.sample,
+        lock_step=options.lock_step,
+        first_number=_first_number(options),
+    )
     link = Link(bridge, faults, options.baud)
     for text in options.fault:
         faults.switch_on(text)
     return Device(board, faults, bridge, link, options.modify, options.secret is not None)
+
+
+def _first_number(options: Options) -> int:
+    """Where the numbers of sessions and stops begin: in lock-step by the seed, so that a run repeats to the bit."""
+    return (Random(f"bridge {options.seed}") if options.lock_step else SystemRandom()).getrandbits(32)
 
 
 def _memory_map(options: Options) -> MemoryMap:

@@ -32,13 +32,12 @@ from firmware_protocol.commands import (
     Gains,
     GainsSet,
     GripperSet,
-    Hello,
-    HelloReply,
     JointReading,
     OutputsWritten,
     Process,
     ReadProcess,
     ReadStatus,
+    Refusal,
     Release,
     Released,
     ReportErrorsPositionsPowers,
@@ -170,8 +169,22 @@ class Controller:
         return StopConfirmation(sent=True, acknowledged=True, tick=stopped.tick, frozen=frozen)
 
     def release(self) -> None:
-        """Ends the freeze; the set points stay where the stop put them."""
-        self.link.request(Release(), Released)
+        """Ends the freeze; the set points stay where the stop put them. Takes the control back from another host.
+
+        Raises RequestRefusedError when another stop arrives meanwhile: that one holds. Raises ControllerRestartedError.
+        """
+        try:
+            self._release_newest()
+        except RequestRefusedError as error:
+            if error.reason != Refusal.BAD_SESSION:
+                raise
+            self._deliveries.check_restart(self.link.request(ReadStatus(), Status).status)
+            self.hello()
+            self._release_newest()
+
+    def _release_newest(self) -> None:
+        newest = self.link.request(ReadStatus(), Status).stop
+        self.link.request(Release(newest), Released)
 
     def gains(self) -> dict[int, tuple[int, int, int]]:
         """Joint → (P, I, D), each 0–20."""
@@ -218,12 +231,14 @@ class Controller:
         self.close()
 
     def _ask_identity(self, boots_before: int | None = None) -> Identity:
-        reply = self.link.request(Hello(), HelloReply)
+        try:
+            reply = self.link.greet()
+        except RequestRefusedError as error:
+            if error.reason != Refusal.BAD_LENGTH:
+                raise
+            raise self._other_version(1) from None  # which knows no greeting but the empty one
         if reply.version != PROTOCOL_VERSION:
-            raise ProtocolVersionError(
-                f"{self.link.url}: the controller speaks protocol {reply.version}, this software {PROTOCOL_VERSION}: "
-                "update the older one"
-            )
+            raise self._other_version(reply.version)
         identity = Identity(
             reply.version,
             Capability(reply.capabilities),
@@ -239,8 +254,15 @@ class Controller:
         self.link.set_period(identity.period_s)
         return identity
 
+    def _other_version(self, version: int) -> ProtocolVersionError:
+        older = "the controller's bridge" if version < PROTOCOL_VERSION else "this software"
+        return ProtocolVersionError(
+            f"{self.link.url}: the controller speaks protocol {version}, this software {PROTOCOL_VERSION}: "
+            f"update {older}"
+        )
+
     def _make_sampling(self) -> Sampling:
-        deliveries = Deliveries(self.link, self.clock, self.period_s, self._watch)
+        self._deliveries = deliveries = Deliveries(self.link, self.clock, self.period_s, self._watch)
         if Capability.SAMPLE in self.identity.capabilities:
             return RingSampling(deliveries)
         return MemorySampling(deliveries, DoubleReader(self.link, self.memory_map, self.clock, self.period_s))

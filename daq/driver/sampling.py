@@ -16,6 +16,7 @@ from firmware_protocol.commands import (
     AFTER_NEWEST,
     JointReading,
     ReadStatus,
+    Refusal,
     Reply,
     Sample,
     SetPointsTaken,
@@ -64,8 +65,10 @@ class Deliveries:
         """
         try:
             confirmation = expect(request, reply, SetPointsTaken)
-        except RequestRefusedError:
+        except RequestRefusedError as error:
             self.watch.withdrawn(batch)
+            if error.reason == Refusal.BAD_SESSION:  # a restart of the board ends the session
+                self.check_restart(self.link.request(ReadStatus(), Status).status)
             raise
         self.check_restart(confirmation.status)
         self.watch.confirmed(batch, confirmation.tick + 1 if due is None else due)

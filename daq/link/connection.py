@@ -29,6 +29,7 @@ class Connection:
         timing: LinkTiming,
         tally: Tally,
         now: Callable[[], float],
+        first_number: int = 0,
     ) -> None:
         self.now = now
         self.timing = timing
@@ -36,7 +37,7 @@ class Connection:
         self.changed = threading.Condition(threading.Lock())
         self._channel = channel
         self._dialect = dialect
-        self._pending = PendingReplies(tally)
+        self._pending = PendingReplies(tally, first_number)
         self._write_lock = threading.Lock()
         self._failure: str | None = None
 
@@ -110,7 +111,8 @@ class Connection:
         return LinkLostError(self._failure)
 
     def replace(self, channel: ByteChannel) -> None:
-        """Goes on over a new channel after a failure; numbers go on too, so no old reply is taken for a new one."""
+        """Goes on over a new channel after a failure, without a session. Sequence numbers go on too, so no old reply is
+        taken for a new one."""
         with self._write_lock, self.changed:
             self._dialect.reset()
             self._channel = channel
@@ -130,7 +132,9 @@ class Connection:
         now = self.now()
         for transaction in transactions:
             request = transaction.request
-            frames += self._dialect.encode(transaction.sequence, request) * copies_of(request)
+            if not transaction.frame:
+                transaction.frame = self._dialect.encode(transaction.sequence, request)
+            frames += transaction.frame * copies_of(request)
             transaction.written += 1
             transaction.written_at = now
             transaction.deadline = now + self.timing.reply_timeout_s(request, len(frames))

@@ -41,5 +41,8 @@ _EXPLANATION: dict[int, str] = {
     Refusal.NOT_CAPABLE: "its bridge cannot do this",
     Refusal.FROZEN: "it has been stopped and holds its posture until it is released",
     Refusal.NOTHING_NEW: "there is nothing new",
+    Refusal.BAD_SESSION: "the session has ended: the controller has restarted, or another host has taken "
+    "the control; connect again, or reset",
+    Refusal.OTHER_STOP: "another stop has come meanwhile, and holds",
     Refusal.STALE: "a later command (a stop, perhaps) has already been obeyed",
 }

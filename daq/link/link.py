@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from enum import StrEnum
+from random import Random, SystemRandom
 from typing import Protocol, Self, TypeVar
 
 from daq.link.connection import Connection
@@ -16,7 +18,18 @@ from daq.link.timed_exchange import TimedExchange
 from daq.link.timing import CLEAN_TRANSACTIONS, LinkTiming
 from daq.link.turn_exchange import TurnExchange
 from daq.transport import Endpoint, ReconnectDelay, TransportError, open_endpoint
-from firmware_protocol.commands import Refused, Reply, Request, Stop, Stopped
+from firmware_protocol.commands import (
+    PROTOCOL_VERSION,
+    Advance,
+    Advanced,
+    Hello,
+    HelloReply,
+    Refused,
+    Reply,
+    Request,
+    Stop,
+    Stopped,
+)
 from firmware_protocol.dialect import FramedDialect, LinkDialect
 
 R = TypeVar("R", bound=Reply)
@@ -46,6 +59,8 @@ class Link:
     Requests that are written together are answered in order and cost one round trip. A request is repeated with its
     number until it is answered or its budget is used up, and then the link is lost. `stop` goes ahead of everything
     that is not yet written.
+
+    `chance` draws the first sequence number and, but on the bench, the nonces of greetings.
     """
 
     def __init__(
@@ -53,11 +68,16 @@ class Link:
         endpoint: Endpoint,
         dialect: LinkDialect | None = None,
         now: Callable[[], float] = time.monotonic,
+        chance: Random | None = None,
     ) -> None:
+        # On the bench a run repeats to the bit.
+        self._chance = chance or (Random(0) if endpoint.lock_step else SystemRandom())
         self.tally = Tally()
         self._endpoint = endpoint
         timing = LinkTiming(endpoint.bytes_per_second, measured=not endpoint.lock_step)
-        self._connection = Connection(endpoint.connect(), dialect or FramedDialect(), timing, self.tally, now)
+        self._connection = Connection(
+            endpoint.connect(), dialect or FramedDialect(), timing, self.tally, now, self._chance.getrandbits(16)
+        )
         self._exchange = TurnExchange(self._connection) if endpoint.lock_step else TimedExchange(self._connection)
         self._clean = CLEAN_TRANSACTIONS
         self._unanswered = False
@@ -139,6 +159,20 @@ class Link:
         if refused:
             self.tally.count("refused", refused)
         return replies
+
+    def greet(self) -> HelloReply:
+        """Begins a session, without which no command is obeyed. Moves nothing.
+
+        Raises RequestRefusedError by a controller of version 1, LinkTimeoutError, LinkLostError.
+        """
+        return self.request(Hello(PROTOCOL_VERSION, self._nonce()), HelloReply)
+
+    def _nonce(self) -> int:
+        """Another one for each greeting. On the bench a run repeats to the bit: there it is the bench's own time."""
+        if self.lock_step:
+            with contextlib.suppress(RequestRefusedError):
+                return self.request(Advance(0), Advanced).time_us & 0xFFFFFFFF
+        return self._chance.getrandbits(32)
 
     def stop(self) -> Stopped:
         """Freezes the arm. Written twice at once, ahead of all that waits. Raises LinkTimeoutError, LinkLostError."""

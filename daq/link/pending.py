@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from daq.link.counters import Tally
 from daq.link.timing import reply_opcode
-from firmware_protocol.commands import Refused, Reply, Request
+from firmware_protocol.commands import NO_SESSION, Hello, HelloReply, Refused, Reply, Request
 
 SEQUENCE_NUMBERS = 0x10000
 REMEMBERED = 256
@@ -26,6 +26,8 @@ class Transaction:
     written: int = 0
     written_at: float = 0.0
     deadline: float = 0.0
+    frame: bytes = b""
+    """As it was written first: a repeat is the same bytes."""
     reply: Reply | None = None
     answered_at: float = 0.0
 
@@ -35,9 +37,14 @@ class PendingReplies:
     """The transactions that wait, by sequence number."""
 
     tally: Tally
+    first: int = 0
+    """The first sequence number."""
     _waiting: dict[int, Transaction] = field(default_factory=dict)
     _answered: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
-    _next: int = 0
+    _next: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._next = self.first % SEQUENCE_NUMBERS
 
     def begin(self, request: Request) -> Transaction:
         """A transaction under the next free sequence number."""
@@ -70,4 +77,7 @@ class PendingReplies:
 def _answers(reply: Reply, request: Request) -> bool:
     if isinstance(reply, Refused):
         return reply.opcode == request.OPCODE
+    if isinstance(reply, HelloReply) and isinstance(request, Hello):
+        # One that was recorded names another nonce; a bridge of another version names none.
+        return reply.nonce == request.nonce or reply.session == NO_SESSION
     return reply_opcode(request) == reply.OPCODE

@@ -84,6 +84,7 @@ class Board:
         self._time_us = 0
         self._complete_us = 0
         self._frozen = False
+        self._postureless = False
         self._process_inputs = 0
         self._host_until_us = 0
         self._published: list[tuple[int, int]] = []
@@ -152,15 +153,20 @@ class Board:
         """Whether set points are held since a `freeze`."""
         return self._frozen
 
-    def freeze(self) -> tuple[int, ...]:
+    def hold(self) -> None:
+        """From now on set points are kept out; a `freeze` with a posture is to follow."""
+        self._frozen, self._postureless = True, True
+
+    def freeze(self, positions: Sequence[int] | None = None) -> tuple[int, ...]:
         """Set points := measured posture, now, and no others until `release`; the six postures (posture units).
 
+        positions: what the host's side has read of the measured positions (ADC counts); None for the board's own
         A second freeze changes nothing. The latch outlives a brown-out.
         """
-        if self._frozen and self._powered:
+        if self._frozen and self._powered and not self._postureless:
             return tuple(self.memory.values("set_point"))
-        self._frozen = True
-        postures = tuple(counts_to_posture(counts) for counts in self._measured)
+        self._frozen, self._postureless = True, False
+        postures = tuple(counts_to_posture(counts) for counts in positions or self._measured)
         self._write_pairs(self.memory.encoded("set_point", enumerate(postures)), by_freeze=True)
         return postures
 

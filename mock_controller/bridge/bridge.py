@@ -15,8 +15,8 @@ from firmware_protocol.commands import (
     PROTOCOL_VERSION,
     Advance,
     Advanced,
+    AdvanceOrder,
     Arrival,
-    ArrivalOrder,
     Capability,
     Hello,
     HelloReply,
@@ -33,6 +33,7 @@ from firmware_protocol.commands import (
     ReportGains,
     Request,
     Sample,
+    Session,
     SetGains,
     SetGripper,
     SetPointsTaken,
@@ -47,11 +48,11 @@ from firmware_protocol.commands import (
     joints_of,
     parse_request,
     refusal_of,
+    stamp_of,
     to_frame,
 )
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import Frame
-from mock_controller.board.memory import MemoryAddressError
 from mock_controller.board.snapshot import RING_DEPTH, PeriodSnapshot
 from mock_controller.bridge.routines import MemoryRoutines
 from mock_controller.bridge.stop_record import StopRecord
@@ -64,6 +65,7 @@ WAIT_LIMIT_PERIODS = 25
 _FROZEN, _RESTARTED, _SET_POINT_MISSED = (
     int(flag) for flag in (StatusFlag.FROZEN, StatusFlag.RESTARTED, StatusFlag.SET_POINT_MISSED)
 )
+_REFUSED_ON_ARRIVAL = {Arrival.STALE: Refusal.STALE, Arrival.FOREIGN: Refusal.BAD_SESSION}
 
 
 @dataclass
@@ -82,15 +84,28 @@ class _WaitingAdvance:
 
 
 class Bridge:
-    """Answers requests. `sees_period` offers `Sample`; `lock_step` offers `Advance`."""
+    """Answers requests. `sees_period` offers `Sample`; `lock_step` offers `Advance`.
 
-    def __init__(self, timeline: Timeline, *, sees_period: bool = True, lock_step: bool = False) -> None:
+    `first_number` is where the numbers of sessions and stops begin, which are to be others at every start.
+    """
+
+    routines: type[MemoryRoutines] = MemoryRoutines
+    """How the memory is accessed."""
+
+    def __init__(
+        self, timeline: Timeline, *, sees_period: bool = True, lock_step: bool = False, first_number: int = 1
+    ) -> None:
         self._timeline = timeline
         self._board = timeline.board
-        self._routines = MemoryRoutines(timeline, sees_period)
+        self._routines = self.routines(timeline, sees_period)
         self._sees_period = sees_period
         self._lock_step = lock_step
-        self._order = ArrivalOrder()
+        capable = {Sample.OPCODE: sees_period, Advance.OPCODE: lock_step}
+        self._incapable = {opcode for opcode, can in capable.items() if not can}
+        self._session = Session()
+        self._advances = AdvanceOrder()
+        self._next_number = first_number
+        self._newest_stop = self._fresh() if self._board.frozen else 0
         self._sample: _WaitingSample | None = None
         self._advance: _WaitingAdvance | None = None
         self._boots_greeted = 0
@@ -140,7 +155,8 @@ class Bridge:
         return wake if advance is None else min(wake, max(advance.until_us, now))
 
     def hang_up(self) -> None:
-        """Nobody waits any more. What the host has said before it went still counts."""
+        """The connection has ended, and with it the session. What the host has said before still counts."""
+        self._session.end()
         self._sample = None
         self._advance = None
 
@@ -148,22 +164,18 @@ class Bridge:
 
     def receive(self, frame: Frame) -> list[Frame]:
         """Carries out one request, or lets it wait; the replies there are now."""
-        try:
-            request = parse_request(frame)
-        except ProtocolError as error:
-            return [self._refuse(frame.sequence, frame.opcode, refusal_of(error))]
-        arrival = self._order.judge(frame.sequence, request)
-        if arrival is Arrival.STALE:
-            return [self._refuse(frame.sequence, frame.opcode, Refusal.STALE)]
+        request = self._understood(frame)
+        if isinstance(request, Refusal):
+            return [self._refuse(frame.sequence, frame.opcode, request)]
+        arrival = self._judge(frame, request)
+        if arrival in _REFUSED_ON_ARRIVAL:
+            return [self._refuse(frame.sequence, frame.opcode, _REFUSED_ON_ARRIVAL[arrival])]
         self.answered[type(request).__name__] += 1
         if isinstance(request, Sample):
             return self._begin_sample(frame.sequence, request)
         if isinstance(request, Advance):
             return self._begin_advance(frame.sequence, request, again=arrival is Arrival.AGAIN)
-        try:
-            reply = self._handlers[type(request)](request)
-        except MemoryAddressError:
-            reply = Refusal.BAD_ADDRESS
+        reply = self._handlers[type(request)](request)
         if isinstance(reply, Refusal):
             return [self._refuse(frame.sequence, frame.opcode, reply)]
         return [to_frame(frame.sequence, reply)]
@@ -178,6 +190,33 @@ class Bridge:
             replies.append(self._advanced(sequence))
         return replies
 
+    def _understood(self, frame: Frame) -> Request | Refusal:
+        """The request in a frame, or what is wrong with the frame itself, whoever sends it and whenever."""
+        if frame.opcode in self._incapable:
+            return Refusal.NOT_CAPABLE
+        try:
+            request = parse_request(frame)
+        except ProtocolError as error:
+            return refusal_of(error)
+        if isinstance(request, ReadBlock | WriteBlock) and not self._routines.holds(request):
+            return Refusal.BAD_ADDRESS
+        return request
+
+    def _judge(self, frame: Frame, request: Request) -> Arrival:
+        if request.IS_COMMAND:
+            if self._board.counters.boots != self._boots_greeted:
+                self._session.end()
+            arrival = self._session.judge(stamp_of(frame))
+            if arrival is not Arrival.NEW:
+                return arrival
+        return self._advances.judge(frame.sequence, request) if self._lock_step else Arrival.NEW
+
+    def _fresh(self) -> int:
+        """A number that none of this bridge's sessions and stops has had; never 0."""
+        number = self._next_number or 1
+        self._next_number = (number + 1) & 0xFFFFFFFF
+        return number
+
     def _refuse(self, sequence: int, opcode: int, reason: Refusal) -> Frame:
         self.refused[reason.name] += 1
         return to_frame(sequence, Refused(opcode, reason))
@@ -188,18 +227,23 @@ class Bridge:
         restarted = self._board.counters.boots != self._boots_greeted
         return frozen * _FROZEN | restarted * _RESTARTED | missed * _SET_POINT_MISSED
 
-    def _hello(self, _: Hello) -> Reply:
+    def _hello(self, request: Hello) -> Reply:
         board = self._board
-        self._boots_greeted = board.counters.boots
+        if request.version == PROTOCOL_VERSION:
+            if board.counters.boots != self._boots_greeted:
+                self._session.end()
+            if self._session.greet(request.nonce, self._fresh):
+                self._boots_greeted = board.counters.boots
         capabilities = Capability.SIMULATED
         if self._sees_period:
             capabilities |= Capability.SAMPLE
         if self._lock_step:
             capabilities |= Capability.LOCK_STEP
         depth = RING_DEPTH if self._sees_period else 0
-        return HelloReply(
-            PROTOCOL_VERSION, capabilities, board.parameters.timing.period, depth, board.counters.boots & 0xFFFF
-        )
+        about = (PROTOCOL_VERSION, capabilities, board.parameters.timing.period, depth, board.counters.boots & 0xFFFF)
+        if request.version != PROTOCOL_VERSION:
+            return HelloReply(*about)  # in the form of version 1, which every host understands
+        return HelloReply(*about, request.nonce, self._session.number)
 
     def _write_set_points(self, request: WriteSetPoints) -> Reply | Refusal:
         if self._board.frozen:
@@ -214,26 +258,31 @@ class Bridge:
 
     def _stop(self, _: Stop) -> Reply:
         received_us, already = self.time_us, self._board.frozen
+        self._newest_stop = self._fresh()
         postures = self._routines.freeze()
         if not already:
             self.stops.note(received_us, self.time_us, self._board.tick)
         return Stopped(self.stops.frozen_tick or 0, postures)
 
-    def _release(self, _: Release) -> Reply:
+    def _release(self, request: Release) -> Reply | Refusal:
+        if request.stop != self._newest_stop:
+            return Refusal.OTHER_STOP
         self._board.release()
         return Released()
 
     def _read_status(self, _: ReadStatus) -> Reply:
         board = self._board
         return Status(
-            board.tick, self._flags(board.frozen), board.counters.boots & 0xFFFF, board.counters.set_points_missed
+            board.tick,
+            self._flags(board.frozen),
+            board.counters.boots & 0xFFFF,
+            board.counters.set_points_missed,
+            self._newest_stop,
         )
 
     # --- what waits
 
     def _begin_sample(self, sequence: int, request: Sample) -> list[Frame]:
-        if not self._sees_period:
-            return [self._refuse(sequence, Sample.OPCODE, Refusal.NOT_CAPABLE)]
         after = request.after
         if after > self._board.tick:
             # AFTER_NEWEST, or a host that remembers the ticks of an earlier life of the board.
@@ -266,8 +315,6 @@ class Bridge:
         )
 
     def _begin_advance(self, sequence: int, request: Advance, *, again: bool) -> list[Frame]:
-        if not self._lock_step:
-            return [self._refuse(sequence, Advance.OPCODE, Refusal.NOT_CAPABLE)]
         if again and self._advance is None:
             return [self._advanced(sequence)]
         if not again:

@@ -31,6 +31,8 @@ from firmware_protocol.memory_map import JOINTS
 from mock_controller.timeline import Timeline
 
 _GAINS = ("gain_p", "gain_i", "gain_d")
+SETTLING_US = 2_000
+"""Between two readings of positions before a freeze: longer than the controller takes to store a period's results."""
 
 
 class MemoryRoutines:
@@ -89,10 +91,45 @@ class MemoryRoutines:
         self._keep_clear(2 * len(request.postures))
         self._board.write_set_points(dict(request.postures))
 
+    def holds(self, request: ReadBlock | WriteBlock) -> bool:
+        """Whether the whole block lies in the shared memory."""
+        count = request.count if isinstance(request, ReadBlock) else len(request.data)
+        return self._map.base <= request.address and request.address + count <= self._map.base + self._map.size
+
     def freeze(self) -> tuple[int, ...]:
-        """Set points := measured posture; the six postures."""
+        """Set points := measured posture; the six postures.
+
+        A bridge that sees the period knows what was measured. Any other reads the memory until two readings agree.
+        """
         self._keep_clear(2 * JOINTS)
-        return self._board.freeze()
+        if self._sees_period or self._board.frozen:
+            return self._board.freeze()
+        self._board.hold()
+        return self._board.freeze(self._untorn_positions())
+
+    def _untorn_positions(self) -> tuple[int, ...] | None:
+        """Positions (ADC counts) of all joints from two readings that agree; None from a memory without supply.
+
+        The second begins when any change that the first has met is complete, and the next change is a period away.
+        """
+        before = self._read_positions()
+        while True:
+            self._timeline.run_until(self._timeline.time_us + SETTLING_US)
+            positions = self._read_positions()
+            if positions == before:
+                return positions if any(positions) else None
+            before = positions
+
+    def _read_positions(self) -> tuple[int, ...]:
+        """Positions (ADC counts) from one reading of the memory: they may be torn."""
+        register = self._map["position"]
+        first, last = min(register.addresses), max(register.addresses)
+        block = self._read(first, last - first + 1)
+        highs = register.high or register.low
+        return tuple(
+            register.decode(block[low - first], block[high - first] if register.high else 0)
+            for low, high in zip(register.low, highs, strict=True)
+        )
 
     def gains(self) -> Reply:
         """PID gains of all joints."""

@@ -76,7 +76,7 @@ ROBOT, TRACE, EXPERIMENT, JOB, MODEL = "ma2000", "3fa1c5d20b77", "c40d1a2b93ee",
 SPEC = ExperimentSpec(trajectory=Ramp(amplitude=0.377, duration=0.65), joints=(1, 2, 3), name="morning-ramp")
 QUEUE = QueueStatus(paused=False, reason="resumed by anna", since=NOON, queued=2, running=EXPERIMENT)
 NOBODY = Control(holder="nobody")
-IDENTITY = RobotIdentity(simulated=False, protocol=1, period=0.02, boots=3)
+IDENTITY = RobotIdentity(simulated=False, protocol=2, period=0.02, boots=3)
 
 
 def _experiments() -> list[BaseModel]:

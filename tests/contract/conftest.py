@@ -42,6 +42,8 @@ class UnderContract:
 
     url: str
     may_move: bool
+    control: str | None = None
+    """The mock's control port, where it is one."""
 
     def channel(self) -> ByteChannel:
         """Bytes to and from it, without a driver."""
@@ -61,7 +63,7 @@ def under_contract(request: pytest.FixtureRequest) -> Iterator[UnderContract]:
     assert isinstance(port, MockPort)
     mock = start_mock(port)
     try:
-        yield UnderContract(mock.url + ("?lock_step=1" if port.lock_step else ""), may_move=True)
+        yield UnderContract(mock.url + ("?lock_step=1" if port.lock_step else ""), True, mock.control)
     finally:
         mock.close()
 

@@ -11,6 +11,7 @@ from daq.link import LinkState, RequestRefusedError
 from firmware_protocol.commands import (
     AFTER_NEWEST,
     ALL_JOINTS,
+    PROTOCOL_VERSION,
     Advance,
     Advanced,
     Block,
@@ -31,7 +32,7 @@ AT_REST_COUNTS = 12
 
 def test_it_says_who_it_is(controller: Controller) -> None:
     identity = controller.identity
-    assert identity.version == 1
+    assert identity.version == PROTOCOL_VERSION
     assert 0.001 <= identity.period_s <= 1.0
     assert identity.boots >= 1
     assert (identity.ring_depth >= 8) == (Capability.SAMPLE in identity.capabilities)

@@ -1,24 +1,30 @@
-"""What every bridge makes of single frames: repeats, old commands, damage and noise. Set points written here are those
-already in force."""
+"""What every bridge makes of single frames: repeats, old and recorded commands, damage and noise. Set points written
+here are those already in force."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import closing
+from random import getrandbits
 
 import pytest
 
 from daq.driver import Controller
 from daq.transport import ByteChannel
 from firmware_protocol.commands import (
+    PROTOCOL_VERSION,
+    UNSTAMPED,
     Hello,
     HelloReply,
     ReadStatus,
     Refusal,
     Refused,
+    Release,
+    Released,
     Reply,
     Request,
     SetPointsTaken,
+    Stamp,
     Status,
     StatusFlag,
     Stop,
@@ -42,10 +48,20 @@ class Line:
         self.channel = channel
         self._dialect = FramedDialect()
         self._arrived: list[tuple[int, Reply]] = []
+        self.session = 0
 
-    def ask(self, sequence: int, request: Request, before: bytes = b"") -> Reply:
-        """The reply to one frame, with any bytes `before` it; replies under other numbers are an error."""
-        self.channel.write(before + encode_frame(to_frame(sequence, request)))
+    def greet(self) -> None:
+        """Begins a session."""
+        reply = self.ask(0, Hello(PROTOCOL_VERSION, getrandbits(32)))
+        assert isinstance(reply, HelloReply)
+        self.session = reply.session
+
+    def ask(
+        self, sequence: int, request: Request, stamp: Stamp = UNSTAMPED, *, number: int = 0, before: bytes = b""
+    ) -> Reply:
+        """The reply to one frame, with any bytes `before` it; replies under other sequence numbers are an error."""
+        stamp = Stamp(self.session, number) if number else stamp
+        self.channel.write(before + encode_frame(to_frame(sequence, request, stamp)))
         while not self._arrived:
             data = self.channel.read(REPLY_S)
             assert data, f"no reply to {request}"
@@ -68,42 +84,51 @@ def line(set_points: tuple[tuple[int, int], ...], under_contract: UnderContract)
         while channel.read(QUIET_S):
             pass  # late replies to what the connection before asked twice
         line = Line(channel)
-        assert isinstance(line.ask(0, Hello()), HelloReply)
+        line.greet()
         yield line
 
 
 def test_a_repeated_command_is_answered_again(line: Line, set_points: tuple[tuple[int, int], ...]) -> None:
     for _ in range(3):
-        assert isinstance(line.ask(10, WriteSetPoints(set_points)), SetPointsTaken)
+        assert isinstance(line.ask(10, WriteSetPoints(set_points), number=10), SetPointsTaken)
 
 
 def test_an_old_command_cannot_undo_a_later_one(line: Line, set_points: tuple[tuple[int, int], ...]) -> None:
     request = WriteSetPoints(set_points)
-    assert isinstance(line.ask(11, request), SetPointsTaken)
-    assert line.ask(10, request) == Refused(request.OPCODE, Refusal.STALE)
+    assert isinstance(line.ask(11, request, number=11), SetPointsTaken)
+    assert line.ask(10, request, number=10) == Refused(request.OPCODE, Refusal.STALE)
     assert isinstance(line.ask(10, ReadStatus()), Status), "reading is never too late"
-    assert isinstance(line.ask(12, request), SetPointsTaken)
+    assert isinstance(line.ask(12, request, number=12), SetPointsTaken)
 
 
-def test_a_stop_is_obeyed_however_old_its_number(line: Line, set_points: tuple[tuple[int, int], ...]) -> None:
-    assert isinstance(line.ask(20, WriteSetPoints(set_points)), SetPointsTaken)
+def test_a_stop_is_obeyed_without_a_session_under_any_sequence_number(
+    line: Line, set_points: tuple[tuple[int, int], ...]
+) -> None:
+    assert isinstance(line.ask(20, WriteSetPoints(set_points), number=20), SetPointsTaken)
     assert isinstance(line.ask(15, Stop()), Stopped)
     status = line.ask(21, ReadStatus())
     assert isinstance(status, Status)
     assert status.status & StatusFlag.FROZEN, "answered, and obeyed"
 
 
-def test_numbers_go_on_after_65535(line: Line, set_points: tuple[tuple[int, int], ...]) -> None:
-    request = WriteSetPoints(set_points)
-    for sequence in (0x3FFF, 0x7FFE, 0xBFFD, 0xFFFC, 0xFFFF, 0x0000, 0x0001):
-        assert isinstance(line.ask(sequence, request), SetPointsTaken)
-    assert line.ask(0xFFFF, request) == Refused(request.OPCODE, Refusal.STALE)
-
-
-def test_a_greeting_forgets_the_numbers(line: Line, set_points: tuple[tuple[int, int], ...]) -> None:
-    assert isinstance(line.ask(500, WriteSetPoints(set_points)), SetPointsTaken)
-    assert isinstance(line.ask(0, Hello()), HelloReply)
-    assert isinstance(line.ask(1, WriteSetPoints(set_points)), SetPointsTaken)
+def test_what_was_recorded_in_an_earlier_session_does_nothing(
+    line: Line, set_points: tuple[tuple[int, int], ...]
+) -> None:
+    recorded = [(30, Stamp(line.session, 1), WriteSetPoints(set_points))]
+    assert isinstance(line.ask(30, WriteSetPoints(set_points), number=1), SetPointsTaken)
+    assert isinstance(line.ask(31, Stop()), Stopped)
+    first = line.ask(32, ReadStatus())
+    assert isinstance(first, Status)
+    recorded.append((33, Stamp(line.session, 2), Release(first.stop)))  # type: ignore[arg-type]
+    assert line.ask(33, Release(first.stop), number=2) == Released()
+    line.greet()
+    assert isinstance(line.ask(34, Stop()), Stopped)
+    for sequence, stamp, request in recorded:
+        assert line.ask(sequence, request, stamp) == Refused(request.OPCODE, Refusal.BAD_SESSION)
+    status = line.ask(35, ReadStatus())
+    assert isinstance(status, Status)
+    assert status.status & StatusFlag.FROZEN
+    assert status.stop != first.stop
 
 
 @pytest.mark.parametrize(

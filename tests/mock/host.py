@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from firmware_protocol.commands import Reply, Request
+from firmware_protocol.commands import PROTOCOL_VERSION, Hello, ReadStatus, Release, Released, Reply, Request, Status
 from firmware_protocol.dialect import IDLE_MARK, FramedDialect
+from firmware_protocol.framing import FrameDecoder, encode_frame
 from mock_controller.device import Device, build_device
 from mock_controller.lock_step import LockStepPace
 from mock_controller.options import Options
@@ -17,15 +18,24 @@ def make_device(**options: Any) -> Device:
     return build_device(Options(tcp="nowhere:0", **options), lambda _: None)
 
 
-class LockStepHost:
-    """Speaks to a mock in lock-step, one turn at a time."""
+def greet(device: Device, dialect: FramedDialect) -> None:
+    """Begins a session behind the line's back: it takes no time and meets no fault."""
+    ((frame),) = FrameDecoder().feed(dialect.encode(0, Hello(PROTOCOL_VERSION, 0x600D)))
+    (reply,) = device.bridge.receive(frame)
+    dialect.feed(encode_frame(reply))
 
-    def __init__(self, **options: Any) -> None:
+
+class LockStepHost:
+    """Speaks to a mock in lock-step, one turn at a time; greeted, where `greeted`, without the board's time passing."""
+
+    def __init__(self, *, greeted: bool = True, **options: Any) -> None:
         self.device = make_device(lock_step=True, **options)
         self.board = self.device.board
         self.pace = LockStepPace(self.device.link)
         self.dialect = FramedDialect()
         self.sequence = 0
+        if greeted:
+            greet(self.device, self.dialect)
 
     def turn(self, data: bytes) -> bytes:
         """All that the mock says to some bytes."""
@@ -50,6 +60,12 @@ class LockStepHost:
         assert answered == (self.sequence if sequence is None else sequence)
         return reply
 
+    def release(self) -> None:
+        """Ends the freeze of the newest stop."""
+        status = self.ask(ReadStatus())
+        assert isinstance(status, Status)
+        assert self.ask(Release(status.stop)) == Released()
+
 
 class HandClock:
     """A clock (µs) that moves when it is told to."""
@@ -70,6 +86,7 @@ class RealTimeHost:
         self.board = self.device.board
         self.pace = RealTimePace(self.device.link, self.device.board, self.clock)
         self.dialect = FramedDialect()
+        greet(self.device, self.dialect)
 
     def send(self, sequence: int, request: Request) -> None:
         """Puts a request on the line now."""

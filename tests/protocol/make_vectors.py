@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields, is_dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,8 @@ from firmware_protocol import commands as c
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import MAX_BODY, Frame, crc16, encode_frame, stuff
 from firmware_protocol.units import counts_to_posture, posture_to_counts
+from tests.protocol.dialogues import DIALOGUES
+from tests.protocol.play import as_json, play, second_bridge
 
 FILE = Path(__file__).parents[2] / "firmware_protocol" / "vectors.json"
 
@@ -24,15 +26,16 @@ READINGS = (
 )
 
 MESSAGES: tuple[c.Message, ...] = (
-    c.Hello(),
-    c.HelloReply(c.PROTOCOL_VERSION, int(c.Capability.SAMPLE), 20_000, 8, 1),
-    c.HelloReply(c.PROTOCOL_VERSION, 7, 20_000, 16, 0x0102),
+    c.Hello(c.PROTOCOL_VERSION, 0x12345678),
+    c.HelloReply(c.PROTOCOL_VERSION, int(c.Capability.SAMPLE), 20_000, 8, 1, 0x12345678, 0x00010001),
+    c.HelloReply(c.PROTOCOL_VERSION, 7, 20_000, 16, 0x0102, 0, 0xFFFFFFFF),
+    c.HelloReply(c.PROTOCOL_VERSION, 1, 20_000, 8, 1),
     c.ReadBlock(0xFC20, 11),
     c.ReadBlock(0xFC00, 48),
     c.Block(bytes((0xF9, 0x00, 0xFF, 0, 0, 0, 0, 0, 0x07, 0x00, 0x0F))),
     c.Block(bytes(48)),
     c.WriteBlock(0xFC71, b"\x05"),
-    c.WriteBlock(0xFC00, bytes(range(1, 47))),
+    c.WriteBlock(0xFC00, bytes(range(1, 39))),
     c.BlockWritten(),
     c.WriteSetPoints(((1, 500), (2, 500), (3, 999))),
     c.WriteSetPoints(((6, 0),)),
@@ -51,7 +54,7 @@ MESSAGES: tuple[c.Message, ...] = (
     c.Snapshot(0, int(c.StatusFlag.RESTARTED), (READINGS[4],)),
     c.Stop(),
     c.Stopped(1236, (498, 0, 999, 256, 255, 63)),
-    c.Release(),
+    c.Release(0x00010002),
     c.Released(),
     c.ReadProcess(),
     c.Process(0b10100101, 0b00000101, 1),
@@ -60,31 +63,35 @@ MESSAGES: tuple[c.Message, ...] = (
     c.SetGripper(1),
     c.GripperSet(),
     c.ReadStatus(),
-    c.Status(70_000, 0, 1, 3),
+    c.Status(70_000, 0, 1, 3, 0x00010002),
     c.Advance(20_000),
     c.Advanced(1_420_000, 71),
     c.Refused(c.WriteSetPoints.OPCODE, c.Refusal.STALE),
 )
 
+STAMP = bytes(8)
+
 REFUSED: tuple[tuple[str, int, bytes, str], ...] = (
     ("request", 0x05, b"", "no such request"),
     ("request", 0x81, b"", "a reply's opcode in a request"),
-    ("request", 0x01, b"\x00", "Hello has no payload"),
+    ("request", 0x01, b"\x02\x00", "a greeting of version 2 has a nonce"),
     ("request", 0x02, b"\x20\xfc", "one byte short"),
     ("request", 0x02, b"\x20\xfc\x00", "no bytes asked for"),
     ("request", 0x02, b"\x20\xfc\x31", "49 bytes do not fit in a reply"),
     ("request", 0x02, b"\xff\xff\x02", "beyond FFFF"),
-    ("request", 0x03, b"\x71\xfc", "nothing to write"),
-    ("request", 0x04, b"", "no mask"),
-    ("request", 0x04, b"\x00", "mask without joints"),
-    ("request", 0x04, b"\x40\x00\x00", "joint 7"),
-    ("request", 0x04, b"\x01\xe8\x03", "set point 1000"),
-    ("request", 0x04, b"\x03\xf4\x01", "two joints, one set point"),
-    ("request", 0x07, b"\x00\x02\x00\x00", "joint 0"),
-    ("request", 0x07, b"\x01\x15\x00\x00", "gain 21"),
+    ("request", 0x03, STAMP + b"\x71\xfc", "nothing to write"),
+    ("request", 0x04, STAMP + b"", "no mask"),
+    ("request", 0x04, b"\x01\xf4\x01", "no stamp"),
+    ("request", 0x21, b"\x01\x00\x00\x00", "no stamp"),
+    ("request", 0x04, STAMP + b"\x00", "mask without joints"),
+    ("request", 0x04, STAMP + b"\x40\x00\x00", "joint 7"),
+    ("request", 0x04, STAMP + b"\x01\xe8\x03", "set point 1000"),
+    ("request", 0x04, STAMP + b"\x03\xf4\x01", "two joints, one set point"),
+    ("request", 0x07, STAMP + b"\x00\x02\x00\x00", "joint 0"),
+    ("request", 0x07, STAMP + b"\x01\x15\x00\x00", "gain 21"),
     ("request", 0x08, b"\x00", "mask without joints"),
     ("request", 0x10, b"\x00\x00\x00\x00\x80", "mask with joint 8"),
-    ("request", 0x32, b"\x02", "a gripper is 0 or 1"),
+    ("request", 0x32, STAMP + b"\x02", "a gripper is 0 or 1"),
     ("reply", 0x01, b"", "a request's opcode in a reply"),
     ("reply", 0x82, b"", "an empty block"),
     ("reply", 0x86, bytes(17), "gains of less than six joints"),
@@ -94,48 +101,20 @@ REFUSED: tuple[tuple[str, int, bytes, str], ...] = (
     ("reply", 0xA0, b"\x00\x00\x00\x00" + b"\xe8\x03" * 6, "frozen at 1000"),
 )
 
-ARRIVALS: tuple[tuple[str, tuple[tuple[int, c.Request], ...]], ...] = (
-    ("a late write is stale", ((1, c.Hello()), (10, c.Release()), (9, c.Release()), (11, c.Release()))),
-    ("a repeat is answered again", ((1, c.Hello()), (10, c.Advance(1000)), (10, c.Advance(1000)))),
-    ("time makes no command stale", ((10, c.Release()), (12, c.Advance(1000)), (11, c.Release()), (9, c.Release()))),
-    ("a late advance is stale", ((5, c.Advance(1000)), (6, c.Advance(1000)), (5, c.Advance(1000)))),
-    ("numbers wrap", ((65535, c.Release()), (0, c.Release()), (65535, c.Release()), (1, c.Release()))),
-    ("half the circle", ((0, c.Release()), (32768, c.Release()), (1, c.Release()), (32769, c.Release()))),
-    ("stop is obeyed however late", ((100, c.Release()), (90, c.Stop()), (95, c.Release()), (101, c.Release()))),
-    ("hello forgets", ((500, c.Release()), (1, c.Hello()), (2, c.Release()))),
-    ("reads are never stale", ((500, c.Release()), (400, c.ReadStatus()), (501, c.Release()))),
-    (
-        "many reads do not make the next write look old",
-        (
-            (0, c.Release()),
-            (20000, c.ReadStatus()),
-            (36000, c.ReadStatus()),
-            (40000, c.Release()),
-            (39999, c.Release()),
-        ),
-    ),
-)
-
-
-def as_json(value: Any) -> Any:
-    """A message's fields as JSON: bytes in hex, tuples as arrays, readings as objects."""
-    if is_dataclass(value):
-        return {field.name: as_json(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, bytes):
-        return value.hex()
-    if isinstance(value, tuple):
-        return [as_json(item) for item in value]
-    return int(value)
-
 
 def _frames() -> list[dict[str, Any]]:
     vectors = []
     for i, message in enumerate(MESSAGES):
         sequence = (0x0203 * (7 * i + 1)) & 0xFFFF
-        wire = encode_frame(c.to_frame(sequence, message))
-        name = type(message).__name__
-        vectors.append({"message": name, "sequence": sequence, "fields": as_json(message), "frame": wire.hex()})
+        stamp = {"session": 0x0102FF00 + i, "number": 256 * i} if _is_command(message) else {}
+        wire = encode_frame(c.to_frame(sequence, message, c.Stamp(**stamp) if stamp else c.UNSTAMPED))
+        name, fields = type(message).__name__, {**stamp, **as_json(message)}
+        vectors.append({"message": name, "sequence": sequence, "fields": fields, "frame": wire.hex()})
     return vectors
+
+
+def _is_command(message: c.Message) -> bool:
+    return isinstance(message, c.Request) and message.IS_COMMAND
 
 
 def _damaged() -> list[dict[str, str]]:
@@ -180,12 +159,17 @@ def _cobs() -> list[dict[str, str]]:
     return [{"body": body.hex(), "stuffed": stuff(body).hex()} for body in bodies]
 
 
-def _arrivals() -> list[dict[str, Any]]:
+def _dialogues() -> list[dict[str, Any]]:
+    """Each with the bytes that it takes with the second implementation, whose board has every joint at 2048 counts."""
     vectors = []
-    for name, requests in ARRIVALS:
-        order = c.ArrivalOrder()
-        steps = [[sequence, request.OPCODE, order.judge(sequence, request).name] for sequence, request in requests]
-        vectors.append({"rule": name, "steps": steps})
+    for dialogue in DIALOGUES:
+        nonces = count(0x5EED0000)
+        lines = play(dialogue.steps, second_bridge(), lambda numbers=nonces: next(numbers))  # type: ignore[misc]
+        steps = [
+            step if line is None else {**step, "frame": line.hex()}
+            for step, line in zip(dialogue.steps, lines, strict=True)
+        ]
+        vectors.append({"rule": dialogue.rule, "needs": list(dialogue.needs), "steps": steps})
     return vectors
 
 
@@ -216,7 +200,7 @@ def vectors() -> dict[str, Any]:
         "frames": _frames(),
         "damaged": _damaged(),
         "refused": _refused(),
-        "arrivals": _arrivals(),
+        "dialogues": _dialogues(),
         "posture_to_counts": [[p, posture_to_counts(p)] for p in (0, 1, 2, 63, 80, 122, 123, 125, 250, 500, 998, 999)],
         "counts_to_posture": [
             [n, counts_to_posture(n)] for n in (0, 1, 2, 3, 255, 256, 257, 767, 768, 2048, 3839, 3840, 4093, 4094, 4095)
@@ -224,11 +208,19 @@ def vectors() -> dict[str, Any]:
     }
 
 
+def _rendered_dialogue(dialogue: dict[str, Any]) -> str:
+    rule, needs = json.dumps(dialogue["rule"]), json.dumps(dialogue["needs"])
+    steps = ",\n".join(f"      {json.dumps(step, ensure_ascii=False)}" for step in dialogue["steps"])
+    return f'    {{"rule": {rule}, "needs": {needs}, "steps": [\n{steps}\n    ]}}'
+
+
 def rendered() -> str:
     """The file's text: one vector a line, so that a change shows as one."""
     parts = []
     for name, value in vectors().items():
-        if isinstance(value, list):
+        if name == "dialogues":
+            parts.append(f'  "{name}": [\n' + ",\n".join(map(_rendered_dialogue, value)) + "\n  ]")
+        elif isinstance(value, list):
             items = ",\n".join(f"    {json.dumps(item, ensure_ascii=False)}" for item in value)
             parts.append(f'  "{name}": [\n{items}\n  ]')
         else:

@@ -28,16 +28,16 @@ gain = st.integers(0, 20)
 postures = st.integers(0, 999)
 
 REQUESTS: dict[type[c.Request], st.SearchStrategy[c.Request]] = {
-    c.Hello: st.builds(c.Hello),
+    c.Hello: st.builds(c.Hello, st.just(c.PROTOCOL_VERSION), u32),
     c.ReadBlock: st.builds(c.ReadBlock, st.integers(0, 0xFFFF - 47), st.integers(1, 48)),
-    c.WriteBlock: st.builds(c.WriteBlock, st.integers(0, 0xFFFF - 45), st.binary(min_size=1, max_size=46)),
+    c.WriteBlock: st.builds(c.WriteBlock, st.integers(0, 0xFFFF - 37), st.binary(min_size=1, max_size=38)),
     c.WriteSetPoints: st.builds(c.WriteSetPoints, of_joints(postures)),
     c.ReportGains: st.builds(c.ReportGains),
     c.SetGains: st.builds(c.SetGains, st.integers(1, 6), gain, gain, gain),
     c.ReportErrorsPositionsPowers: st.builds(c.ReportErrorsPositionsPowers, masks),
     c.Sample: st.builds(c.Sample, u32, masks),
     c.Stop: st.builds(c.Stop),
-    c.Release: st.builds(c.Release),
+    c.Release: st.builds(c.Release, u32),
     c.ReadProcess: st.builds(c.ReadProcess),
     c.WriteOutputs: st.builds(c.WriteOutputs, u8, u8),
     c.SetGripper: st.builds(c.SetGripper, st.integers(0, 1)),
@@ -45,7 +45,7 @@ REQUESTS: dict[type[c.Request], st.SearchStrategy[c.Request]] = {
     c.Advance: st.builds(c.Advance, u32),
 }
 REPLIES: dict[type[c.Reply], st.SearchStrategy[c.Reply]] = {
-    c.HelloReply: st.builds(c.HelloReply, u8, u16, u32, u8, u16),
+    c.HelloReply: st.builds(c.HelloReply, u8, u16, u32, u8, u16, u32, st.integers(1, 0xFFFFFFFF)),
     c.Block: st.builds(c.Block, st.binary(min_size=1, max_size=48)),
     c.BlockWritten: st.builds(c.BlockWritten),
     c.SetPointsTaken: st.builds(c.SetPointsTaken, u32, u8),
@@ -58,7 +58,7 @@ REPLIES: dict[type[c.Reply], st.SearchStrategy[c.Reply]] = {
     c.Process: st.builds(c.Process, u8, u8, u8),
     c.OutputsWritten: st.builds(c.OutputsWritten),
     c.GripperSet: st.builds(c.GripperSet),
-    c.Status: st.builds(c.Status, u32, u8, u16, u32),
+    c.Status: st.builds(c.Status, u32, u8, u16, u32, u32),
     c.Advanced: st.builds(c.Advanced, u64, u32),
     c.Refused: st.builds(c.Refused, u8, u8),
 }

@@ -16,8 +16,10 @@ from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import Frame, FrameDecoder, crc16, encode_frame, stuff
 from firmware_protocol.memory_map import default_memory_map
 from firmware_protocol.message import Message
+from firmware_protocol.stamp import LARGEST_NUMBER
 from firmware_protocol.units import GAIN_MAX, counts_to_posture, posture_to_counts
-from tests.protocol.make_vectors import FILE, MESSAGES, as_json
+from tests.protocol.make_vectors import FILE, MESSAGES
+from tests.protocol.play import as_json
 
 TEXT = (Path(FILE).parent / "PROTOCOL.md").read_text("utf-8")
 PERIOD_S = 0.020
@@ -63,11 +65,11 @@ def test_figures_in_the_text_of_frames() -> None:
 def test_a_frame_step_by_step() -> None:
     steps = {step: bytes.fromhex(data) for step, data in table("A frame step by step")}
     request = c.WriteSetPoints(((1, 500), (2, 508), (3, 515)))
-    frame = c.to_frame(1, request)
+    frame = c.to_frame(1, request, c.Stamp(0x10001, 1))
     header = bytes((len(frame.payload), 1, 0, frame.opcode))
     with_crc = header + frame.payload + crc16(header + frame.payload).to_bytes(2, "big")
     assert steps == {
-        "payload": request.pack(),
+        "payload": frame.payload,
         "header and payload": header + frame.payload,
         "with CRC": with_crc,
         "stuffed": stuff(with_crc),
@@ -95,6 +97,7 @@ def read_payload(layout: str, payload: bytes) -> dict[str, list[int]]:
         return int(value)
 
     joints = 0
+    layout = layout.replace("stamp", "session:u32 number:u32")
     for part in re.findall(rf"[n6]×\([^)]*\)|{FIELD}|bytes", layout):
         if part == "bytes":
             values["data"] = list(payload[place:])
@@ -135,6 +138,13 @@ def flat(message: Message) -> dict[str, list[int]]:
     return values
 
 
+STAMP = c.Stamp(0x01020304, 0x05060708)
+
+
+def is_command(message: Message) -> bool:
+    return isinstance(message, c.Request) and message.IS_COMMAND
+
+
 def documented_messages() -> dict[str, list[str]]:
     return {row[1]: row for row in (*table("Requests"), *table("Replies"))}
 
@@ -142,16 +152,20 @@ def documented_messages() -> dict[str, list[str]]:
 def test_every_message_is_in_the_tables_with_its_opcode() -> None:
     requests = {(int(row[0], 16), row[1], row[4] == "yes") for row in table("Requests")}
     replies = {(int(row[0], 16), row[1]) for row in table("Replies")}
-    assert requests == {(opcode, kind.__name__, kind.CHANGES_STATE) for opcode, kind in c.REQUESTS.items()}
+    assert requests == {(opcode, kind.__name__, kind.IS_COMMAND) for opcode, kind in c.REQUESTS.items()}
     assert replies == {(opcode, kind.__name__) for opcode, kind in c.REPLIES.items()}
 
 
-@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: type(message).__name__)
+WHOLE = [m for m in MESSAGES if not isinstance(m, c.HelloReply) or m.session != c.NO_SESSION]
+
+
+@pytest.mark.parametrize("message", WHOLE, ids=lambda message: type(message).__name__)
 def test_layouts_and_lengths(message: Message) -> None:
     _, _, layout, length, *_ = documented_messages()[type(message).__name__]
-    payload = message.pack()
+    payload = c.to_frame(0, message, STAMP).payload
     values = read_payload(layout, payload)
-    assert values == flat(message)
+    stamped = {name: [value] for name, value in vars(STAMP).items()} if is_command(message) else {}
+    assert values == stamped | flat(message)
     if "–" in length:
         least, most = map(int, length.split("–"))
         assert least <= len(payload) <= most
@@ -177,6 +191,8 @@ def test_ranges_of_values() -> None:
     assert limits("p, i, d in SetGains") == (0, GAIN_MAX)
     assert limits("count in ReadBlock") == (1, c.MAX_READ)
     assert limits("tick")[1] == c.AFTER_NEWEST
+    assert f"WriteBlock carries 1 to {c.MAX_WRITE}" in section("Values")
+    assert limits("session, stop") == limits("number in a stamp") == (1, LARGEST_NUMBER)
 
 
 @pytest.mark.parametrize(
@@ -192,8 +208,10 @@ def test_every_example_of_the_conversation_is_what_the_code_says() -> None:
     for name, sequence, fields, line in rows:
         (frame,) = FrameDecoder().feed(bytes.fromhex(line))
         message = c.parse_request(frame) if frame.opcode < 0x80 else c.parse_reply(frame)
-        assert (type(message).__name__, frame.sequence, as_json(message)) == (name, int(sequence), json.loads(fields))
-        assert encode_frame(c.to_frame(frame.sequence, message)) == bytes.fromhex(line)
+        stamp = c.stamp_of(frame) if is_command(message) else None
+        told = (vars(stamp) if stamp else {}) | as_json(message)
+        assert (type(message).__name__, frame.sequence, told) == (name, int(sequence), json.loads(fields))
+        assert encode_frame(c.to_frame(frame.sequence, message, stamp or c.UNSTAMPED)) == bytes.fromhex(line)
 
 
 def test_the_conversation_is_true_to_its_own_rules() -> None:
@@ -295,8 +313,8 @@ def test_figures_in_the_text_of_line_rates() -> None:
     text = section("Line rate against what can be sampled")
     for joints in range(1, 7):
         assert sampled(joints) == 29 + 7 * joints
-        assert commanded(joints) + sampled(joints) == 53 + 9 * joints
-    assert "53 + 9n bytes for n joints, 80 for three, 107 for six; Sample alone is 29 + 7n" in text
+        assert commanded(joints) + sampled(joints) == 61 + 9 * joints
+    assert "61 + 9n bytes for n joints, 88 for three, 115 for six; Sample alone is 29 + 7n" in text
     assert f"Sample and its reply alone take {sampled(3) / 230.4 * 100:.0f} %" in text
     assert f"one joint in every period and send no set points meanwhile: {sampled(1)} of the 38 bytes" in text
     assert "one block of 35 bytes, twice: 112 bytes" in text

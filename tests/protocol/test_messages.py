@@ -36,11 +36,41 @@ def test_every_reply_comes_back(kind: type[c.Reply], data: st.DataObject, sequen
 @pytest.mark.parametrize("opcode", sorted(c.REQUESTS))
 @given(payload=st.binary(max_size=MAX_PAYLOAD))
 def test_a_request_s_payload_is_taken_as_it_would_be_packed_or_not_at_all(opcode: int, payload: bytes) -> None:
+    if opcode == c.Hello.OPCODE and payload[:1] != bytes((c.PROTOCOL_VERSION,)):
+        return  # of a greeting in another version nothing but that is known
+    frame = Frame(0, opcode, payload)
     try:
-        outcome: bytes | c.Refusal = c.parse_request(Frame(0, opcode, payload)).pack()
+        request = c.parse_request(frame)
     except ProtocolError as error:
-        outcome = c.refusal_of(error)
-    assert outcome in (payload, c.Refusal.BAD_LENGTH, c.Refusal.BAD_VALUE)
+        outcome: Frame | c.Refusal = c.refusal_of(error)
+    else:
+        outcome = c.to_frame(0, request, c.stamp_of(frame) if request.IS_COMMAND else c.UNSTAMPED)
+    assert outcome in (frame, c.Refusal.BAD_LENGTH, c.Refusal.BAD_VALUE, c.Refusal.BAD_ADDRESS)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in REQUEST_KINDS if kind.IS_COMMAND], ids=named)
+@given(data=st.data(), session=st.integers(0, 0xFFFFFFFF), number=st.integers(0, 0xFFFFFFFF))
+def test_a_command_travels_behind_its_stamp(
+    kind: type[c.Request], data: st.DataObject, session: int, number: int
+) -> None:
+    request = data.draw(strategies.REQUESTS[kind])
+    frame = c.to_frame(1, request, c.Stamp(session, number))
+    assert c.stamp_of(frame) == c.Stamp(session, number)
+    assert frame.payload[8:] == request.pack()
+    assert c.parse_request(frame) == request
+
+
+def test_a_stop_has_no_stamp_and_the_layout_of_version_1() -> None:
+    assert not c.Stop.IS_COMMAND
+    assert c.to_frame(1, c.Stop(), c.Stamp(1, 1)).payload == b""
+    assert len(c.Stopped(1, (500,) * 6).pack()) == 16
+
+
+@pytest.mark.parametrize("payload", [b"", b"\x01", b"\x03", b"\x03" + bytes(30)])
+def test_a_greeting_of_any_other_version_is_understood_as_such(payload: bytes) -> None:
+    request = c.parse_request(Frame(0, c.Hello.OPCODE, payload))
+    assert isinstance(request, c.Hello)
+    assert request.version == (payload[0] if payload else 1)
 
 
 @pytest.mark.parametrize("opcode", sorted(c.REPLIES))
@@ -89,8 +119,8 @@ READING = c.JointReading(0, 0, 0, 0)
         (lambda: c.ReadBlock(0xFC20, 49), "ReadBlock: number of bytes of 49: allowed are 1 to 48"),
         (lambda: c.ReadBlock(0xFFFF, 2), "2 bytes from FFFF: the address space ends at FFFF"),
         (lambda: c.ReadBlock(-1, 2), "address of -1: allowed are 0 to 65535"),
-        (lambda: c.WriteBlock(0xFC20, b""), "number of bytes of 0: allowed are 1 to 46"),
-        (lambda: c.WriteBlock(0xFC20, bytes(47)), "number of bytes of 47: allowed are 1 to 46"),
+        (lambda: c.WriteBlock(0xFC20, b""), "number of bytes of 0: allowed are 1 to 38"),
+        (lambda: c.WriteBlock(0xFC20, bytes(39)), "number of bytes of 39: allowed are 1 to 38"),
         (lambda: c.WriteSetPoints(()), "no joints: at least one"),
         (lambda: c.WriteSetPoints(((2, 1), (1, 2))), "joints 2, 1: each once, in ascending order"),
         (lambda: c.WriteSetPoints(((1, 1), (1, 2))), "joints 1, 1: each once, in ascending order"),

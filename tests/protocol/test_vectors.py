@@ -1,6 +1,7 @@
 """vectors.json: it is what its generator makes, and a second implementation finds every vector true."""
 
 import json
+from random import Random
 from typing import Any
 
 import pytest
@@ -9,8 +10,12 @@ from firmware_protocol import commands as c
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import Frame, FrameDecoder, crc16, encode_frame, stuff, unstuff
 from firmware_protocol.units import counts_to_posture, posture_to_counts
+from mock_controller.bridge.bridge import Bridge
+from mock_controller.timeline import Timeline
+from tests.mock.host import make_device
 from tests.protocol import second_implementation as second
 from tests.protocol.make_vectors import FILE, as_json, rendered
+from tests.protocol.play import PurePartner, play, second_bridge
 
 VECTORS: dict[str, Any] = json.loads(FILE.read_text("utf-8"))
 
@@ -48,12 +53,10 @@ def test_frames(vector: dict[str, Any]) -> None:
     line = bytes.fromhex(vector["frame"])
     (frame,) = FrameDecoder().feed(line)
     message = c.parse_request(frame) if frame.opcode < 0x80 else c.parse_reply(frame)
-    assert (type(message).__name__, frame.sequence, as_json(message)) == (
-        vector["message"],
-        vector["sequence"],
-        vector["fields"],
-    )
-    assert encode_frame(c.to_frame(frame.sequence, message)) == line
+    stamp = c.stamp_of(frame) if isinstance(message, c.Request) and message.IS_COMMAND else c.UNSTAMPED
+    fields = as_json(message) if stamp == c.UNSTAMPED else {**vars(stamp), **as_json(message)}
+    assert (type(message).__name__, frame.sequence, fields) == (vector["message"], vector["sequence"], vector["fields"])
+    assert encode_frame(c.to_frame(frame.sequence, message, stamp)) == line
     assert second.read_frame(line[1:-1]) == (frame.sequence, frame.opcode, frame.payload)
     assert second.frame_of(frame.sequence, frame.opcode, frame.payload) == line
 
@@ -73,12 +76,52 @@ def test_refused_payloads(vector: dict[str, Any]) -> None:
     assert c.refusal_of(caught.value).name == vector["reason"]
 
 
-@pytest.mark.parametrize("vector", VECTORS["arrivals"], ids=lambda v: v["rule"])
-def test_arrivals(vector: dict[str, Any]) -> None:
-    order = c.ArrivalOrder()
-    for sequence, opcode, verdict in vector["steps"]:
-        request = c.Advance(1000) if opcode == c.Advance.OPCODE else c.REQUESTS[opcode]()
-        assert order.judge(sequence, request).name == verdict
+@pytest.mark.parametrize("dialogue", VECTORS["dialogues"], ids=lambda d: d["rule"])
+def test_dialogues_with_the_second_implementation(dialogue: dict[str, Any]) -> None:
+    """To the byte: the file says what its bridge said."""
+    bridge, steps = second_bridge(), dialogue["steps"]
+    for number, step in enumerate(steps):
+        if "board" in step:
+            bridge.happens(step["board"])
+        elif "host" in step:
+            bridge.send(bytes.fromhex(step["frame"]))
+        else:
+            assert encode_frame(bridge.reply(step["sequence"])).hex() == step["frame"], (number, step)
+    assert not bridge.rest()
+
+
+@pytest.mark.parametrize("dialogue", VECTORS["dialogues"], ids=lambda d: d["rule"])
+def test_dialogues_with_the_mock(dialogue: dict[str, Any]) -> None:
+    chance = Random(dialogue["rule"])
+    play(dialogue["steps"], mock(), lambda: chance.getrandbits(32))
+
+
+def mock(**options: Any) -> PurePartner:
+    """The mock's bridge without a line, early in a period of its board."""
+    device = make_device(**options)
+    bridge, decoder = device.bridge, FrameDecoder()
+
+    def said(frames: list[Frame]) -> bytes:
+        return b"".join(map(encode_frame, frames))
+
+    def after(us: int) -> bytes:
+        bridge.run_until(bridge.time_us + us)
+        return said(bridge.overdue())
+
+    def receive(data: bytes) -> bytes:
+        return b"".join(said(bridge.receive(frame)) for frame in decoder.feed(data))
+
+    def reset() -> bytes:
+        device.board.brown_out()
+        return after(device.board.parameters.timing.reset + 1_000)
+
+    def start_again() -> bytes:
+        nonlocal bridge
+        bridge = Bridge(Timeline(device.board, device.faults), first_number=Random(1).getrandbits(32))
+        return b""
+
+    after(7_000)
+    return PurePartner(receive, {"period": lambda: after(20_000), "reset": reset, "bridge": start_again})
 
 
 def test_rounding() -> None:

@@ -32,7 +32,7 @@ from server.store.schedules import ScheduleStore
 from tests.server.clocks import HandClock
 
 CALM = ArmReport(arm="idle", cause="", activity="none", limp=(), link="connected", counters={})
-MOCK = RobotIdentity(simulated=True, protocol=1, period=0.02, boots=1)
+MOCK = RobotIdentity(simulated=True, protocol=2, period=0.02, boots=1)
 REAL = MOCK.model_copy(update={"simulated": False})
 FULL = OperationalError("INSERT", {}, Exception("database or disk is full"))
 SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]})

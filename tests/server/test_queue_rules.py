@@ -147,7 +147,7 @@ def _arm(**changes: object) -> ArmReport:
     return ArmReport.model_validate(calm | changes)
 
 
-REAL = RobotIdentity(simulated=False, protocol=1, period=0.02, boots=1)
+REAL = RobotIdentity(simulated=False, protocol=2, period=0.02, boots=1)
 MOCK = REAL.model_copy(update={"simulated": True})
 
 

@@ -53,7 +53,7 @@ class MemoryBoard:
             reply = Block(bytes(self.byte(address, begin + i * self.byte_s) for i, address in enumerate(addresses)))
         else:
             assert isinstance(request, ReadStatus)
-            reply = Status(0, 0, 1, 0)
+            reply = Status(0, 0, 1, 0, 0)
         return [(2 * self.delay_s + duration, frame_of(sequence, reply))]
 
     def byte(self, address: int, time_s: float) -> int:

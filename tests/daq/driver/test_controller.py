@@ -15,6 +15,8 @@ from firmware_protocol.commands import (
     GainsSet,
     Hello,
     HelloReply,
+    Refusal,
+    Refused,
     Reply,
     ReportGains,
     Request,
@@ -22,11 +24,13 @@ from firmware_protocol.commands import (
     SetGains,
     Snapshot,
     Status,
+    Stop,
+    Stopped,
 )
 from firmware_protocol.joints import JointReading
 from tests.daq.link.scripted import frame_of, scripted_link
 
-HELLO = HelloReply(1, Capability.SAMPLE, 20_000, 8, 3)
+HELLO = HelloReply(2, Capability.SAMPLE, 20_000, 8, 3, 0, 7)
 
 
 def controller_that(answers: Callable[[Request], Reply | None], hello: HelloReply = HELLO) -> Controller:
@@ -41,13 +45,26 @@ def controller_that(answers: Callable[[Request], Reply | None], hello: HelloRepl
 
 
 def test_another_protocol_is_refused_with_both_versions() -> None:
-    newer = HelloReply(2, Capability.SAMPLE, 20_000, 8, 1)
-    with pytest.raises(ProtocolVersionError, match="the controller speaks protocol 2, this software 1"):
+    newer = HelloReply(3, Capability.SAMPLE, 20_000, 8, 1)
+    with pytest.raises(ProtocolVersionError, match="speaks protocol 3, this software 2: update this software"):
         controller_that(lambda _: None, newer)
 
 
+def test_a_bridge_of_version_1_is_refused_in_one_line_and_can_be_stopped_all_the_same() -> None:
+    stopped = Stopped(7, (500,) * 6)
+
+    def version_1(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        reply = stopped if isinstance(request, Stop) else Refused(request.OPCODE, Refusal.BAD_LENGTH)
+        return [(0.001, frame_of(sequence, reply))]
+
+    link, _ = scripted_link(version_1)
+    with pytest.raises(ProtocolVersionError, match="protocol 1, this software 2: update the controller's bridge"):
+        Controller(link)
+    assert link.stop() == stopped
+
+
 def test_a_controller_in_lock_step_must_be_named_so() -> None:
-    lock_step = HelloReply(1, Capability.LOCK_STEP, 20_000, 0, 1)
+    lock_step = HelloReply(2, Capability.LOCK_STEP, 20_000, 0, 1, 0, 7)
     with pytest.raises(TransportError, match=r"runs in lock-step: add \?lock_step=1 to the URL"):
         controller_that(lambda _: None, lock_step)
 
@@ -68,7 +85,7 @@ def test_gains_are_named_by_joint() -> None:
 
 def test_a_sample_older_than_asked_for_is_not_delivered() -> None:
     old = Snapshot(7, 0, ((1, JointReading(500, 2048, 0, 0)),))
-    controller = controller_that(lambda request: old if isinstance(request, Sample) else Status(7, 0, 3, 0))
+    controller = controller_that(lambda request: old if isinstance(request, Sample) else Status(7, 0, 3, 0, 0))
     with pytest.raises(NoSampleError, match="sent tick 7, asked for one after 9"):
         controller.next_snapshot(after=9)
 
@@ -91,7 +108,7 @@ def test_a_stop_over_an_ended_channel_was_not_sent() -> None:
 
 def test_a_silent_controller_is_a_time_out_whatever_was_asked() -> None:
     with pytest.raises(LinkTimeoutError, match="no reply to Sample"):
-        controller_that(lambda request: None if isinstance(request, Sample) else Status(7, 0, 3, 0)).next_snapshot()
+        controller_that(lambda request: None if isinstance(request, Sample) else Status(7, 0, 3, 0, 0)).next_snapshot()
 
 
 def test_a_gap_in_the_ticks_is_counted_as_missing() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from random import Random
 
 from daq.link import Link
 from daq.transport import ChannelError, TransportError
@@ -92,4 +93,11 @@ class ScriptedEndpoint:
 def scripted_link(answer: Answer, lock_step: bool = False) -> tuple[Link, ScriptedChannel]:
     """A link to a scripted controller, and the channel to look at."""
     channel = ScriptedChannel(answer, marks=lock_step)
-    return Link(ScriptedEndpoint([channel], lock_step), now=channel.now), channel
+    return Link(ScriptedEndpoint([channel], lock_step), now=channel.now, chance=Zeros()), channel
+
+
+class Zeros(Random):
+    """No chance at all: sequence numbers begin at 0, every nonce is 0."""
+
+    def getrandbits(self, bits: int, /) -> int:
+        return 0

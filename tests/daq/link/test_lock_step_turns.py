@@ -13,7 +13,7 @@ from firmware_protocol.commands import Advance, Advanced, ReadStatus, Request, S
 from firmware_protocol.dialect import IDLE_MARK
 from tests.daq.link.scripted import frame_of, scripted_link
 
-STATUS = Status(7, 0, 1, 0)
+STATUS = Status(7, 0, 1, 0, 0)
 
 
 def test_a_reply_missing_at_the_mark_has_timed_out_and_the_board_is_given_the_time_of_the_wait() -> None:

@@ -10,8 +10,6 @@ from daq.link import Link, LinkLostError, LinkState, LinkTimeoutError, RequestRe
 from daq.link.timing import CLEAN_TRANSACTIONS, HELLO_RETRIES, RETRIES
 from firmware_protocol.commands import (
     Block,
-    Hello,
-    HelloReply,
     ReadBlock,
     ReadStatus,
     Refusal,
@@ -25,9 +23,9 @@ from firmware_protocol.commands import (
     WriteSetPoints,
 )
 from firmware_protocol.joints import JointReading
-from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint, frame_of, scripted_link
+from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint, Zeros, frame_of, scripted_link
 
-STATUS = Status(7, 0, 1, 0)
+STATUS = Status(7, 0, 1, 0, 0)
 TAKEN = SetPointsTaken(7, 0)
 SNAPSHOT = Snapshot(8, 0, ((1, JointReading(500, 2048, 0, 0)),))
 
@@ -76,7 +74,7 @@ def test_a_greeting_is_asked_for_long_enough_for_a_bridge_that_starts_anew() -> 
     link, channel = scripted_link(lambda _sequence, _request: [])
     begun = channel.now()
     with pytest.raises(LinkTimeoutError, match="no reply to Hello"):
-        link.request(Hello(), HelloReply)
+        link.greet()
     assert len(channel.asked) == HELLO_RETRIES + 1
     assert channel.now() - begun > 1.0
 
@@ -153,7 +151,7 @@ def test_after_the_channel_has_ended_nothing_is_asked_until_reconnected() -> Non
     first = ScriptedChannel(lambda _sequence, _request: [])
     second = ScriptedChannel(lambda sequence, _: [(0.0, frame_of(sequence, STATUS))])
     endpoint = ScriptedEndpoint([first, second])
-    link = Link(endpoint, now=first.now)
+    link = Link(endpoint, now=first.now, chance=Zeros())
     first.broken = "cable pulled"
     for _ in range(2):
         with pytest.raises(LinkLostError, match="cable pulled"):

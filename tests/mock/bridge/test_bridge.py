@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import pytest
@@ -44,11 +45,14 @@ from firmware_protocol.commands import (
     WriteBlock,
     WriteOutputs,
     WriteSetPoints,
+    parse_reply,
+    to_frame,
 )
 from firmware_protocol.framing import Frame, encode_frame
 from firmware_protocol.units import counts_to_posture
 from mock_controller.board.parameters import default_board_text
-from mock_controller.bridge.bridge import WAIT_LIMIT_PERIODS
+from mock_controller.bridge.bridge import WAIT_LIMIT_PERIODS, Bridge
+from mock_controller.timeline import Timeline
 from tests.mock.host import LockStepHost, RealTimeHost
 
 
@@ -64,9 +68,61 @@ def refusal(reply: object) -> Refusal:
 
 def test_hello_tells_what_the_bridge_can_do(host: LockStepHost) -> None:
     everything = Capability.SAMPLE | Capability.LOCK_STEP | Capability.SIMULATED
-    assert host.ask(Hello()) == HelloReply(1, everything, 20_000, 64, 1)
-    without = LockStepHost(sample=False).ask(Hello())
-    assert without == HelloReply(1, Capability.LOCK_STEP | Capability.SIMULATED, 20_000, 0, 1)
+    reply = host.ask(Hello(2, 77))
+    assert isinstance(reply, HelloReply)
+    assert reply == HelloReply(2, everything, 20_000, 64, 1, 77, reply.session)
+    assert reply.session != 0
+    without = LockStepHost(sample=False).ask(Hello(2, 78))
+    assert isinstance(without, HelloReply)
+    assert without == HelloReply(2, Capability.LOCK_STEP | Capability.SIMULATED, 20_000, 0, 1, 78, without.session)
+
+
+def test_a_host_of_another_version_is_told_in_words_that_version_1_understands(host: LockStepHost) -> None:
+    everything = Capability.SAMPLE | Capability.LOCK_STEP | Capability.SIMULATED
+    for payload in (b"", b"\x01", b"\x03" + bytes(20)):
+        (answer,) = host.device.bridge.receive(Frame(7, Hello.OPCODE, payload))
+        assert struct.unpack("<BHIBH", answer.payload) == (2, everything, 20_000, 64, 1)
+    assert host.ask(SetGains(2, 5, 1, 3)) == GainsSet(), "the session goes on"
+    (answer,) = host.device.bridge.receive(Frame(7, Stop.OPCODE, b""))
+    assert len(answer.payload) == struct.calcsize("<I6H"), "a stop is confirmed to it as version 1 did"
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (WriteOutputs(1, 1), WriteSetPoints(((1, 520),))),
+        (SetGripper(1), SetGains(1, 3, 0, 0)),
+        (WriteBlock(0xFC78, b"1"), Release(0)),
+    ],
+)
+def test_no_command_is_obeyed_without_a_session(first: Request, second: Request) -> None:
+    host = LockStepHost(greeted=False)
+    before = bytes(host.board.memory.get(0xFC00 + offset) for offset in range(0x80))
+    for request in (first, second):
+        assert refusal(host.ask(request)) is Refusal.BAD_SESSION
+    assert bytes(host.board.memory.get(0xFC00 + offset) for offset in range(0x80)) == before
+    assert isinstance(host.ask(Stop()), Stopped), "a stop needs none"
+
+
+def test_the_session_ends_with_the_connection(host: LockStepHost) -> None:
+    assert host.ask(SetGripper(1)) == GripperSet()
+    host.pace.hang_up()
+    assert refusal(host.ask(SetGripper(0))) is Refusal.BAD_SESSION
+
+
+@pytest.mark.parametrize("first_number", [0xFFFFFFFF, 0])
+def test_no_session_and_no_stop_has_the_number_0(host: LockStepHost, first_number: int) -> None:
+    bridge = Bridge(Timeline(host.board, host.device.faults), first_number=first_number)
+    numbers = set()
+    for nonce in range(3):
+        reply = parse_reply(bridge.receive(to_frame(0, Hello(2, nonce)))[0])
+        assert isinstance(reply, HelloReply)
+        bridge.receive(to_frame(0, Stop()))
+        status = parse_reply(bridge.receive(to_frame(0, ReadStatus()))[0])
+        assert isinstance(status, Status)
+        numbers |= {reply.session, status.stop}
+    assert len(numbers) == 6
+    assert 0 not in numbers
 
 
 def test_set_points_are_in_the_memory_and_taken_by_the_next_period(host: LockStepHost) -> None:
@@ -136,7 +192,11 @@ def test_stop_freezes_the_measured_posture_and_refuses_set_points_until_release(
     assert isinstance(snapshot, Snapshot)
     assert snapshot.status & StatusFlag.FROZEN
     assert host.ask(Stop()) == stopped
-    assert host.ask(Release()) == Released()
+    status = host.ask(ReadStatus())
+    assert isinstance(status, Status)
+    assert refusal(host.ask(Release(status.stop - 1))) is Refusal.OTHER_STOP
+    assert host.ask(Release(status.stop)) == Released()
+    assert host.ask(Release(status.stop)) == Released()
     assert isinstance(host.ask(WriteSetPoints(((1, 600),))), SetPointsTaken)
 
 
@@ -163,7 +223,7 @@ def test_the_next_sample_may_be_asked_for_whatever_has_been_seen(host: LockStepH
 
 
 def test_after_a_brown_out_a_sample_comes_from_the_new_life(host: LockStepHost) -> None:
-    host.ask(Hello())
+    host.ask(Hello(2, 1))
     host.ask(Advance(500_000))
     host.board.brown_out()
     reply = host.ask(Sample(25, 1))
@@ -173,7 +233,9 @@ def test_after_a_brown_out_a_sample_comes_from_the_new_life(host: LockStepHost) 
     status = host.ask(ReadStatus())
     assert isinstance(status, Status)
     assert status.boots == 2
-    host.ask(Hello())
+    assert refusal(host.ask(SetGripper(1))) is Refusal.BAD_SESSION
+    host.ask(Hello(2, 1))
+    assert host.ask(SetGripper(1)) == GripperSet()
     assert not host.ask(ReadStatus()).status & StatusFlag.RESTARTED  # type: ignore[attr-defined]
 
 
@@ -202,9 +264,13 @@ def test_what_the_bridge_cannot_do_is_refused() -> None:
         (0x55, b"", Refusal.UNKNOWN_OPCODE),
         (0x90, b"", Refusal.UNKNOWN_OPCODE),
         (0x02, b"\x00\xfc", Refusal.BAD_LENGTH),
-        (0x04, b"\x01\xe8\x03", Refusal.BAD_VALUE),
-        (0x04, b"\x40\x00\x00", Refusal.BAD_VALUE),
-        (0x07, b"\x01\x15\x00\x00", Refusal.BAD_VALUE),
+        (0x04, b"\x01\xf4\x01", Refusal.BAD_LENGTH),
+        (0x04, bytes(8) + b"\x01\xe8\x03", Refusal.BAD_VALUE),
+        (0x04, bytes(8) + b"\x40\x00\x00", Refusal.BAD_VALUE),
+        (0x07, bytes(8) + b"\x01\x15\x00\x00", Refusal.BAD_VALUE),
+        (0x02, b"\xff\xff\x02", Refusal.BAD_ADDRESS),
+        (0x03, bytes(8) + b"\x7f\xfc12", Refusal.BAD_ADDRESS),
+        (0x01, b"\x02\x00", Refusal.BAD_LENGTH),
         (0x10, b"\x00\x00\x00\x00\x00", Refusal.BAD_VALUE),
     ],
 )
@@ -222,3 +288,5 @@ def test_an_advance_lets_time_pass_once(host: LockStepHost) -> None:
     assert host.ask(Advance(123_456), sequence=5) == Advanced(123_456, 7)
     assert host.ask(Advance(123_456), sequence=5) == Advanced(123_456, 7)
     assert host.ask(Advance(0), sequence=6) == Advanced(123_456, 7)
+    assert host.ask(Advance(0), sequence=4) == Advanced(123_456, 7), "the time may always be asked for"
+    assert refusal(host.ask(Advance(1), sequence=4)) is Refusal.STALE

@@ -8,7 +8,6 @@ from firmware_protocol.commands import (
     Advance,
     Block,
     ReadBlock,
-    Release,
     ReportErrorsPositionsPowers,
     Request,
     SetGains,
@@ -38,7 +37,7 @@ def busy(sample: bool, seed: int) -> LockStepHost:
         request = dice.choice(accesses)
         host.ask(request)
         if isinstance(request, Stop):
-            host.ask(Release())
+            host.release()
     return host
 
 

@@ -29,10 +29,10 @@ def test_bytes_follow_one_another_on_the_line() -> None:
 def test_a_round_trip_takes_both_ways_on_the_line() -> None:
     host = RealTimeHost(baud=9600)
     host.wait(1000)
-    host.send(1, Hello())
+    host.send(1, Hello(2, 5))
     ((moment, sequence, reply),) = host.wait(100_000)
     assert (sequence, type(reply)) == (1, HelloReply)
-    assert moment == -(-9 * 10_000_000 // 9600) + -(-19 * 10_000_000 // 9600)
+    assert moment == -(-14 * 10_000_000 // 9600) + -(-27 * 10_000_000 // 9600)
 
 
 def test_a_sample_waits_for_its_period_while_others_are_answered() -> None:
@@ -72,26 +72,26 @@ def test_a_sample_is_answered_though_its_moment_falls_into_another_request() -> 
 
 def test_damage_is_counted_and_never_answered() -> None:
     host = RealTimeHost()
-    frame = bytearray(host.dialect.encode(1, Hello()))
+    frame = bytearray(host.dialect.encode(1, Hello(2, 5)))
     frame[4] ^= 0x10
     host.pace.receive(bytes(frame))
     host.pace.receive(b"\0" + b"x" * 500 + b"\0")
     assert host.wait(30_000) == []
     assert host.device.link.counts.damaged == 2
-    host.send(2, Hello())
+    host.send(2, Hello(2, 5))
     assert [number for _, number, _ in host.wait(100)] == [2]
 
 
 def test_a_host_that_hangs_up_leaves_nothing_behind() -> None:
     host = RealTimeHost(baud=9600)
-    host.send(1, Hello())
+    host.send(1, Hello(2, 5))
     host.wait(30_000)
     host.send(2, Sample(AFTER_NEWEST, 1))
     host.pace.receive(b"\0\x09unfinished")
     host.wait(5_000)
     host.pace.hang_up()
     assert host.wait(100_000) == []
-    host.send(3, Hello())
+    host.send(3, Hello(2, 5))
     assert [number for _, number, _ in host.wait(100_000)] == [3]
     assert host.device.link.counts.damaged == 0
 

@@ -35,7 +35,7 @@ EVERY_WIRE_FAULT = (
 def conversation(**options: object) -> bytes:
     """What a mock says to forty periods of an ordinary host that never listens."""
     host = LockStepHost(**options)
-    said = host.turn(host.dialect.encode(0, Hello()))
+    said = host.turn(host.dialect.encode(0, Hello(2, 0x600D)))
     for index in range(40):
         said += host.turn(host.dialect.encode(2 * index + 1, Sample(AFTER_NEWEST, 7)))
         said += host.turn(host.dialect.encode(2 * index + 2, WriteSetPoints(((1, 500 + index),))))
@@ -56,7 +56,7 @@ def test_time_stands_still_between_turns_and_moves_by_what_is_asked() -> None:
 def test_bytes_take_their_time_on_the_line() -> None:
     host = LockStepHost(baud=115_200)
     host.ask(ReadStatus())
-    assert host.board.time_us == -(-9 * 10_000_000 // 115_200) + -(-20 * 10_000_000 // 115_200)
+    assert host.board.time_us == -(-9 * 10_000_000 // 115_200) + -(-24 * 10_000_000 // 115_200)
 
 
 @pytest.mark.parametrize("data", [b"\0garbage\0", b"\0" + b"x" * 1000 + b"\0", b"x\0"])
@@ -89,7 +89,7 @@ def test_frames_in_one_write_are_turns_of_their_own() -> None:
 @settings(max_examples=12, deadline=None)
 @given(st.lists(st.integers(0, 200), max_size=10))
 def test_what_is_said_does_not_depend_on_how_the_bytes_were_cut(cuts: list[int]) -> None:
-    requests: list[Request] = [Hello(), WriteSetPoints(((1, 510),)), Sample(AFTER_NEWEST, 7), Stop(), ReadStatus()]
+    requests: list[Request] = [Hello(2, 5), WriteSetPoints(((1, 510),)), Sample(AFTER_NEWEST, 7), Stop(), ReadStatus()]
     encode = LockStepHost().dialect.encode
     stream = b"\0noise\0" + b"".join(encode(number, request) for number, request in enumerate(requests))
     faults = ("flip:rate=0.3,seed=4", "delay:rate=0.3,seed=5")

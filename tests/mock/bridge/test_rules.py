@@ -1,89 +1,149 @@
-"""Stale commands and the freeze, whatever comes in whatever order."""
+"""Sessions, numbers and the freeze, whatever comes in whatever order, new or recorded."""
 
 from __future__ import annotations
 
 from hypothesis import settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from firmware_protocol.commands import (
-    Arrival,
-    ArrivalOrder,
+    PROTOCOL_VERSION,
     Hello,
+    HelloReply,
     ReadStatus,
     Refusal,
     Refused,
     Release,
     Released,
+    Reply,
+    Request,
     SetPointsTaken,
+    Stamp,
     Status,
     StatusFlag,
     Stop,
     Stopped,
     WriteSetPoints,
+    parse_reply,
+    to_frame,
 )
-from tests.mock.host import LockStepHost
+from firmware_protocol.framing import Frame
+from tests.mock.host import make_device
 
-NUMBERS = st.one_of(st.integers(0, 0xFFFF), st.sampled_from([0, 1, 2, 0x7FFF, 0x8000, 0x8001, 0xFFFE, 0xFFFF]))
+NUMBERS = st.one_of(st.integers(0, 9), st.sampled_from([1, 0xFFFF, 0x10000, 0x10001, 0xFFFFFFFE, 0xFFFFFFFF]))
+SEQUENCES = st.integers(0, 0xFFFF)
 
 
 class Conversation(RuleBasedStateMachine):
-    """A second, simpler bookkeeping of what the bridge ought to do."""
+    """A second, simpler bookkeeping of what the bridge ought to do, and a recorder that plays back what it heard."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.host = LockStepHost()
-        self.order = ArrivalOrder()
+        self.device = make_device()
+        self.board = self.device.board
+        self.session = self.newest = self.stop_number = 0
+        self.nonce: int | None = None
         self.frozen = False
-        self.set_point = self.host.board.memory.values("set_point")[1]
+        self.restarted = True
+        self.set_point = self.board.memory.values("set_point")[1]
+        self.recorded: list[tuple[Frame, bool]] = []
+        """Frames, and whether each may still be obeyed: of the present session, and none after it."""
 
-    @rule(sequence=NUMBERS, posture=st.integers(0, 999))
-    def write(self, sequence: int, posture: int) -> None:
-        request = WriteSetPoints(((2, posture),))
-        arrival = self.order.judge(sequence, request)
-        reply = self.host.ask(request, sequence)
-        if arrival is Arrival.STALE:
-            assert reply == Refused(WriteSetPoints.OPCODE, Refusal.STALE)
-        elif self.frozen:
-            assert reply == Refused(WriteSetPoints.OPCODE, Refusal.FROZEN)
-        else:
+    def ask(self, request: Request, sequence: int, stamp: Stamp) -> Reply:
+        frame = to_frame(sequence, request, stamp)
+        (answer,) = self.device.bridge.receive(frame)
+        assert answer.sequence == sequence
+        self.recorded.append((frame, False))
+        return parse_reply(answer)
+
+    def expected(self, stamp: Stamp) -> Refusal | None:
+        if self.session == 0 or stamp.session != self.session:
+            return Refusal.BAD_SESSION
+        if stamp.number < self.newest:
+            return Refusal.STALE
+        self.newest = stamp.number
+        return None
+
+    @rule(sequence=SEQUENCES, number=NUMBERS, posture=st.integers(0, 999), foreign=st.booleans())
+    def write(self, sequence: int, number: int, posture: int, foreign: bool) -> None:
+        stamp = Stamp(self.session + foreign, number)
+        refusal = self.expected(stamp)
+        reply = self.ask(WriteSetPoints(((2, posture),)), sequence, stamp)
+        if refusal is None and self.frozen:
+            refusal = Refusal.FROZEN
+        if refusal is None:
             assert isinstance(reply, SetPointsTaken)
             self.set_point = posture
+        else:
+            assert reply == Refused(WriteSetPoints.OPCODE, refusal)
 
-    @rule(sequence=NUMBERS)
+    @rule(sequence=SEQUENCES)
     def stop(self, sequence: int) -> None:
-        self.order.judge(sequence, Stop())
-        reply = self.host.ask(Stop(), sequence)
+        reply = self.ask(Stop(), sequence, Stamp(0, 0))
         assert isinstance(reply, Stopped)
         if self.frozen:
             assert reply.postures[1] == self.set_point
         self.frozen = True
         self.set_point = reply.postures[1]
+        before, self.stop_number = self.stop_number, self.status().stop
+        assert self.stop_number not in (0, before)
 
-    @rule(sequence=NUMBERS)
-    def release(self, sequence: int) -> None:
-        stale = self.order.judge(sequence, Release()) is Arrival.STALE
-        reply = self.host.ask(Release(), sequence)
-        assert reply == (Refused(Release.OPCODE, Refusal.STALE) if stale else Released())
-        self.frozen = self.frozen and stale
+    @rule(sequence=SEQUENCES, number=NUMBERS, other=st.booleans())
+    def release(self, sequence: int, number: int, other: bool) -> None:
+        stamp = Stamp(self.session, number)
+        refusal = self.expected(stamp) or (Refusal.OTHER_STOP if other else None)
+        reply = self.ask(Release(self.stop_number ^ other), sequence, stamp)
+        assert reply == (Released() if refusal is None else Refused(Release.OPCODE, refusal))
+        self.frozen = self.frozen and refusal is not None
 
-    @rule(sequence=NUMBERS)
-    def hello(self, sequence: int) -> None:
-        self.order.judge(sequence, Hello())
-        self.host.ask(Hello(), sequence)
+    @rule(sequence=SEQUENCES, nonce=st.integers(0, 3))
+    def hello(self, sequence: int, nonce: int) -> None:
+        reply = self.ask(Hello(PROTOCOL_VERSION, nonce), sequence, Stamp(0, 0))
+        assert isinstance(reply, HelloReply)
+        assert reply.nonce == nonce
+        if self.session and nonce == self.nonce:
+            assert reply.session == self.session
+        else:
+            assert reply.session not in (0, self.session)
+            self.session, self.nonce, self.newest, self.restarted = reply.session, nonce, 1, False
 
-    @rule(sequence=NUMBERS)
-    def status(self, sequence: int) -> None:
-        self.order.judge(sequence, ReadStatus())
-        reply = self.host.ask(ReadStatus(), sequence)
+    @rule()
+    def reset_of_the_board(self) -> None:
+        self.board.brown_out()
+        self.device.bridge.run_until(self.board.time_us + 200_000)
+        self.set_point = self.board.memory.values("set_point")[1]
+        self.session, self.restarted = 0, True
+
+    @precondition(lambda self: self.recorded)
+    @rule(data=st.data())
+    def replay(self, data: st.DataObject) -> None:
+        """Whatever was recorded, except the newest command itself and greetings and stops, changes nothing at all."""
+        frame, _ = data.draw(st.sampled_from(self.recorded))
+        if frame.opcode in (Hello.OPCODE, Stop.OPCODE):
+            return
+        stamp = Stamp.parse(frame.payload)
+        self.expected(stamp)
+        (answer,) = self.device.bridge.receive(frame)
+        if stamp != Stamp(self.session, self.newest):
+            assert isinstance(parse_reply(answer), Refused)
+        elif frame.opcode == WriteSetPoints.OPCODE and not self.frozen:
+            self.set_point = int.from_bytes(frame.payload[9:11], "little")
+        elif frame.opcode == Release.OPCODE and frame.payload[8:] == self.stop_number.to_bytes(4, "little"):
+            self.frozen = False
+
+    def status(self) -> Status:
+        (answer,) = self.device.bridge.receive(to_frame(0, ReadStatus()))
+        reply = parse_reply(answer)
         assert isinstance(reply, Status)
-        assert bool(reply.status & StatusFlag.FROZEN) == self.frozen
+        return reply
 
     @invariant()
-    def memory_holds_the_last_command_obeyed(self) -> None:
-        assert self.host.board.memory.values("set_point")[1] == self.set_point
-        assert self.host.board.frozen == self.frozen
+    def status_and_memory_are_those_of_the_commands_obeyed(self) -> None:
+        status = self.status()
+        assert bool(status.status & StatusFlag.FROZEN) == self.frozen == self.board.frozen
+        assert bool(status.status & StatusFlag.RESTARTED) == self.restarted
+        assert self.board.memory.values("set_point")[1] == self.set_point
 
 
 TestConversation = Conversation.TestCase
-TestConversation.settings = settings(max_examples=40, stateful_step_count=20, deadline=None)
+TestConversation.settings = settings(max_examples=40, stateful_step_count=25, deadline=None)

@@ -81,7 +81,7 @@ def test_a_stalled_joint_stays_where_it_is_and_comes_free_again() -> None:
 
 def test_a_brown_out_restarts_the_board_where_the_arm_is() -> None:
     host = LockStepHost(fault=("brown_out:start=0.5",))
-    host.ask(Hello())
+    host.ask(Hello(2, 1))
     host.ask(Write(((1, 540),)))
     host.ask(Advance(700_000))
     assert host.board.counters.boots == 2

@@ -60,7 +60,7 @@ def test_the_control_port_tells_nothing(kind: Kind) -> None:
 
 
 def test_a_host_is_greeted_as_by_any_other_mock() -> None:
-    assert LockStepHost(secret=SEED).ask(Hello()) == LockStepHost().ask(Hello())
+    assert LockStepHost(secret=SEED).ask(Hello(2, 1)) == LockStepHost().ask(Hello(2, 1))
 
 
 def test_process_arguments_and_output_hold_the_seed_and_nothing_else() -> None:

@@ -101,4 +101,6 @@ class SerialHost:
     def turn(self, sequence: int, request: Request) -> bytes:
         """Everything the mock says in one turn of lock-step."""
         self.port.write(self.dialect.encode(sequence, request))
-        return self.port.read_until(b"\0\0\0\0")
+        said: bytes = self.port.read_until(b"\0\0\0\0")
+        self.dialect.feed(said)  # for the session
+        return said

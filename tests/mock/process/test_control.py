@@ -84,7 +84,7 @@ def test_faults_are_switched_listed_and_counted(desk: Desk) -> None:
     counts = desk.say("counts")
     assert counts["faults"] == {"drop": {"to_host": 1}}
     assert counts["bridge"]["frames_received"] == counts["bridge"]["frames_sent"] == 2
-    assert counts["bridge"]["answered"] == {"Advance": 2}
+    assert counts["bridge"]["answered"] == {"Hello": 1, "Advance": 2}
 
 
 def test_snapshots_are_the_boards_own_record(desk: Desk) -> None:

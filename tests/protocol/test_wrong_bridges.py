@@ -1,0 +1,168 @@
+"""Bridges that break one rule each: some dialogue finds every one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+
+from tests.protocol.dialogues import DIALOGUES, Step
+from tests.protocol.play import play, second_bridge
+from tests.protocol.second_bridge import SESSION, STALE, SecondBridge, number
+
+
+class ForgetsAtEveryGreeting(SecondBridge):
+    def _hello(self, payload: bytes) -> bytes:
+        self.session = 0
+        return super()._hello(payload)
+
+
+class ResumesARecordedSession(SecondBridge):
+    def _hello(self, payload: bytes) -> bytes:
+        self.fresh = number(payload[1:]) - 1 if len(payload) == 5 else self.fresh
+        return super()._hello(payload)
+
+
+class BeginsASessionForVersion1(SecondBridge):
+    def _hello(self, payload: bytes) -> bytes:
+        self.session = self.session if payload[:1] == b"\x02" else 0
+        return super()._hello(payload)
+
+
+class DropsTheSampleAtAGreeting(SecondBridge):
+    def _hello(self, payload: bytes) -> bytes:
+        self.waiting = None
+        return super()._hello(payload)
+
+
+class ReleasesAtAGreeting(SecondBridge):
+    def _hello(self, payload: bytes) -> bytes:
+        self.frozen = False
+        return super()._hello(payload)
+
+
+class LooksAtNoSession(SecondBridge):
+    def _not_now(self, opcode: int, payload: bytes) -> int:
+        return super()._not_now(opcode, self.session.to_bytes(4, "little") + payload[4:])
+
+
+class LooksAtNoNumber(SecondBridge):
+    def _not_now(self, opcode: int, payload: bytes) -> int:
+        self.newest = 0
+        return super()._not_now(opcode, payload)
+
+
+class CountsOnACircle(SecondBridge):
+    def _not_now(self, opcode: int, payload: bytes) -> int:
+        ahead = (number(payload[4:8]) - self.newest) & 0xFFFF
+        self.newest = number(payload[4:8]) + (ahead > 0x7FFF)
+        return super()._not_now(opcode, payload)
+
+
+class MovesTheNumberOnlyIfObeyed(SecondBridge):
+    def _not_now(self, opcode: int, payload: bytes) -> int:
+        before = self.newest
+        reason = super()._not_now(opcode, payload)
+        self.newest = before if reason else self.newest
+        return reason
+
+
+class MovesTheNumberWhateverIsWrong(SecondBridge):
+    def _wrong(self, opcode: int, payload: bytes) -> int:
+        reason = super()._wrong(opcode, payload)
+        if reason and opcode in (0x03, 0x04) and len(payload) >= 8 and number(payload[:4]) == self.session:
+            self.newest = max(self.newest, number(payload[4:8]))
+        return reason
+
+
+class TellsTheSessionFirst(SecondBridge):
+    def _wrong(self, opcode: int, payload: bytes) -> int:
+        if opcode in (0x03, 0x04) and len(payload) >= 8 and number(payload[:4]) != self.session:
+            return SESSION
+        return super()._wrong(opcode, payload)
+
+
+class TellsTheFreezeFirst(SecondBridge):
+    def _not_now(self, opcode: int, payload: bytes) -> int:
+        reason = super()._not_now(opcode, payload)
+        return 6 if reason == STALE and self.frozen and opcode == 0x04 else reason
+
+
+class ReleasesAnyStop(SecondBridge):
+    def _not_now(self, opcode: int, payload: bytes) -> int:
+        if opcode == 0x21:
+            payload = payload[:8] + self.stop.to_bytes(4, "little")
+        return super()._not_now(opcode, payload)
+
+
+class NumbersOnlyTheFirstStop(SecondBridge):
+    def _number_the_stop(self) -> None:
+        if not self.frozen:
+            super()._number_the_stop()
+
+
+class NumbersStopsFromOne(SecondBridge):
+    def _number_the_stop(self) -> None:
+        self.stop += 1
+
+
+class StopsOnlyInASession(SecondBridge):
+    def _wrong(self, opcode: int, payload: bytes) -> int:
+        return SESSION if opcode == 0x20 and self.session == 0 else super()._wrong(opcode, payload)
+
+
+class FreezesAnewAtEveryStop(SecondBridge):
+    def _freeze(self) -> bytes:
+        self.frozen, self.tick = False, self.tick + 1
+        return super()._freeze()
+
+
+class KeepsTheSessionOverAReset(SecondBridge):
+    def reset(self) -> bytes:
+        session = self.session
+        super().reset()
+        self.session = session
+        return b""
+
+
+class ReleasesAtAReset(SecondBridge):
+    def reset(self) -> bytes:
+        self.frozen = False
+        return super().reset()
+
+
+class ForgetsTheSampleAtAReset(SecondBridge):
+    def reset(self) -> bytes:
+        self.waiting = None
+        return super().reset()
+
+
+class StartsWithTheSameNumbers(SecondBridge):
+    def start_again(self) -> bytes:
+        super().start_again()
+        self.fresh = 0x00010000
+        return b""
+
+
+class GivesTheNewestSampleOnly(SecondBridge):
+    def _answer_sample(self) -> bytes:
+        self.ring = self.ring[-1:]
+        return super()._answer_sample()
+
+
+WRONG = SecondBridge.__subclasses__()
+
+
+@pytest.mark.parametrize("kind", WRONG, ids=lambda kind: kind.__name__)
+def test_some_dialogue_finds_it(kind: type[SecondBridge]) -> None:
+    found = [dialogue.rule for dialogue in DIALOGUES if _goes_wrong(kind, dialogue.steps)]
+    assert found
+
+
+def _goes_wrong(kind: type[SecondBridge], steps: Sequence[Step]) -> bool:
+    nonces = iter(range(0x5EED0000, 0x5EED0100))
+    try:
+        play(steps, second_bridge(kind), lambda: next(nonces))
+    except AssertionError:
+        return True
+    return False
