@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from daq.config import Settings
     from daq.contracts.machine import Machine
+    from daq.contracts.trace_limits import TraceLimits
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")]
 YesOption = Annotated[bool, typer.Option("--yes", help="Consent to moving a real arm without being asked.")]
@@ -90,7 +91,7 @@ class Invocation:
         if self.server is None or Path(wanted).is_file():
             from daq.traces.catalogue import find_trace
 
-            return find_trace(folder, wanted)
+            return find_trace(folder, wanted, self.trace_limits)
         from daq.cli.remote.traces import fetched_trace
 
         return fetched_trace(self, folder, wanted)
@@ -110,6 +111,11 @@ class Invocation:
     def trace_folder(self) -> Path:
         """Where traces are kept."""
         return self.settings.traces.folder
+
+    @property
+    def trace_limits(self) -> TraceLimits:
+        """How large a trace may be that is read."""
+        return self.settings.traces.limits
 
 
 def invocation(context: typer.Context) -> Invocation:

@@ -37,6 +37,13 @@ def _path(context: typer.Context, wanted: str, folder: Path | None) -> Path:
     return call.find_trace(_folder(call, folder), wanted)
 
 
+def _read(context: typer.Context, wanted: str, folder: Path | None) -> tuple[Path, Trace]:
+    from daq.traces.reader import read_trace
+
+    path = _path(context, wanted, folder)
+    return path, read_trace(path, invocation(context).trace_limits)
+
+
 @app.command("ls")
 def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOption = False) -> None:
     """List traces, the oldest first."""
@@ -77,7 +84,7 @@ def _summaries(call: Invocation, folder: Path | None) -> tuple[Sequence[TraceSum
     from daq.traces.catalogue import list_traces
 
     place = _folder(call, folder)
-    return list_traces(place) if place.is_dir() else (), str(place)
+    return list_traces(place, call.trace_limits) if place.is_dir() else (), str(place)
 
 
 def joints_text(joints: tuple[int, ...]) -> str:
@@ -92,11 +99,9 @@ def show(
     context: typer.Context, trace: TraceArgument = "last", folder: FolderOption = None, json: JsonOption = False
 ) -> None:
     """Show what a trace says about itself, and its figures by joint."""
-    from daq.traces.reader import read_trace
     from daq.traces.summary import joint_figures
 
-    path = _path(context, trace, folder)
-    found = read_trace(path)
+    path, found = _read(context, trace, folder)
     figures = joint_figures(found)
     if json:
         data = found.record.model_dump(mode="json", exclude={"machine", "memory_map"})
@@ -162,10 +167,9 @@ def plot(
 ) -> None:
     """Draw a trace: set point and position, error and drive of every joint."""
     from daq.traces.plot import plot_trace
-    from daq.traces.reader import read_trace
 
-    path = _path(context, trace, folder)
-    print(plot_trace(read_trace(path), output or path.with_suffix(".png")))
+    path, found = _read(context, trace, folder)
+    print(plot_trace(found, output or path.with_suffix(".png")))
 
 
 @app.command("export")
@@ -179,10 +183,9 @@ def export(
 ) -> None:
     """Write a trace as plain CSV, with a TOML file for what columns cannot say."""
     from daq.cli.csv_output import write_csv
-    from daq.traces.reader import read_trace
 
-    path = _path(context, trace, folder)
-    print(write_csv(read_trace(path), output or path.with_suffix(".csv")))
+    path, found = _read(context, trace, folder)
+    print(write_csv(found, output or path.with_suffix(".csv")))
 
 
 @app.command("import")
@@ -209,7 +212,7 @@ def import_(
         upload(call, file)
         return
     place = _folder(call, folder)
-    found = import_csv(file)
+    found = import_csv(file, call.trace_limits)
     try:
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -224,7 +227,7 @@ def check(
     """Check a trace from its checksums to its signals; ends with 5 when it is not to be trusted."""
     from daq.traces.verify import verify
 
-    found = verify(_path(context, trace, folder))
+    found = verify(_path(context, trace, folder), invocation(context).trace_limits)
     if json:
         print_json(found.model_dump(mode="json") | {"trustworthy": found.trustworthy})
     else:
@@ -243,7 +246,7 @@ def salvage(context: typer.Context, folder: FolderOption = None, json: JsonOptio
     call = invocation(context)
     if call.server is not None:
         raise SpecError("--server: `daq traces salvage` is for this computer's traces; a service salvages its own")
-    results = salvage_folder(_folder(call, folder))
+    results = salvage_folder(_folder(call, folder), call.trace_limits)
     if json:
         print_json([vars(result) for result in results])
         return
