@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
+
+from daq.contracts.errors import TraceError
+from daq.contracts.trace import Trace, TraceEvent, TraceRecord
 
 LARGEST_POSITION = 1e9
 """rad or m. A shaft at 10 000 rpm takes eleven days to turn as far, and a float64 resolves 1e-7 rad there."""
@@ -35,7 +41,8 @@ LARGEST = {
 
 def first_outside(name: str, values: NDArray[np.float64] | NDArray[np.int64]) -> tuple[int, ...] | None:
     """Index of the first value that is not finite or beyond its bound; None when all are within."""
-    wrong = ~(np.abs(values) <= LARGEST[name][0])
+    largest = LARGEST[name][0]
+    wrong = ~((values >= -largest) & (values <= largest))
     return tuple(int(index) for index in np.argwhere(wrong)[0]) if wrong.any() else None
 
 
@@ -49,3 +56,34 @@ def first_short_step(time: NDArray[np.float64]) -> int | None:
     """Row of the first time that does not come at least SMALLEST_STEP after the one before; None when all do."""
     wrong = ~(np.diff(time) >= SMALLEST_STEP)
     return int(np.argmax(wrong)) + 1 if wrong.any() else None
+
+
+def check_trace(trace: Trace, origin: str) -> None:
+    """Raises TraceError for the first value of a trace that no rig can have measured."""
+    check_signals({name: getattr(trace, name) for name in LARGEST}, origin)
+    check_record(trace.record, trace.events, origin)
+
+
+def check_signals(signals: Mapping[str, NDArray[Any] | None], origin: str) -> None:
+    """The same for columns, by their names; those that are None, or have no bound, are passed over."""
+    for name in LARGEST:
+        values = signals.get(name)
+        outside = None if values is None else first_outside(name, values)
+        if values is not None and outside is not None:
+            where = f"sample {outside[0]}" + (f", column {outside[1]}" if len(outside) > 1 else "")
+            raise TraceError(f"{origin}: {where}: {name} = {values[outside]:g}, {allowed(name)}")
+    time = signals.get("time")
+    row = None if time is None else first_short_step(time)
+    if time is not None and row is not None:
+        step = f"{float(time[row])!r} s after {float(time[row - 1])!r} s"
+        raise TraceError(f"{origin}: sample {row}: time = {step}, it has to increase by {SMALLEST_STEP:g} s at least")
+
+
+def check_record(record: TraceRecord, events: tuple[TraceEvent, ...], origin: str) -> None:
+    """Raises TraceError for a control period or the time of an event that no rig can have."""
+    if record.period is not None and not SHORTEST_PERIOD <= record.period <= LONGEST_PERIOD:
+        line = f"period = {record.period:g} s, allowed is {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s"
+        raise TraceError(f"{origin}: {line}")
+    for event in events:
+        if not abs(event.time) <= LARGEST_TIME:
+            raise TraceError(f"{origin}: event {event.kind!r}: time = {event.time:g} s, {allowed('time')}")

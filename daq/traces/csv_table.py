@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from daq.contracts.errors import DaqError, TraceError
 from daq.contracts.machine import load_machine, shipped_machines
-from daq.contracts.trace import Floats, Outcome, Trace, TraceRecord
+from daq.contracts.trace import Floats, Moment, Outcome, Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds, disk
 from daq.traces.naming import trace_id_of
@@ -47,7 +47,7 @@ class Beside(BaseModel):
     """Joints to take from the columns; all of them when None."""
     drive_unit: Literal["V", "N·m", "N"] | None = None
     period: Annotated[float, Field(gt=0)] | None = None
-    created: datetime | None = None
+    created: Moment | None = None
     outcome: Outcome | None = None
     operator: str | None = None
     notes: str = ""
@@ -107,7 +107,9 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
     record = _record(path, beside, trace_id_of(data, *([] if beside_data is None else [beside_data])))
     if "position" not in signals:
         signals["position"] = _travelled(table[:, 0], signals["velocity"])
+        bounds.check_signals({"position": signals["position"]}, f"{path}: integrals of the speeds")
         record = record.model_copy(update={"notes": f"{record.notes} {INTEGRATED}".strip()})
+    bounds.check_record(record, (), str(path))
     return Trace(record, joints, table[:, 0], **signals)
 
 
@@ -215,7 +217,8 @@ def _check_bounds(path: Path, header: list[str], table: Floats) -> None:
         outside = bounds.first_outside(signal, table[:, column])
         if outside is not None:
             value = table[outside[0], column]
-            raise TraceError(f"{path}: row {outside[0] + 2}, column {name!r}: {value:g} is too large, {bounds.allowed(signal)}")
+            place = f"row {outside[0] + 2}, column {name!r}"
+            raise TraceError(f"{path}: {place}: {value:g} is too large, {bounds.allowed(signal)}")
     row = bounds.first_short_step(table[:, 0])
     if row is not None:
         before, value = table[row - 1, 0], table[row, 0]

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import TraceError
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import cache, disk, layout
+from daq.traces.bounds import check_record, check_signals
 from daq.traces.decode import Decoded, decode
 from daq.traces.metadata import joints_of, one_line, record_of, signals_of
 from daq.traces.scan import Scan, scan
@@ -72,20 +73,24 @@ def trace_of(found: Scan, origin: str, limits: TraceLimits = DEFAULT_TRACE_LIMIT
     count = len(decoded.samples[0])
     if end is not None and end.get("samples", str(count)) != str(count):
         raise TraceError(f"{origin}: has {count} samples, and says at its end that they are {end['samples'][:20]}")
-    return _trace(record, joints, signals_of(start, origin), decoded)
+    signals = _signals(signals_of(start, origin), decoded)
+    check_signals(signals, origin)
+    check_record(record, decoded.events, origin)
+    return Trace(record, joints, events=decoded.events, **signals)
 
 
-def _trace(record: TraceRecord, joints: tuple[int, ...], signals: frozenset[str], decoded: Decoded) -> Trace:
-    """Raises TraceError."""
+def _signals(names: frozenset[str], decoded: Decoded) -> dict[str, NDArray[Any]]:
+    """The columns of a trace, by their names: time, position, and what else of them it has."""
     first = decoded.samples[0]
 
     def columns(name: str) -> NDArray[Any]:
         return np.stack([joint[name] for joint in decoded.samples], axis=1)
 
-    optional = {name: columns(name) for name in layout.OPTIONAL_SIGNALS if name in signals}
-    if "power_raw" in signals:
-        optional["power_raw"] = columns("power_raw").astype(np.int64)
-    optional |= {name: first[name].copy() for name in ("tick", "host_time") if name in signals}
-    if "status" in signals:
-        optional["status"] = first["status"].astype(np.int64)
-    return Trace(record, joints, first["time"].copy(), columns("position"), events=decoded.events, **optional)
+    found = {"time": first["time"].copy(), "position": columns("position")}
+    found |= {name: columns(name) for name in layout.OPTIONAL_SIGNALS if name in names}
+    found |= {name: first[name].copy() for name in ("tick", "host_time") if name in names}
+    if "power_raw" in names:
+        found["power_raw"] = columns("power_raw").astype(np.int64)
+    if "status" in names:
+        found["status"] = first["status"].astype(np.int64)
+    return found
