@@ -27,6 +27,9 @@ BOUNDARIES = (
     0, 1, 2**16, 2**31 - 1, 2**31, 2**31 + 1, 2**32 - 1, 2**32, 2**32 + 1, 2**62, 2**63 - 1, 2**63, 2**64 - 1,
 )  # fmt: skip
 
+Choice = Callable[[], bool]
+"""Whether the next damage is done, for a share of all of them."""
+
 
 @dataclass(frozen=True)
 class Original:
@@ -108,8 +111,8 @@ _LAYOUTS = {
     Opcode.DATA_END: "4",
     Opcode.FOOTER: "LL4",
 }
-"""Fields of the records of MCAP: 1, 2, 4, 8 numbers; L a number that is a size or a place; s, b bytes behind a length of
-32 bits; B behind one of 64; m texts behind a length of 32 bits, each of them behind one of its own."""
+"""Fields of the records of MCAP: 1, 2, 4, 8 numbers of so many bytes; L a number that is a size or a place; s, b bytes
+behind a length of 32 bits; B behind one of 64; m texts behind a length of 32 bits, each behind one of its own."""
 
 
 def length_fields(data: bytes, opcode: int, begin: int) -> list[tuple[int, int]]:
@@ -162,17 +165,17 @@ def _record(opcode: int, body: bytes) -> bytes:
 # ---- damage on purpose
 
 
-def at_boundaries(original: Original) -> Iterator[Damaged]:
+def at_boundaries(original: Original, chosen: Choice) -> Iterator[Damaged]:
     """Every length field of every record at every boundary, and one beside what it was."""
     for opcode, begin, _ in records(original.data):
         for position, size in length_fields(original.data, opcode, begin):
             true = int.from_bytes(original.data[position : position + size], "little")
             for value in {*BOUNDARIES, true - 1, true + 1, 2 * true} - {true}:
-                if 0 <= value < 1 << (8 * size):
+                if 0 <= value < 1 << (8 * size) and chosen():
                     yield Damaged(original, "lengths at boundaries", _with(original.data, position, value, size))
 
 
-def inside_chunks(original: Original) -> Iterator[Damaged]:
+def inside_chunks(original: Original, chosen: Choice) -> Iterator[Damaged]:
     """The same inside of the first chunk, the checksums made right: what no checksum tells."""
     plain: list[bytes] = []
     recompressed(original.data, "", lambda chunk: plain.append(chunk) or chunk)
@@ -185,17 +188,19 @@ def inside_chunks(original: Original) -> Iterator[Damaged]:
     for position, size in fields:
         true = int.from_bytes(first[position - MAGIC : position - MAGIC + size], "little")
         for value in {0, 2**31, 2**32 - 1, 2**63, 2**64 - 1, true - 1, true + 1} - {true}:
-            if 0 <= value < 1 << (8 * size):
+            if 0 <= value < 1 << (8 * size) and chosen():
                 changed = _with(first, position - MAGIC, value, size)
                 data = recompressed(original.data, "zstd", lambda chunk, c=changed: c if chunk == first else chunk)
                 yield Damaged(original, "lengths inside of chunks, checksums right", data)
 
 
-def of_records(original: Original) -> Iterator[Damaged]:
+def of_records(original: Original, chosen: Choice) -> Iterator[Damaged]:
     """Every record left out, doubled, emptied, and swapped with the next one."""
     data = original.data
     spans = [(begin, end) for _, begin, end in records(data)]
     for (begin, end), (_, following) in zip(spans, [*spans[1:], (0, len(data))], strict=True):
+        if not chosen():
+            continue
         own, after = data[begin:end], data[end:following]
         yield Damaged(original, "records left out", data[:begin] + data[end:])
         yield Damaged(original, "records doubled", data[:end] + own + data[end:])

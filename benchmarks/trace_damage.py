@@ -25,7 +25,16 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.damaged_traces import Damaged, Original, at_boundaries, at_random, inside_chunks, of_records, originals
+from benchmarks.damaged_traces import (
+    Choice,
+    Damaged,
+    Original,
+    at_boundaries,
+    at_random,
+    inside_chunks,
+    of_records,
+    originals,
+)
 from benchmarks.figures import Figure, at_least, at_most, show
 from daq.contracts.errors import TraceError
 from daq.contracts.machine import load_machine
@@ -172,12 +181,11 @@ class Campaign:
             self.tally.fault("salvaged traces that are none", damaged, str(made))
 
 
-def on_purpose(chosen: list[Original]) -> Iterator[Damaged]:
+def on_purpose(sound: list[Original], chosen: Choice) -> Iterator[Damaged]:
     """Every length field of every record at its boundaries, every record left out, doubled, emptied, swapped."""
-    for original in chosen:
-        yield from at_boundaries(original)
-        yield from of_records(original)
-        yield from inside_chunks(original)
+    for original in sound:
+        for damages in (at_boundaries, of_records, inside_chunks):
+            yield from damages(original, chosen)
 
 
 def figures(tally: Tally) -> list[Figure]:
@@ -198,7 +206,7 @@ def campaign(cases: int, seed: int, folder: Path, share: float = 1.0) -> Tally:
     """All damage on purpose, or a share of it at random, and damage at random up to `cases`."""
     rng = random.Random(seed)
     running = Campaign(folder)
-    running.run(damaged for damaged in on_purpose(running.originals) if rng.random() < share)
+    running.run(on_purpose(running.originals, lambda: rng.random() < share))
     left = max(0, cases - running.tally.cases)
     return running.run(itertools.islice(at_random(running.originals, rng), left))
 

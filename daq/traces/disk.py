@@ -34,7 +34,7 @@ def read_at_most(stream: IO[bytes], most: int, origin: str) -> bytes:
     size = size_of(stream)
     if size > most:
         raise TraceError(f"{origin}: has {size} bytes; up to {most} are read (traces.limits.file_bytes)")
-    return stream.read(most)
+    return stream.read(size)  # of what it has now: a read of `most` bytes would make room for as many
 
 
 def create_locked(path: Path) -> IO[bytes]:

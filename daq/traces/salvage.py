@@ -57,6 +57,14 @@ class _Readable:
     counters: dict[str, float]
 
 
+class PutAsideError(TraceError):
+    """A part file from which no trace can be made; it is at `kept` now."""
+
+    def __init__(self, problem: str, kept: Path) -> None:
+        super().__init__(f"{problem}; it was renamed to {kept.name}")
+        self.kept = kept
+
+
 class _NoTraceError(TraceError):
     """A part file from which no trace can be made, by this version or a later one."""
 
@@ -79,8 +87,10 @@ def salvage_folder(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> 
             continue  # another process salvaged it, or its writer finished it, in this moment
         except OSError as error:
             found.append(Salvaged(part, None, problem=f"{part}: cannot be read: {disk.reason(error)}", kept=part))
+        except PutAsideError as error:
+            found.append(Salvaged(part, None, problem=str(error), kept=error.kept))
         except TraceError as error:
-            found.append(Salvaged(part, None, problem=str(error)))
+            found.append(Salvaged(part, None, problem=str(error), kept=part))
     return tuple(found)
 
 
@@ -89,9 +99,9 @@ def salvage(part: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Salvaged:
 
     Everything up to the first damage is kept. Where something follows that was not read, the part file is renamed and
     stays. Running it again after it was cut short itself gives the same trace.
-    Raises TraceError when a living process is writing the file, when another trace has its name, when it holds no
-    trace (it is then renamed, so that it is not tried again), or when reading or writing fails; the part file is then
-    as it was.
+    Raises PutAsideError when no trace can be made from it: it has been renamed, so that it is not tried again. Raises
+    TraceError when a living process is writing the file, when another trace has its name, when a newer version wrote
+    it, or when reading or writing fails; the part file is then as it was.
     """
     part = Path(part)
     if not part.name.endswith(layout.PART_SUFFIX):
@@ -111,8 +121,8 @@ def salvage(part: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Salvaged:
             except MemoryError as error:
                 raise TraceError(f"{part}: {TOO_LARGE}; it is unchanged") from error
             except Exception as error:  # noqa: BLE001  # whatever a file does, the next one is salvaged
-                problem = f"{part}: cannot be salvaged ({type(error).__name__}: {error})"
-            raise TraceError(f"{problem}; it was renamed to {_put_aside(part, UNREADABLE_SUFFIX).name}")
+                problem = " ".join(f"{part}: cannot be salvaged ({type(error).__name__}: {error})".split())
+            raise PutAsideError(problem, _put_aside(part, UNREADABLE_SUFFIX))
     except OSError as error:
         raise TraceError(f"{part}: cannot be salvaged: {disk.reason(error)}; it is unchanged") from error
 

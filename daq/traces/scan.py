@@ -25,6 +25,9 @@ HEAD = struct.Struct("<BQ")
 UNREADABLE = (ValueError, struct.error, *INFLATE_ERRORS)
 """What reading damaged bytes raises here."""
 
+NOT_IN_CHUNKS = "a chunk holds something else than schemas, channels and whole messages"
+
+_DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
 _MESSAGE = struct.Struct("<BQHIQQ")
 _CRC = struct.Struct("<I")
 _OURS = (layout.START_METADATA, layout.END_METADATA)
@@ -131,12 +134,14 @@ def payloads(chunk: bytes, by_channel: dict[int, list[bytes]], most: int) -> tup
             seen.add(channel)
             if channel in by_channel:
                 by_channel[channel].append(chunk[position + message : following])
+        elif opcode not in _DEFINITIONS:
+            raise ValueError(NOT_IN_CHUNKS)
         position = following
         count += 1
     while position < end and count < most:  # what is too short for a message
         opcode, position = _record_at(chunk, position)
-        if opcode == Opcode.MESSAGE:
-            raise ValueError("a message is cut off")
+        if opcode not in _DEFINITIONS:
+            raise ValueError(NOT_IN_CHUNKS)
         count += 1
     if position < end:
         raise ValueError("there are more records than are read (traces.limits.records)")
@@ -163,6 +168,7 @@ class _Walk:
         self._limits = limits
         self._inflated = 0
         self._attached = 0
+        self._definitions: set[tuple[int, bytes]] = set()
 
     def take(self, opcode: int, body: memoryview) -> None:
         """Raises one of UNREADABLE."""
@@ -175,7 +181,7 @@ class _Walk:
             self._take_metadata(body)
         elif opcode == Opcode.ATTACHMENT:
             self._take_attachment(body)
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+        elif opcode in _DEFINITIONS:
             self._take_definition(opcode, body)
         elif opcode == Opcode.STATISTICS:
             found.chunks_indexed = fields.chunks_counted(body)
@@ -198,6 +204,8 @@ class _Walk:
             opcode, following = _record_at(chunk, position)
             if opcode == Opcode.MESSAGE:
                 break  # definitions come before the messages that need them, in every chunk that has any
+            if opcode not in _DEFINITIONS:
+                raise ValueError(NOT_IN_CHUNKS)
             self._take_definition(opcode, memoryview(chunk)[position + HEAD.size : following])
             position = following
         self._found.chunks.append(chunk)
@@ -222,11 +230,15 @@ class _Walk:
         self._found.attachments.append(fields.attachment_of(body))
 
     def _take_definition(self, opcode: int, body: memoryview) -> None:
+        raw = bytes(body)
+        if (opcode, raw) in self._definitions:  # some writers repeat them in every chunk
+            return
+        self._definitions.add((opcode, raw))
         if opcode == Opcode.SCHEMA:
             schema = fields.schema_of(body)
             if self._found.schemas.setdefault(schema.id, schema) != schema:
                 raise ValueError(f"schema {schema.id} is defined twice, and differently")
-        elif opcode == Opcode.CHANNEL:
+        else:
             channel = fields.channel_of(body)
             if self._found.channels.setdefault(channel.id, channel) != channel:
                 raise ValueError(f"channel {channel.id} is defined twice, and differently")
