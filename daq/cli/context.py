@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from dataclasses import dataclass, field
 from functools import cache, cached_property
@@ -32,6 +33,11 @@ def console() -> Console:
     from rich.console import Console
 
     return Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
+
+
+def printable(text: str) -> str:
+    """Text of a file that somebody else may have made, without what would command the terminal."""
+    return "".join(sign if sign.isprintable() or sign == "\n" else "\N{REPLACEMENT CHARACTER}" for sign in text)
 
 
 def print_table(table: Table, width: int | None = None) -> None:
@@ -88,7 +94,7 @@ class Invocation:
 
         Raises TraceError, ServiceError, ServiceNotReachedError.
         """
-        if self.server is None or Path(wanted).is_file():
+        if self.server is None or os.path.isfile(wanted):
             from daq.traces.catalogue import find_trace
 
             return find_trace(folder, wanted, self.trace_limits)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq.cli.context import Invocation, JsonOption, console, invocation, print_json, print_table
+from daq.cli.context import Invocation, JsonOption, console, invocation, print_json, print_table, printable
 from daq.contracts.errors import SpecError, TraceError
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from daq.contracts.trace import Trace, TraceRecord
     from daq.traces.catalogue import TraceSummary
+    from daq.traces.salvage import Salvaged
 
 app = typer.Typer(add_completion=False, help="List, show, plot, convert and verify traces.", no_args_is_help=True)
 
@@ -64,9 +65,9 @@ def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOpti
         moment = one.created.strftime("%Y-%m-%d %H:%M") if one.created else "?"
         ended = one.outcome or one.state
         table.add_row(
-            (one.trace_id or one.path.name)[:SHOWN_DIGITS],
+            printable((one.trace_id or one.path.name)[:SHOWN_DIGITS]),
             moment,
-            f"{one.name or one.kind or one.source or one.problem}",
+            printable(f"{one.name or one.kind or one.source or one.problem}"),
             joints_text(one.joints),
             "?" if one.samples is None else str(one.samples),
             "?" if one.duration is None else f"{one.duration:.2f}",
@@ -110,14 +111,14 @@ def show(
         return
     record = found.record
     what = record.spec.trajectory.kind if record.spec else "import"
-    print(f"{record.trace_id}: {what} on {record.robot} ({record.source}), {_ended(record)}")
-    print(f"recorded {record.created:%Y-%m-%d %H:%M:%S %Z} with {record.software}")
+    print(printable(f"{record.trace_id}: {what} on {record.robot} ({record.source}), {_ended(record)}"))
+    print(printable(f"recorded {record.created:%Y-%m-%d %H:%M:%S %Z} with {record.software}"))
     print(f"{len(found)} samples on joints {', '.join(map(str, found.joints))}, {found.missing} missing")
     if record.operator or record.notes:
-        print(f"operator {record.operator or '?'}: {record.notes}")
+        print(printable(f"operator {record.operator or '?'}: {record.notes}"))
     print_figures(found)
     for event in found.events:
-        print(f"  {event.time:8.2f} s  {event.kind.replace('_', ' ')}: {event.message}")
+        print(printable(f"  {event.time:8.2f} s  {event.kind.replace('_', ' ')}: {event.message}"))
     print(f"file: {path}")
 
 
@@ -232,7 +233,7 @@ def check(
         print_json(found.model_dump(mode="json") | {"trustworthy": found.trustworthy})
     else:
         for finding in found.findings:
-            print(f"{finding.level}: {finding.message}")
+            print(printable(f"{finding.level}: {finding.message}"))
         print("trustworthy" if found.trustworthy else "NOT to be trusted")
     if not found.trustworthy:
         raise typer.Exit(EXIT_NOT_TRUSTWORTHY)
@@ -251,8 +252,17 @@ def salvage(context: typer.Context, folder: FolderOption = None, json: JsonOptio
         print_json([vars(result) for result in results])
         return
     for result in results:
-        print(f"{result.path}: salvaged from {result.part.name}" if result.path else f"{result.part}: {result.problem}")
+        print(printable(_salvage_line(result)))
     if not results:
         console().print("nothing to salvage")
     if any(result.path is None for result in results):
         raise typer.Exit(EXIT_NOT_TRUSTWORTHY)
+
+
+def _salvage_line(result: Salvaged) -> str:
+    if result.path is None:
+        return f"{result.part}: {result.problem}"
+    line = f"{result.path}: salvaged from {result.part.name}"
+    if result.kept is None:
+        return line
+    return f"{line} up to its damage; the {result.dropped_bytes} bytes after it are in {result.kept.name}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from datetime import datetime
 from pathlib import Path
 from typing import Literal
@@ -102,9 +103,8 @@ def find_trace(folder: Path, wanted: str, limits: TraceLimits = DEFAULT_TRACE_LI
 
     Raises TraceError when there is none, or when several begin so.
     """
-    path = Path(wanted)
-    if path.is_file():
-        return path
+    if os.path.isfile(wanted):  # pathlib's raises for a name that is too long
+        return Path(wanted)
     folder = Path(folder)
     summaries = list_traces(folder, limits) if folder.is_dir() else ()
     if wanted == LAST:

@@ -255,13 +255,16 @@ def _beside(path: Path, data: bytes | None) -> Beside:
     if data is None:
         return Beside()
     try:
-        return Beside.model_validate(tomllib.loads(data.decode("utf-8")))
+        beside = Beside.model_validate(tomllib.loads(data.decode("utf-8")))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        raise TraceError(f"{path}: {where}: {first['msg']} (got {first['input']!r})") from error
+        raise TraceError(f"{path}: {where}: {first['msg']} (got {str(first['input'])[:80]!r})") from error
     except (ValueError, RecursionError) as error:
         raise TraceError(f"{path}: is not TOML: {error}") from error
+    if beside.created is not None and beside.created.tzinfo is None:
+        raise TraceError(f"{path}: created: {beside.created.isoformat()} has no time zone; write Z behind it for UTC")
+    return beside
 
 
 def _beside_text(trace: Trace) -> str:

@@ -5,6 +5,7 @@ import re
 import struct
 import time
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,8 @@ from tests.daq.traces.test_files_that_are_no_trace import foreign, ours
 HEAD = 9
 SIZE_IN_CHUNK = HEAD + 16
 """Where a chunk declares how large it is once it is uncompressed."""
+LENGTH_IN_CHUNK = SIZE_IN_CHUNK + 8 + 4 + 4 + len("zstd")
+"""Where it tells the length of its records."""
 A_MEGABYTE = 1 << 20
 
 
@@ -209,25 +212,26 @@ def test_a_trace_with_less_samples_than_its_end_tells_is_refused(tmp_path: Path,
 
 
 @pytest.mark.parametrize(
-    ("damage", "left"),
+    ("damage", "kept"),
     [
-        (lambda data, chunk: with_number(data, chunk + SIZE_IN_CHUNK, 2**64 - 1), "a.mcap.part.damaged"),
-        (lambda data, chunk: with_number(data, chunk + SIZE_IN_CHUNK + 8 + 4 + 4 + 4, 2**63), "a.mcap.part.damaged"),
-        (lambda data, chunk: with_number(data, chunk + SIZE_IN_CHUNK + 8 + 4 + 4 + 4, 2**64 - 1), "a.mcap.part.damaged"),
-        (lambda data, chunk: data[: chunk + HEAD] + bytes(512) + data[chunk + HEAD + 512 :], "a.mcap.part.damaged"),
-        (lambda data, _: data.replace(b'"record"', b'"racord"').replace(b'{"format', b'["format'), "a.mcap.part.unreadable"),
-        (lambda _, __: b"", "a.mcap.part.unreadable"),
+        (lambda data, chunk: with_number(data, chunk + SIZE_IN_CHUNK, 2**64 - 1), "damaged"),
+        (lambda data, chunk: with_number(data, chunk + LENGTH_IN_CHUNK, 2**63), "damaged"),
+        (lambda data, chunk: with_number(data, chunk + LENGTH_IN_CHUNK, 2**64 - 1), "damaged"),
+        (lambda data, chunk: data[: chunk + HEAD] + bytes(512) + data[chunk + HEAD + 512 :], "damaged"),
+        (lambda data, _: data.replace(b'{"format', b'["format'), "unreadable"),
+        (lambda _, __: b"", "unreadable"),
     ],
-)  # fmt: skip
+)
 def test_a_damaged_part_file_keeps_no_other_from_being_salvaged(
-    tmp_path: Path, sound: dict[str, Original], damage: object, left: str
+    tmp_path: Path, sound: dict[str, Original], damage: Callable[[bytes, int], bytes], kept: str
 ) -> None:
     data = sound["unfinished"].data
-    hurt = damage(data, first_of(data, Opcode.CHUNK))  # type: ignore[operator]
+    hurt = damage(data, first_of(data, Opcode.CHUNK))
     (tmp_path / "a.mcap.part").write_bytes(hurt)
     (tmp_path / "b.mcap.part").write_bytes(data)
     first, second = salvage_folder(tmp_path)
-    assert (first.kept and first.kept.name, (tmp_path / left).read_bytes()) == (left, hurt)
+    assert first.kept == tmp_path / f"a.mcap.part.{kept}"
+    assert first.kept.read_bytes() == hurt
     assert second.samples == 60
     assert len(read_trace(tmp_path / "b.mcap")) == 60
     assert salvage_folder(tmp_path) == ()
