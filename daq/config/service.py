@@ -5,9 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator
 
 DEFAULT_PORT = 8300
+
+
+def _true_or_false(given: object) -> object:
+    """Raises ValueError for anything but the two; an environment variable has them as text."""
+    if isinstance(given, bool) or given in ("true", "false"):
+        return given
+    raise ValueError("must be true or false")
+
+
+Consent = Annotated[bool, BeforeValidator(_true_or_false)]
+"""Something that may move an arm: `true` and nothing that merely looks like it."""
 
 
 class ServiceSettings(BaseModel):
@@ -30,7 +41,7 @@ class ServiceSettings(BaseModel):
     """URL of the database; None for a SQLite file in `folder`."""
     connect_at_start: bool = True
     """Connecting moves nothing."""
-    unattended: bool = False
+    unattended: Consent = False
     """Whether the queue may move a real arm while no operator says to be there."""
     jobs_at_once: Annotated[int, Field(ge=1, le=64)] = 1
     """Worker processes for fits, validations and comparisons."""

@@ -154,10 +154,11 @@ class Gate:
         kind, _, token = headers.get("authorization", "").partition(" ")
         if token and kind.lower() == "bearer":
             known, caller = self.tokens.remembered(token.strip())
+            if caller is None and not self.tokens.was_known(token.strip()) and not _is_post(scope, STOP):
+                self._count(None, scope)  # before the database is asked
             if not known:
                 caller = await asyncio.to_thread(self.tokens.look_up, token.strip())
             if caller is None:
-                self._count(None, scope)
                 line = "this token is not known, or was revoked"
                 raise ProblemError(401, "token-unknown", line, "`daq token ls` lists tokens by name", (), _BEARER)
             return caller

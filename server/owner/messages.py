@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, TypeAdapter
 
 from daq.acquisition.messages import EventHappened, Finished, Progress
 from daq.contracts.experiment import ExperimentSpec, Gain
@@ -58,7 +58,7 @@ class RunExperiment(_Request):
     kind: Literal["run"] = "run"
     spec: ExperimentSpec
     trace_id: str
-    moves_real_arm: bool
+    moves_real_arm: StrictBool
 
 
 class JogBegin(_Request):
@@ -129,21 +129,21 @@ class WriteOutput(_QuickRequest):
 
     kind: Literal["write_output"] = "write_output"
     output: int
-    on: bool
+    on: StrictBool
 
 
 class MoveGripper(_QuickRequest):
     """Closes or opens the gripper."""
 
     kind: Literal["gripper"] = "gripper"
-    closed: bool
+    closed: StrictBool
 
 
 class Reset(_QuickRequest):
     """The explicit end of a stop."""
 
     kind: Literal["reset"] = "reset"
-    here: bool
+    here: StrictBool
 
 
 class Close(_Message):

@@ -16,8 +16,8 @@ from server.app import bare_app
 
 JSON = ("application/json", "application/problem+json")
 GUIDE = Path(__file__).parents[2].joinpath("docs", "service.md").read_text("utf-8")
-NO_ADDRESS = {"ticket-unknown", "no-such-method", "fault"}
-"""Of the WebSocket, of addresses that are none, of what never happens."""
+NO_ADDRESS = {"ticket-unknown", "no-such-method", "fault", "head-too-large"}
+"""Of the WebSocket, of addresses that are none, of what never happens, of requests whose address is not read."""
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import AwareDatetime, Field
+from pydantic import AwareDatetime, Field, StrictBool
 
 from daq.contracts.experiment import Gain, JointNumber
 from daq.contracts.service.base import Wire
@@ -108,7 +108,7 @@ class StopResult(Wire):
 class ResetRequest(Wire):
     """`here`: first make the posture measured now the set points."""
 
-    here: bool = False
+    here: StrictBool = False
 
 
 class JointGains(Wire):
@@ -128,13 +128,13 @@ class ProcessState(Wire):
 class OutputRequest(Wire):
     """One process output."""
 
-    on: bool
+    on: StrictBool
 
 
 class GripperRequest(Wire):
     """The gripper."""
 
-    closed: bool
+    closed: StrictBool
 
 
 class Done(Wire):
