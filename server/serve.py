@@ -6,6 +6,7 @@ import signal
 import socket
 from collections.abc import Callable
 from contextlib import suppress
+from types import FrameType
 
 import uvicorn
 
@@ -20,6 +21,7 @@ from server.access.stop_gate import StopGate
 from server.access.tokens import KnownTokens
 from server.app import make_app
 from server.connections import Connection
+from server.ending import EndInTime
 from server.listening import listening
 from server.services import Services
 from server.steady import keep_steady
@@ -66,12 +68,14 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         def ending() -> None:
             for one in services.robots():
                 one.hub.end_waiting()
+            services.uploads.close()
+            services.motions.close()
 
         # The web server raises its signal again when it has ended in order; the rest ends in order after it.
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         try:
             with suppress(KeyboardInterrupt):  # the service has ended in order by then
-                _Server(config, lambda: ready(address), ending).run([listener])
+                _Server(config, lambda: ready(address), ending, EndInTime(services.end_processes).arm).run([listener])
         finally:
             stop_listener.close()
 
@@ -106,10 +110,22 @@ def _stop_listener(services: Services, gate: Gate, listener: socket.socket, serv
 class _Server(uvicorn.Server):
     """Says when it answers, and when it begins to end."""
 
-    def __init__(self, config: uvicorn.Config, ready: Callable[[], None], ending: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        ready: Callable[[], None],
+        ending: Callable[[], None],
+        told_to_end: Callable[[], None],
+    ) -> None:
         super().__init__(config)
         self._ready = ready
         self._ending = ending
+        self._told_to_end = told_to_end
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """As uvicorn's. From now on the end comes in time."""
+        self._told_to_end()
+        super().handle_exit(sig, frame)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """As uvicorn's, then ready."""

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -17,8 +20,11 @@ from daq.contracts.errors import DaqError
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.live import EventMessage, JobMessage
 from daq.trajectories import control_period
+from server.access.lanes import Lanes
 from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
+from server.bounded.messages import Limits
+from server.bounded.workers import Workers
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock, SystemClock
 from server.jobs.desk import JobDesk, JobParts
@@ -45,8 +51,8 @@ from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
 
-SHUTDOWN = 4.0
-"""s for the arm to be frozen and the trace to be closed when the service ends."""
+SHUTDOWN, TIDYING = 2.0, 0.5
+"""s for the arm to be frozen and the trace to be closed when the service ends; the arm's owner goes on alone then."""
 log = logging.getLogger("server")
 
 
@@ -93,7 +99,12 @@ class Services:
         self.begun = self.clock.monotonic()
         self.stop_port = 0
         """Of the stop listener, once there is one."""
+        self.lanes = Lanes()
         self.metrics = Metrics()
+        limits = Limits(memory=settings.server.upload_memory << 20, seconds=settings.server.upload_time)
+        self.uploads = Workers(limits, 1)
+        self.motions = Workers(limits, 1)
+        """Apart, so that whoever uploads holds up no preview."""
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
         self._robots: dict[str, RobotServices] = {}
@@ -120,17 +131,24 @@ class Services:
             one.keeper.start(connect=self.settings.server.connect_at_start)
 
     def close(self) -> None:
-        """Freezes what moves, closes traces, ends threads and processes. Within SHUTDOWN s, or it says so."""
-        for one in self.robots():
-            closing = threading.Thread(target=one.keeper.close, args=(SHUTDOWN,))
-            closing.start()
-            one.queue.close(SHUTDOWN)
-            one.jobs.close(SHUTDOWN)
-            closing.join()
-            one.control.close()
-            one.stop.close()
-        self._later.shutdown(wait=True)
+        """Freezes what moves, closes traces, ends threads and processes. Within SHUTDOWN s; what is not done by then
+        ends with this process."""
+        self.end_processes()
+        every = self.robots()
+        _all_within(
+            SHUTDOWN,
+            [partial(close, SHUTDOWN) for o in every for close in (o.keeper.close, o.queue.close, o.jobs.close)],
+        )
+        _all_within(
+            TIDYING, [self._later.shutdown, *(close for o in every for close in (o.control.close, o.stop.close))]
+        )
         self.store.close()
+
+    def end_processes(self) -> None:
+        """Those that read and plan for somebody, at once. The owner of a robot's port ends by itself, jobs with this
+        process."""
+        self.uploads.close()
+        self.motions.close()
 
     def _make_robot(self, settings: Settings) -> RobotServices:
         name, folder = settings.robot.name, settings.traces.folder.absolute()
@@ -234,3 +252,13 @@ class Services:
             catalogue.bring_up_to_date()
         except (DaqError, ProblemError, OSError, SQLAlchemyError) as error:
             log.warning("catalogue: %s", error)
+
+
+def _all_within(seconds: float, steps: Iterable[Callable[[], object]]) -> None:
+    """Each on a thread of its own; one that takes longer is left alone."""
+    until = time.monotonic() + seconds
+    threads = [threading.Thread(target=step, name="closing", daemon=True) for step in steps]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(max(0.0, until - time.monotonic()))

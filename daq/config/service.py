@@ -47,6 +47,12 @@ class ServiceSettings(BaseModel):
     """Worker processes for fits, validations and comparisons."""
     history: Annotated[float, Field(ge=10, le=3600)] = 300.0
     """s of live samples that a client finds when it joins."""
+    upload_size: Annotated[int, Field(ge=1, le=65536)] = 512
+    """MB that an uploaded trace may have."""
+    upload_memory: Annotated[int, Field(ge=64, le=1 << 20)] = 2048
+    """MB of memory for the process that reads it."""
+    upload_time: Annotated[float, Field(ge=1, le=3600)] = 60.0
+    """s that it may take."""
     names: tuple[Annotated[str, Field(max_length=253)], ...] = ()
     """Names by which browsers reach this service, beside its address: others are refused."""
 

@@ -145,7 +145,7 @@ class KnownTokens:
             except SQLAlchemyError as error:
                 if self._known.at == -math.inf:
                     raise
-                log.error("tokens cannot be read, the last ones that were are taken: %s", error)
+                log.warning("tokens cannot be read, the last ones that were are taken: %s", error)
                 self._known = _Known(self._known.callers, self._clock.monotonic())
             return self._known.callers.get(digest)
 

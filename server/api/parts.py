@@ -6,6 +6,7 @@ to a thread and back, which under load costs more than most answers.
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
 from datetime import UTC, datetime
 from typing import Annotated
 
@@ -52,6 +53,13 @@ async def _operator(connection: HTTPConnection) -> Caller:
     return require_operator(connection)
 
 
+async def _turn(connection: HTTPConnection) -> AsyncIterator[None]:
+    async with services(connection).lanes.turn(require_viewer(connection).name):
+        yield
+
+
+Turn = Annotated[None, Depends(_turn, scope="function")]
+"""Of routes that cost much: a caller has a few of them at once. It ends before the answer is sent."""
 Viewer = Annotated[Caller, Depends(_viewer)]
 Operator = Annotated[Caller, Depends(_operator)]
 

@@ -8,7 +8,7 @@ from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Experiment, Schedule, ScheduleChange, ScheduleRequest
 from daq.contracts.service.queue import Control, ControlLease, ControlRequest, QueueResume, QueueStatus
 from server.api.experiments import require_possible
-from server.api.parts import CursorOf, Identity, LeaseHeader, Limit, Operator, RobotPart, ServicesPart, Viewer
+from server.api.parts import CursorOf, Identity, LeaseHeader, Limit, Operator, RobotPart, ServicesPart, Turn, Viewer
 from server.problems import PROBLEMS, ProblemError
 
 router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
@@ -21,7 +21,7 @@ async def get_queue(one: RobotPart, _: Viewer) -> QueueStatus:
 
 
 @router.get("/queue/experiments", tags=["queue"])
-def list_queue(one: RobotPart, found: ServicesPart, _: Viewer) -> tuple[Experiment, ...]:
+def list_queue(one: RobotPart, found: ServicesPart, _: Viewer, _turn: Turn) -> tuple[Experiment, ...]:
     """What waits, in the order in which it will be run."""
     return tuple(found.experiments.in_order(one.robot.name))
 
@@ -52,9 +52,11 @@ def attend_queue(one: RobotPart, _: Operator) -> QueueStatus:
 
 
 @router.post("/schedules", tags=["queue"], status_code=201)
-def create_schedule(request: ScheduleRequest, one: RobotPart, found: ServicesPart, who: Operator) -> Schedule:
+def create_schedule(
+    request: ScheduleRequest, one: RobotPart, found: ServicesPart, who: Operator, _turn: Turn
+) -> Schedule:
     """An experiment to be run every so often. It is checked now, and again before every run."""
-    require_possible(one, request.spec)
+    require_possible(found, one, request.spec)
     made = found.schedules.create(one.robot.name, request, found.clock.utc(), who.name)
     found.tell(one.robot.name, "schedule", f"schedule {made.id}: every {made.every:g} s", actor=who.name)
     one.queue.wake()

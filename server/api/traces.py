@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -22,7 +23,7 @@ from daq.contracts.trace import Outcome
 from daq.traces.csv_table import export_csv
 from daq.traces.reader import read_trace
 from daq.traces.summary import joint_figures
-from server.api.parts import CursorOf, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
+from server.api.parts import CursorOf, Identity, Limit, Operator, RobotPart, ServicesPart, Turn, Viewer
 from server.catalogue.thinning import thinned
 from server.catalogue.upload import store_upload
 from server.problems import PROBLEMS, TITLES
@@ -44,7 +45,7 @@ _BINARY = {"schema": {"type": "string", "format": "binary"}}
 async def list_traces(
     one: RobotPart,
     found: ServicesPart,
-    _: Viewer,
+    who: Viewer,
     q: Text = None,
     tag: Annotated[str | None, Query(max_length=40)] = None,
     source: Source | None = None,
@@ -57,7 +58,8 @@ async def list_traces(
 ) -> Page[CatalogueEntry]:
     """Traces, the newest first."""
     search = TraceSearch(q, tag, source, outcome, kind, since, until)
-    return await found.traces.page.told(one.robot.name, search, cursor, limit)
+    async with nullcontext() if q is None else found.lanes.turn(who.name):
+        return await found.traces.page.told(one.robot.name, search, cursor, limit)
 
 
 @router.post(
@@ -72,7 +74,7 @@ async def upload_trace(request: Request, one: RobotPart, found: ServicesPart, wh
 
 
 @router.get("/{trace}")
-def get_trace(trace: Identity, one: RobotPart, found: ServicesPart, _: Viewer) -> TraceDetails:
+def get_trace(trace: Identity, one: RobotPart, found: ServicesPart, _: Viewer, _turn: Turn) -> TraceDetails:
     """What one trace says about itself, its figures and events."""
     entry = found.traces.get(one.robot.name, trace)
     read = read_trace(one.catalogue.path_of(trace))
@@ -109,7 +111,7 @@ def download_trace(trace: Identity, one: RobotPart, _: Viewer) -> FileResponse:
 
 
 @router.get("/{trace}/data.csv", response_class=FileResponse, responses={200: {"content": {CSV: _BINARY}}})
-def download_trace_as_csv(trace: Identity, one: RobotPart, _: Viewer) -> FileResponse:
+def download_trace_as_csv(trace: Identity, one: RobotPart, _: Viewer, _turn: Turn) -> FileResponse:
     """Time and signals as plain CSV, in s, rad and V."""
     path = one.catalogue.path_of(trace)
     folder = tempfile.TemporaryDirectory(prefix="daq-csv-")
@@ -119,7 +121,13 @@ def download_trace_as_csv(trace: Identity, one: RobotPart, _: Viewer) -> FileRes
 
 @router.get("/{trace}/data.json")
 def get_trace_signals(
-    trace: Identity, one: RobotPart, _: Viewer, points: Points = 2000, start: Seconds = None, end: Seconds = None
+    trace: Identity,
+    one: RobotPart,
+    _: Viewer,
+    _turn: Turn,
+    points: Points = 2000,
+    start: Seconds = None,
+    end: Seconds = None,
 ) -> TraceSignals:
     """Signals for a plot, thinned to about `points` between `start` and `end`; no peak is lost."""
     read = read_trace(one.catalogue.path_of(trace))

@@ -46,9 +46,10 @@ class Catalogue:
         with self._lock:
             return summary.trace_id if (summary := self._summary(path)) and self._insert(path, summary) else None
 
-    def move_in(self, source: Path, target: Path) -> bool:
-        """Takes in a finished file from elsewhere on this disk, as `target` of the folder; False, and nothing is
-        changed, when a trace of this number is there. Raises a 409 when a file of this name is."""
+    def move_in(self, source: Path, target: Path, summary: TraceSummary) -> bool:
+        """Takes in a finished file from elsewhere on this disk, as `target` of the folder, which says `summary` about
+        itself; False, and nothing is changed, when a trace of this number is there. Raises a 409 when a file of this
+        name is."""
         with self._lock:  # whoever else looks into the folder finds both file and row, or neither
             if target.exists():
                 advice = "it is the same trace: nothing needs to be done"
@@ -56,7 +57,7 @@ class Catalogue:
             disk.rename(source, target)
             taken = False
             try:
-                taken = self._take_in(target)
+                taken = self._insert(target, summary)
             finally:
                 if not taken:
                     target.unlink()
