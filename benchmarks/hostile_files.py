@@ -1,4 +1,4 @@
-"""Traces that are made to harm whoever reads them: bombs, lengths that are lies, nesting, numbers beyond all measure."""
+"""Traces that are made to harm whoever reads them: bombs, lengths that are lies, nesting, numbers beyond measure."""
 
 from __future__ import annotations
 

@@ -11,12 +11,13 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import DatabaseError
 from starlette.exceptions import HTTPException
 
 from daq.contracts.errors import DaqError
 from daq.contracts.service.problems import FieldProblem, ProblemDetails
 from daq.transport import PortBusyError
+from server.store.damage import BRING_BACK, DamagedError, line_of
 
 MEDIA_TYPE = "application/problem+json"
 log = logging.getLogger("server")
@@ -88,6 +89,16 @@ def of_error(error: DaqError) -> ProblemError:
     return of_exit_code(error.exit_code, str(error))
 
 
+def of_database(error: DatabaseError) -> ProblemError:
+    """A 503 that names the table, or a 507."""
+    line = line_of(error)
+    log.error("database: %s", line)
+    if "full" in str(error.orig):
+        return ProblemError(507, "no-room", "the disk of the database is full", "make room on it")
+    passes = "locked" in line or "busy" in line
+    return ProblemError(503, "database", f"the database: {line}", "try again" if passes else BRING_BACK)
+
+
 def no_room(error: OSError) -> ProblemError:
     """A 507: the disk takes no more."""
     log.error("disk: %s", error)
@@ -150,14 +161,14 @@ def install(app: FastAPI) -> None:
         advice = "/api/v1/openapi.json lists every address"
         return response(request, ProblemError(error.status_code, kind, detail, advice, (), error.headers))
 
-    @app.exception_handler(OperationalError)
-    async def database(request: Request, error: OperationalError) -> JSONResponse:
-        log.error("database: %s", error.orig)
-        if "full" in str(error.orig):
-            return response(
-                request, ProblemError(507, "no-room", "the disk of the database is full", "make room on it")
-            )
-        return response(request, ProblemError(503, "database", f"the database: {error.orig}", "try again"))
+    @app.exception_handler(DatabaseError)
+    async def database(request: Request, error: DatabaseError) -> JSONResponse:
+        return response(request, of_database(error))
+
+    @app.exception_handler(DamagedError)
+    async def damaged(request: Request, error: DamagedError) -> JSONResponse:
+        log.error("database: %s", error)
+        return response(request, ProblemError(503, "database", f"the database: {error}", BRING_BACK))
 
     @app.exception_handler(OSError)
     async def disk(request: Request, error: OSError) -> JSONResponse:

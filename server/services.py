@@ -88,6 +88,7 @@ class Services:
         self.clock = clock or SystemClock()
         self.store = Store(settings.server.database_url)
         self.store.migrate()
+        self.store.require_sound()
         self.experiments = ExperimentStore(self.store)
         self.schedules = ScheduleStore(self.store)
         self.traces = TraceStore(self.store)

@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from urllib.parse import parse_qs
 
+from sqlalchemy.exc import DatabaseError
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -24,7 +25,7 @@ from server.access.limits import LARGEST_BODY, Buckets, counted
 from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_known_name, is_this_computers_user
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
-from server.problems import ProblemError, response
+from server.problems import ProblemError, of_database, response
 
 STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
 """The one address whose POST no limit of requests holds up."""
@@ -90,6 +91,9 @@ class Gate:
                 state["caller"] = await self._admit(scope)
             except ProblemError as problem:
                 await response(Request(scope), problem)(scope, receive, secured)
+                return
+            except DatabaseError as error:  # of whoever is not known by heart
+                await response(Request(scope), of_database(error))(scope, receive, secured)
                 return
             await app(scope, receive if _is_post(scope, UPLOADS) else counted(receive, LARGEST_BODY), secured)
         finally:
