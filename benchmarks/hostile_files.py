@@ -189,6 +189,7 @@ def hostile_traces(data: bytes) -> dict[str, bytes]:
         "a number that is a path": with_record(data, trace_id="../../etc/passwd"),
         "a chunk of 2⁶⁴−1 bytes inside": lying_chunk(data, 16, 2**64 - 1),
         "a chunk of 2⁶³ bytes inside": lying_chunk(data, 16, 2**63),
+        "a chunk of 2⁶² bytes inside": lying_chunk(data, 16, 2**62),
         "a record of 2⁶⁴−1 bytes": data[:20] + record(Opcode.CHUNK, b"", 2**64 - 1),
         "a bomb of 64 MB that says it is small": bomb(data, 64 << 20, declared=1000),
     }

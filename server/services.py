@@ -159,7 +159,7 @@ class Services:
             memory_map = settings.robot.memory_map.read_text("utf-8")
         robot = Robot(RobotPlace(name, settings.port, settings.machine(), folder, memory_map), self.clock)
         control = ControlDesk(self.clock, lambda holder: self._lapsed(robot, holder))
-        catalogue = Catalogue(folder, name, self.traces, self.experiments)
+        catalogue = Catalogue(folder, name, self.traces, self.experiments, settings.traces.limits)
 
         def told(kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
             self.tell(name, kind, text, actor=actor, experiment=experiment)

@@ -112,7 +112,7 @@ def calibrate_gain(
 @router.get("/traces/{trace}/gain")
 def get_measured_gain(trace: Identity, one: RobotPart, _: Viewer, _turn: Turn) -> tuple[MeasuredGain, ...]:
     """The actual proportional gains that a trace shows."""
-    read = read_trace(one.catalogue.path_of(trace))
+    read = read_trace(one.catalogue.path_of(trace), one.catalogue.limits)
     fields = MeasuredGain.model_fields
     return tuple(
         MeasuredGain.model_validate({name: value for name, value in found.as_data().items() if name in fields})

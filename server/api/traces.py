@@ -77,7 +77,7 @@ async def upload_trace(request: Request, one: RobotPart, found: ServicesPart, wh
 def get_trace(trace: Identity, one: RobotPart, found: ServicesPart, _: Viewer, _turn: Turn) -> TraceDetails:
     """What one trace says about itself, its figures and events."""
     entry = found.traces.get(one.robot.name, trace)
-    read = read_trace(one.catalogue.path_of(trace))
+    read = read_trace(one.catalogue.path_of(trace), one.catalogue.limits)
     return TraceDetails(
         entry=entry,
         record=read.record,
@@ -115,7 +115,7 @@ def download_trace_as_csv(trace: Identity, one: RobotPart, _: Viewer, _turn: Tur
     """Time and signals as plain CSV, in s, rad and V."""
     path = one.catalogue.path_of(trace)
     folder = tempfile.TemporaryDirectory(prefix="daq-csv-")
-    made = export_csv(read_trace(path), Path(folder.name) / f"{path.stem}.csv")
+    made = export_csv(read_trace(path, one.catalogue.limits), Path(folder.name) / f"{path.stem}.csv")
     return FileResponse(made, media_type=CSV, filename=made.name, background=BackgroundTask(folder.cleanup))
 
 
@@ -130,7 +130,7 @@ def get_trace_signals(
     end: Seconds = None,
 ) -> TraceSignals:
     """Signals for a plot, thinned to about `points` between `start` and `end`; no peak is lost."""
-    read = read_trace(one.catalogue.path_of(trace))
+    read = read_trace(one.catalogue.path_of(trace), one.catalogue.limits)
     few = thinned(read, points, start, end)
     columns = {name: None if s is None else tuple(map(tuple, s.T.tolist())) for name, s in few.signals.items()}
     return TraceSignals(

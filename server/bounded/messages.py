@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.catalogue import TraceSummary
 
 
@@ -30,6 +31,7 @@ class ReadUpload(_Message):
     kind: Literal["upload"] = "upload"
     path: Path
     folder: Path
+    limits: TraceLimits = DEFAULT_TRACE_LIMITS
 
 
 class WorkOutMotion(_Message):

@@ -29,14 +29,14 @@ def read_upload(order: ReadUpload) -> UploadedTrace:
     """The trace in a file. Raises TraceError, and whatever a damaged file makes of its reader."""
     path = order.path
     try:
-        trace = import_csv(path) if path.suffix == ".csv" else read_trace(path)
+        trace = import_csv(path, order.limits) if path.suffix == ".csv" else read_trace(path, order.limits)
         _require_sound(trace)
         target = trace_path(order.folder, trace.record)
         made = path
         if path.suffix == ".csv":
             made = path.with_name(target.name)
             write_trace(trace, made)
-        summary = summary_of(made)
+        summary = summary_of(made, order.limits)
         _require_true(summary, trace)
         return UploadedTrace(path=made, name=target.name, summary=summary)
     except TraceError as error:

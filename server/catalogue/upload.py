@@ -60,7 +60,8 @@ def _take_in(path: Path, one: RobotServices, found: Services, who: Caller) -> Ca
 def _read(path: Path, one: RobotServices, found: Services) -> UploadedTrace:
     """Raises a 413 for what takes too much, a 422 for what is no trace."""
     try:
-        answer = found.uploads.ask(ReadUpload(path=path, folder=one.catalogue.folder))
+        limits = found.settings.traces.limits
+        answer = found.uploads.ask(ReadUpload(path=path, folder=one.catalogue.folder, limits=limits))
     except ExhaustedError as error:
         raise _too_much(str(error)) from error
     if answer.exhausted:

@@ -250,7 +250,8 @@ class QueueDesk:
         """The next experiment, with the control of the robot; None when none may begin now."""
         parts = self._parts
         with self._lock:
-            following = next_due(parts.experiments.waiting(parts.robot.name), parts.clock.utc())
+            now = parts.clock.utc()
+            following = next_due(parts.experiments.due(parts.robot.name, now), now)
             if following is None:
                 self._waiting_for = ""
                 return None
