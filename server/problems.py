@@ -156,7 +156,7 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(HTTPException)
     async def http(request: Request, error: HTTPException) -> JSONResponse:
         kind = {404: "not-found", 405: "no-such-method"}.get(error.status_code, "http")
-        path = request.url.path
+        path = request.url.path[:100]
         detail = f"{request.method} {path}: {error.detail}"
         advice = "/api/v1/openapi.json lists every address"
         return response(request, ProblemError(error.status_code, kind, detail, advice, (), error.headers))

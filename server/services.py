@@ -119,7 +119,7 @@ class Services:
     def robot(self, name: str) -> RobotServices:
         """Raises a 404."""
         if name not in self._robots:
-            raise not_found(f"robot {name!r}", f"this service has {', '.join(self._robots)}")
+            raise not_found(f"robot {name!r:.60}", f"this service has {', '.join(self._robots)}")
         return self._robots[name]
 
     def start(self) -> None:

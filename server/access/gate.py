@@ -7,6 +7,7 @@ import logging
 import re
 import secrets
 import time
+from collections import Counter
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -31,7 +32,9 @@ STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
 """The one address whose POST no limit of requests holds up."""
 UPLOADS = re.compile(r"/api/v1/robots/[^/]+/(traces|models)")
 """Addresses whose POST takes a file, and counts its bytes itself."""
-NOT_ALLOWED = 1008
+NOT_ALLOWED, TRY_LATER = 1008, 1013
+MOST_SOCKETS = 100
+"""WebSockets of one caller, of the 500 connections that there are for all."""
 LOOK_EVERY = 1.0
 """s between two looks at whether the token of whoever holds a WebSocket has been revoked."""
 log = logging.getLogger("server.access")
@@ -53,6 +56,8 @@ class Gate:
     stop_port: int | None = None
     observed: Callable[[str, int, float], None] = lambda _method, _status, _seconds: None
     buckets: Buckets = field(default_factory=Buckets)
+    sockets: Counter[str] = field(default_factory=Counter)
+    """WebSockets that are open, by the caller's name."""
 
     def middleware(self, app: ASGIApp) -> ASGIApp:
         """`app` behind this gate."""
@@ -112,6 +117,21 @@ class Gate:
             await WebSocketClose(NOT_ALLOWED, problem.detail)(scope, receive, send)
             return
         caller = state["caller"]
+        name = caller.name if caller else ""
+        if self.sockets[name] >= MOST_SOCKETS:
+            log.warning("refused a WebSocket: %s has %s open", name, MOST_SOCKETS)
+            await WebSocketClose(TRY_LATER, "too many sockets are open")(scope, receive, send)
+            return
+        self.sockets[name] += 1
+        try:
+            await self._open_socket(app, caller, scope, receive, send)
+        finally:
+            self.sockets[name] -= 1
+            self.sockets += Counter()  # forgets names that have none
+
+    async def _open_socket(
+        self, app: ASGIApp, caller: Caller | None, scope: Scope, receive: Receive, send: Send
+    ) -> None:
         if caller is None or caller.token is None:
             await app(scope, receive, send)
         elif not await self._while_let_in(caller, app(scope, receive, send)):
