@@ -17,7 +17,7 @@ from starlette.exceptions import HTTPException
 from daq.contracts.errors import DaqError
 from daq.contracts.service.problems import FieldProblem, ProblemDetails
 from daq.transport import PortBusyError
-from server.store.damage import BRING_BACK, DamagedError, line_of
+from server.store.database_errors import BRING_BACK, DamagedError, line_of
 
 MEDIA_TYPE = "application/problem+json"
 log = logging.getLogger("server")

@@ -2,42 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from typing import get_args
 
 from sqlalchemy import Connection, Engine, inspect, select, text
 from sqlalchemy.exc import DatabaseError
 
-from daq.contracts.errors import DaqError
 from daq.contracts.service.experiments import ExperimentState
+from server.store.database_errors import BRING_BACK, DamagedError, line_of, one_line
 from server.store.tables import ExperimentRow, JobRow, Table
-
-BRING_BACK = "`daq restore FILE --overwrite` brings a backup back"
-_TABLE = re.compile(r'\b(?:FROM|INTO|UPDATE)\s+"?(\w+)', re.IGNORECASE)
-_LONGEST = 200
-
-
-class DamagedError(DaqError):
-    """What the database holds cannot be what was written there."""
-
-    exit_code = 2
-
-
-def table_of(statement: str | None) -> str:
-    """The table that a statement is about; empty where it names none."""
-    found = _TABLE.search(statement or "")
-    return found[1] if found else ""
-
-
-def line_of(error: DatabaseError) -> str:
-    """What the database says, and about which table."""
-    table = table_of(error.statement)
-    return f"{f'table {table}: ' if table else ''}{one_line(error.orig or error)}"
-
-
-def one_line(error: BaseException) -> str:
-    """The beginning of what an error says."""
-    return " ".join(str(error).split())[:_LONGEST]
 
 
 def require_sound(engine: Engine, url: str) -> None:
@@ -56,7 +28,7 @@ def require_sound(engine: Engine, url: str) -> None:
 def _require_whole(connection: Connection, url: str) -> None:
     told = connection.execute(text("PRAGMA quick_check(1)")).scalar()
     if told != "ok":
-        raise DamagedError(f"database {url}: is damaged: {' '.join(str(told).split())[:_LONGEST]}; {BRING_BACK}")
+        raise DamagedError(f"database {url}: is damaged: {one_line(told)}; {BRING_BACK}")
 
 
 def _require_columns(connection: Connection, url: str) -> None:

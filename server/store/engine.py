@@ -19,7 +19,8 @@ from sqlalchemy.exc import DatabaseError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 
 from daq.contracts.errors import DaqError
-from server.store.damage import BRING_BACK, DamagedError, line_of, one_line, require_sound, table_of
+from server.store.damage import require_sound
+from server.store.database_errors import BRING_BACK, DamagedError, line_of, one_line, table_of
 
 BUSY_TIMEOUT_MS = 5000
 """Another process (`daq token`, a backup) may hold the write lock for a moment."""
