@@ -125,18 +125,20 @@ class ReadProcess(_QuickRequest):
 
 
 class WriteOutput(_QuickRequest):
-    """One process output, 0 to 7."""
+    """One process output, 0 to 7. Refused while the arm is stopped, unless `while_stopped`."""
 
     kind: Literal["write_output"] = "write_output"
     output: int
     on: bool
+    while_stopped: bool = False
 
 
 class MoveGripper(_QuickRequest):
-    """Closes or opens the gripper."""
+    """Closes or opens the gripper. Refused while the arm is stopped, unless `while_stopped`."""
 
     kind: Literal["gripper"] = "gripper"
     closed: bool
+    while_stopped: bool = False
 
 
 class Reset(_QuickRequest):

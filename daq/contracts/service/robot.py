@@ -126,15 +126,17 @@ class ProcessState(Wire):
 
 
 class OutputRequest(Wire):
-    """One process output."""
+    """One process output. Refused while the arm is stopped, unless `while_stopped`."""
 
     on: bool
+    while_stopped: bool = False
 
 
 class GripperRequest(Wire):
-    """The gripper."""
+    """The gripper. Refused while the arm is stopped, unless `while_stopped`: it may hold a load, or somebody's hand."""
 
     closed: bool
+    while_stopped: bool = False
 
 
 class Done(Wire):

@@ -1,7 +1,5 @@
-"""A second door for the stop alone, on threads of its own: it opens also while the event loop is blocked.
-
-It speaks just enough HTTP for `POST /api/v1/robots/{robot}/stop`, with the same answers as the service, and touches
-nothing that the event loop does. When the whole process hangs or is gone, `daq stop` on the computer itself remains.
+"""A second door for the stop alone: just enough HTTP for `POST /api/v1/robots/{robot}/stop`, every request on a thread
+of its own, with the same names, tokens, origins and answers as at the service itself.
 """
 
 from __future__ import annotations
@@ -21,6 +19,7 @@ from daq.contracts.service.robot import StopResult
 from server.access.caller import Caller
 from server.access.stop_gate import StopGate
 from server.problems import MEDIA_TYPE, ProblemError, details_of, not_found
+from server.stopping.tokens import TokensCannotBeReadError
 
 ADDRESS = re.compile(r"/api/v1/robots/([a-z0-9][a-z0-9_-]{0,31})/stop")
 READ_WITHIN = 2.0
@@ -29,14 +28,16 @@ MOST_AT_ONCE = 32
 """Connections; one more is closed at once, and the service's own door is still there."""
 LONGEST_BODY = 4096
 """Bytes of a body that are read, so that the answer is not lost with it; nothing in it is looked at."""
+ANSWERED_WITHIN = 2.0
+"""s for what is under way when the listener ends: a stop is answered within 1.1 s."""
 log = logging.getLogger("server.stop")
 
 Stop = Callable[[], StopResult]
-Told = Callable[[str, str, Caller], None]
+Told = Callable[[str, StopResult, Caller], None]
 
 
 class StopListener:
-    """Listens until closed. `stops` by robot; `told` is given robot, result in one line, and who asked."""
+    """Listens until closed. `stops` by robot; `told` is given the robot, what became of its stop, and who asked."""
 
     def __init__(self, listener: socket.socket, gate: StopGate, stops: Mapping[str, Stop], told: Told) -> None:
         self._server = _Server(listener, _handler(gate, stops, told))
@@ -48,6 +49,7 @@ class StopListener:
         self._server.shutdown()
         self._thread.join()
         self._server.server_close()
+        self._server.wait_for_answers(ANSWERED_WITHIN)
 
 
 class _Server(ThreadingHTTPServer):
@@ -86,6 +88,13 @@ class _Server(ThreadingHTTPServer):
                 with suppress(OSError):  # closed by now
                     request.shutdown(socket.SHUT_RD)
 
+    def wait_for_answers(self, within: float) -> None:
+        """Until nobody has a place any more, or `within` s are over."""
+        until = time.monotonic() + within
+        for _ in range(MOST_AT_ONCE):
+            if not self._room.acquire(timeout=max(0.0, until - time.monotonic())):
+                return
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A client that goes away is no fault; anything else is in the log."""
         del request
@@ -104,12 +113,16 @@ def _handler(gate: StopGate, stops: Mapping[str, Stop], told: Told) -> type[Base
             self._read_body()
             try:
                 robot, caller = self._admitted()
+            except TokensCannotBeReadError as error:
+                problem = ProblemError(503, "database", f"the tokens cannot be read: {error}", "try again")
+                self._answer(problem.status, details_of(problem), MEDIA_TYPE)
+                return
             except ProblemError as problem:
                 self._answer(problem.status, details_of(problem), MEDIA_TYPE, problem.headers)
                 return
             result = stops[robot]()
             self._answer(200, result, "application/json")
-            told(robot, result.text, caller)
+            told(robot, result, caller)
 
         def do_OPTIONS(self) -> None:
             """Whether the service's page may ask, which is at another port and so of another origin."""
