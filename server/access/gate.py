@@ -24,6 +24,7 @@ from server.access.limits import LARGEST_BODY, Buckets, counted
 from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_known_name, is_this_computers_user
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
+from server.access.turns import Turns
 from server.problems import ProblemError, response
 
 STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
@@ -52,6 +53,7 @@ class Gate:
     stop_port: int | None = None
     observed: Callable[[str, int, float], None] = lambda _method, _status, _seconds: None
     buckets: Buckets = field(default_factory=Buckets)
+    turns: Turns = field(default_factory=Turns)
 
     def middleware(self, app: ASGIApp) -> ASGIApp:
         """`app` behind this gate."""
@@ -91,7 +93,12 @@ class Gate:
             except ProblemError as problem:
                 await response(Request(scope), problem)(scope, receive, secured)
                 return
-            await app(scope, receive if _is_post(scope, UPLOADS) else counted(receive, LARGEST_BODY), secured)
+            turn = await self.turns.taken(scope, secured)
+            try:
+                body = receive if _is_post(scope, UPLOADS) else counted(receive, LARGEST_BODY)
+                await app(scope, body, turn.send)
+            finally:
+                turn.end()
         finally:
             seconds = time.perf_counter() - begun
             self.observed(scope["method"], status, seconds)

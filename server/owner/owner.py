@@ -82,6 +82,7 @@ def _carry_out(desk: Desk, order: Long | Quick) -> None:
     try:
         if _is_away(desk):
             raise ReachError(_being_tried(desk))
+        long_orders.require_in_time(order)
         desk.activity = order.activity
         desk.tell_arm()  # at once: what cannot be done meanwhile is refused by the service
         answer = _moved(desk, order)

@@ -383,6 +383,7 @@ class QueueDesk:
                 return Ending(Event.STOPPED, "cancelled before it moved")
             answer = running.answer = parts.robot.ask(
                 RunExperiment,
+                asked=parts.clock.monotonic(),
                 spec=experiment.spec,
                 trace_id=parts.experiments.trace_number(experiment.id),
                 moves_real_arm=self._consent,
