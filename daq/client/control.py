@@ -16,6 +16,7 @@ from daq.contracts.experiment import Gain
 from daq.contracts.service.queue import ControlLease, ControlRequest
 from daq.contracts.service.robot import GripperRequest, JointGains, OutputRequest, ProcessState
 from daq.contracts.service.teaching import JogRequest, LeadRequest, StepRequest, TeachingStatus
+from daq.contracts.word import require_word
 
 HEADER = "Control-Lease"
 T = TypeVar("T")
@@ -36,7 +37,7 @@ class HeldControl:
     def __init__(self, connection: Connection, robot: str, *, moves_real_arm: bool = False) -> None:
         self._connection = connection
         self._path = robot
-        self._moves_real_arm = moves_real_arm
+        self._moves_real_arm = require_word(moves_real_arm)
         self._lease: ControlLease | None = None
         self._ended = threading.Event()
         self._lost = ""
