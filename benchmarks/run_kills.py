@@ -20,7 +20,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
@@ -41,13 +41,15 @@ from daq.traces.reader import read_trace
 from daq.traces.salvage import salvage_folder
 
 RUN = ("run", "sine", "--joints", "1-3", "--amplitude", "5", "--period", "4", "--cycles", "6", "--hold", "0.2")
-MOCK = ("--pty", "--lock-step", "--seed", "3")
+MOCK = ("--tcp", "127.0.0.1:0", "--lock-step", "--seed", "3")
 ENDS_WITHIN = 30.0
 """s for everything to have ended, on a busy computer."""
 HOLDS_FOR = 100
 """Control periods for which the arm is watched afterwards."""
 AT_REST = 40
 """ADC counts of error within which an arm holds."""
+SOME_RECORD = 10_000
+"""Bytes of an unfinished trace: some seconds of the arm's time."""
 ACQUISITION = b"daq.acquisition"
 
 
@@ -159,17 +161,32 @@ def until_acquiring(run: subprocess.Popen[bytes]) -> int:
         time.sleep(0.002)
 
 
-def end_one(way: Way, moment: float, whole: Undisturbed, machine: Machine, findings: Findings) -> None:
-    """One run, ended at `moment` (0 to 1, of the undisturbed run's length)."""
-    label = f"{way.name} at {moment:.3f}"
+def after(share: float, way: Way, whole: Undisturbed) -> Callable[[Desk], None]:
+    """Waits for a share (0 to 1) of what the undisturbed run took from the start of the process that is met."""
+    return lambda _desk: time.sleep(share * (whole.acquisition if way.acquisition else whole.command))
+
+
+def once_recording(here: Desk) -> None:
+    """Waits until there is something of a record on the disk, beside what a trace begins with."""
+    begun: int | None = None
+    while True:
+        for part in (here.folder / "traces").glob("*.part"):
+            size = part.stat().st_size
+            begun = size if begun is None else begun
+            if size > begun + SOME_RECORD:
+                return
+        time.sleep(0.002)
+
+
+def end_one(
+    way: Way, moment: Callable[[Desk], None], label: str, whole: Undisturbed, machine: Machine, findings: Findings
+) -> None:
+    """One run, ended when `moment` returns."""
     with desk() as here:
         run = here.start()
-        acquisition = None
-        if way.acquisition:
-            acquisition = until_acquiring(run)
-            time.sleep(moment * whole.acquisition)
-        else:
-            time.sleep(moment * whole.command)
+        acquisition = until_acquiring(run) if way.acquisition else None
+        moment(here)
+        if acquisition is None:
             with contextlib.suppress(RuntimeError, OSError):
                 acquisition = child(run.pid, ACQUISITION)
         with contextlib.suppress(ProcessLookupError):
@@ -269,7 +286,9 @@ def _after(here: Desk) -> list[str]:
     """What is wrong with the port, or with the arm behind it."""
     try:
         with Controller.connect(here.url) as controller:
-            snapshot = first = controller.next_snapshot()
+            # The first period after a freeze uses its set points, and so it is the next one that they are seen in.
+            first = controller.next_snapshot(controller.next_snapshot().tick)
+            snapshot = first
             for _ in range(HOLDS_FOR):
                 snapshot = controller.next_snapshot(snapshot.tick)
     except DaqError as error:
@@ -289,7 +308,8 @@ def measure(moments: int, seed: int) -> tuple[Findings, dict[str, int]]:
     ended: Counter[str] = Counter()
     for number in range(moments):
         for way in WAYS:
-            end_one(way, random.uniform(0.0, 1.0), whole, machine, findings)
+            share = random.uniform(0.0, 1.0)
+            end_one(way, after(share, way, whole), f"{way.name} at {share:.3f}", whole, machine, findings)
             ended[way.name] += 1
         print(f"  moment {number + 1} of {moments}: {len(findings.wrong)} wrong", file=sys.stderr, flush=True)
     return findings, dict(ended)

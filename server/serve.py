@@ -117,8 +117,6 @@ def _connect(services: Services, door: StopDoor, listener: socket.socket) -> Non
     """The service hears of stops at the listener, which hears how each robot is reached."""
 
     def stopped(news: Stopped) -> None:
-        if news.confirmed:
-            services.robot(news.robot).robot.note_stop()
         with suppress(RuntimeError):  # the service is ending, and writes nothing down any more
             services.tell_later(news.robot, "stop", news.text, actor=news.actor)
 

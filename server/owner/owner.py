@@ -76,7 +76,9 @@ def _watch(desk: Desk, last: int | None) -> int:
 def _carry_out(desk: Desk, order: Long | Quick) -> None:
     if isinstance(order, Quick):
         answer = long_orders.answered_quickly(desk, order)
-        desk.tell_arm()  # before the answer: who has heard of a reset may resume the queue at once
+        # Before the answer, since who has heard of a reset may resume the queue at once; and also where it looks as it
+        # did when it was told last: the service may have noted a stop since, which this process never came to tell.
+        desk.tell_arm(anew=True)
         desk.speaker.ended(answer)
         return
     try:

@@ -16,7 +16,7 @@ from daq.link import LinkState
 from daq.runner import ArmControl
 from firmware_protocol.commands import StatusFlag
 from server.owner import long_orders
-from server.owner.messages import BEGINS_WITHIN, Answer, RunProgram
+from server.owner.messages import BEGINS_WITHIN, Answer, Reset, RunProgram
 from server.owner.owner import serve
 
 SILENT = NoSampleError("mock://: no whole sample")
@@ -44,9 +44,10 @@ class SilentForAWhile:
 
 
 def served(
-    orders: dict[int, Any], turns: int = 8, activities: list[str] | None = None
+    orders: dict[int, Any], turns: int = 8, activities: list[str] | None = None, anew: list[int] | None = None
 ) -> tuple[list[str], list[Answer]]:
-    """States of the arm as they are told, and answers; `orders` by the turn in which they come."""
+    """States of the arm as they are told, and answers; `orders` by the turn in which they come. `anew` gets how many
+    answers there were whenever the state was told in any case."""
     controller, closing = SilentForAWhile(), Event()
     states: list[str] = []
     answers: list[Answer] = []
@@ -56,7 +57,9 @@ def served(
     def take(_timeout: float) -> Any:
         return orders.get(next(numbers))
 
-    def tell_arm() -> None:
+    def tell_arm(**told: bool) -> None:
+        if anew is not None and told.get("anew"):
+            anew.append(len(answers))
         states.append(str(control.arm.state))
         if activities is not None:
             activities.append(desk.activity)
@@ -83,6 +86,17 @@ def test_what_would_move_a_robot_that_is_silent_is_refused() -> None:
     assert [(a.number, a.exit_code) for a in answers] == [(7, ReachError.exit_code)]
     assert "the link is lost; it is being tried again" in answers[0].problem
     assert states[-1] == "idle"
+
+
+def test_a_reset_is_told_before_its_answer_though_the_stop_before_it_never_was(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The service has noted the stop by then, and lets nobody resume the queue until it is told of another state."""
+    monkeypatch.setattr(long_orders, "answered_quickly", lambda _desk, order: Answer(number=order.number))
+    told: list[int] = []
+    _, answers = served({0: Reset(number=7, asked=time.monotonic(), here=False)}, anew=told)
+    assert [answer.number for answer in answers] == [7]
+    assert told == [0]
 
 
 def test_an_order_that_comes_late_moves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
