@@ -45,7 +45,10 @@ def main() -> int:
     """Listens until the input ends: the service is leaving, or gone. Returns the exit code."""
     logs.begin()
     lines = sys.stdin.buffer
-    begin = ORDER.validate_json(lines.readline())
+    first = lines.readline()
+    if not first:
+        return 0  # the service has ended before it began
+    begin = ORDER.validate_json(first)
     assert isinstance(begin, Begin)
     robots = Robots(begin.urls)
     tokens = StopTokens(reader_of(begin.database_url, begin.sqlite))
