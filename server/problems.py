@@ -6,18 +6,19 @@ import errno
 import logging
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
-
-from fastapi import FastAPI, Request
-from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
-from sqlalchemy.exc import DatabaseError
-from starlette.exceptions import HTTPException
+from typing import TYPE_CHECKING, Any
 
 from daq.contracts.errors import DaqError
 from daq.contracts.service.problems import FieldProblem, ProblemDetails
 from daq.transport import PortBusyError
 from server.store.database_errors import BRING_BACK, DamagedError, line_of
+
+if TYPE_CHECKING:
+    from fastapi import FastAPI, Request
+    from fastapi.exceptions import RequestValidationError
+    from fastapi.responses import JSONResponse
+    from sqlalchemy.exc import DatabaseError
+    from starlette.exceptions import HTTPException
 
 MEDIA_TYPE = "application/problem+json"
 log = logging.getLogger("server")
@@ -131,12 +132,18 @@ def details_of(problem: ProblemError, request_id: str | None = None) -> ProblemD
 
 def response(request: Request, problem: ProblemError) -> JSONResponse:
     """A problem on its way out."""
+    from fastapi.responses import JSONResponse
+
     details = details_of(problem, getattr(request.state, "request_id", None))
     return JSONResponse(details.model_dump(mode="json"), problem.status, headers=problem.headers, media_type=MEDIA_TYPE)
 
 
 def install(app: FastAPI) -> None:
     """Every error of `app` leaves it as a problem."""
+    # Here alone: the stop listener tells problems too, and starts without the web framework and the database's.
+    from fastapi.exceptions import RequestValidationError
+    from sqlalchemy.exc import DatabaseError
+    from starlette.exceptions import HTTPException
 
     @app.exception_handler(ProblemError)
     async def problem(request: Request, error: ProblemError) -> JSONResponse:

@@ -136,6 +136,8 @@ class Services:
         ends with this process."""
         self.end_processes()
         every = self.robots()
+        for one in every:
+            one.queue.take_no_more()  # first: the end of the connection is no reason to find the queue held
         _all_within(
             SHUTDOWN,
             [partial(close, SHUTDOWN) for o in every for close in (o.keeper.close, o.queue.close, o.jobs.close)],
@@ -158,7 +160,9 @@ class Services:
             load_memory_map(settings.robot.memory_map)
             memory_map = settings.robot.memory_map.read_text("utf-8")
         robot = Robot(RobotPlace(name, settings.port, settings.machine(), folder, memory_map), self.clock)
-        control = ControlDesk(self.clock, lambda holder: self._lapsed(robot, holder))
+        control = ControlDesk(
+            self.clock, lambda holder: self._lapsed(robot, holder), lambda holder: self._given_back(robot, holder)
+        )
         catalogue = Catalogue(folder, name, self.traces, self.experiments, settings.traces.limits)
 
         def told(kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
@@ -188,11 +192,13 @@ class Services:
                 queue.progressed(report.fraction, report.text)
             elif isinstance(report, ArmReport):
                 queue.hear(report)
-            elif isinstance(report, Opened | EventHappened):
+            elif isinstance(report, Opened):
+                queue.connection_made()
+            elif isinstance(report, EventHappened):
                 queue.wake()
 
         robot.listeners.append(heard)
-        robot.disconnected.append(lambda _why: queue.wake())
+        robot.disconnected.append(queue.connection_ended)
         # After the loss of a process that wrote a trace, its part file is finished and found.
         robot.disconnected.append(lambda _why: self._take_in(catalogue))
         teaching = TeachingDesk(robot, lambda line: self.tell_later(name, "teaching", line))
@@ -201,7 +207,7 @@ class Services:
         robot.listeners.append(hub.hear)
         robot.listeners.append(lambda report: self.metrics.hear(name, report))
         robot.disconnected.append(lambda _why: hub.look())
-        stop = StopDesk(robot, self.clock)
+        stop = StopDesk(robot)
         models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
         jobs = JobDesk(
             JobParts(
@@ -242,11 +248,17 @@ class Services:
         self._later.submit(self.tell, robot, kind, text, actor=actor)
 
     def _lapsed(self, robot: Robot, holder: str) -> None:
-        """A client went silent: the arm holds."""
+        """A client went silent: the arm holds, and the queue waits for a person."""
         one = self._robots.get(robot.name)
         if one is not None:
+            one.queue.control_lapsed(holder)
             one.teaching.hold()
         self.tell(robot.name, "control", f"the control of {holder} has lapsed: the arm holds", actor=holder)
+
+    def _given_back(self, robot: Robot, holder: str) -> None:
+        one = self._robots.get(robot.name)
+        if one is not None:
+            one.queue.control_given_back(holder)
 
     def _take_in(self, catalogue: Catalogue) -> None:
         try:

@@ -26,6 +26,7 @@ from server.access.limits import LARGEST_BODY, Buckets, counted
 from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_known_name, is_this_computers_user
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
+from server.access.turns import Turns
 from server.problems import ProblemError, of_database, response
 
 STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
@@ -58,6 +59,7 @@ class Gate:
     buckets: Buckets = field(default_factory=Buckets)
     sockets: Counter[str] = field(default_factory=Counter)
     """WebSockets that are open, by the caller's name."""
+    turns: Turns = field(default_factory=Turns)
 
     def middleware(self, app: ASGIApp) -> ASGIApp:
         """`app` behind this gate."""
@@ -100,7 +102,12 @@ class Gate:
             except DatabaseError as error:  # of whoever is not known by heart
                 await response(Request(scope), of_database(error))(scope, receive, secured)
                 return
-            await app(scope, receive if _is_post(scope, UPLOADS) else counted(receive, LARGEST_BODY), secured)
+            state["turn"] = turn = await self.turns.taken(scope, secured)
+            try:
+                body = receive if _is_post(scope, UPLOADS) else counted(receive, LARGEST_BODY)
+                await app(scope, body, turn.send)
+            finally:
+                turn.end()
         finally:
             seconds = time.perf_counter() - begun
             self.observed(scope["method"], status, seconds)

@@ -6,7 +6,6 @@ They have 256 random bits, so a plain hash is enough: there is nothing to guess,
 from __future__ import annotations
 
 import asyncio
-import hashlib
 import logging
 import math
 import secrets
@@ -20,6 +19,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from daq.contracts.errors import SpecError
 from daq.contracts.service.queue import Role
 from server.access.caller import Caller
+from server.access.digest import digest_of
 from server.clock import Clock
 from server.store.engine import Store
 from server.store.tables import TokenRow
@@ -42,11 +42,6 @@ class TokenInfo:
     role: Role
     created: datetime
     revoked: datetime | None
-
-
-def digest_of(token: str) -> str:
-    """What is kept of a token."""
-    return hashlib.sha256(token.encode()).hexdigest()
 
 
 class TokenStore:

@@ -54,8 +54,16 @@ async def _operator(connection: HTTPConnection) -> Caller:
 
 
 async def _turn(connection: HTTPConnection) -> AsyncIterator[None]:
+    let_others_ask(connection)
     async with services(connection).lanes.turn(require_viewer(connection).name):
         yield
+
+
+def let_others_ask(connection: HTTPConnection) -> None:
+    """Ends the turn of a plain question, which this is not: it waits among those of its caller."""
+    turn = getattr(connection.state, "turn", None)
+    if turn is not None:
+        turn.end()
 
 
 Turn = Annotated[None, Depends(_turn, scope="function")]

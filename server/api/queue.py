@@ -105,7 +105,7 @@ async def get_control(one: RobotPart, _: Viewer) -> Control:
 
 @router.post("/control", tags=["control"], status_code=201)
 def take_control(request: ControlRequest, one: RobotPart, found: ServicesPart, who: Operator) -> ControlLease:
-    """The control of the robot, for one client. It lapses without a heartbeat, and the arm holds then."""
+    """The control of the robot, for one client. It lapses without a heartbeat: the arm holds, the queue is paused."""
     identity = one.robot.identity
     if identity is not None and not identity.simulated and not request.moves_real_arm:
         line = f"{one.robot.place.url} is a real arm: it moves only with the operator's word"
@@ -123,7 +123,10 @@ def renew_control(one: RobotPart, _: Operator, lease: LeaseHeader = None) -> Con
 
 @router.delete("/control", tags=["control"], status_code=204)
 def give_control_back(one: RobotPart, found: ServicesPart, who: Operator, lease: LeaseHeader = None) -> Response:
-    """Gives the control back; what this client was moving holds. A program that still runs is stopped."""
+    """Gives the control back; what this client was moving holds. A program that still runs is stopped.
+
+    Where experiments wait the queue is paused by it: what waits begins when somebody resumes the queue.
+    """
     one.control.give_back(lease or "")
     one.teaching.hold()
     one.teaching.finish()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -23,7 +22,7 @@ from daq.contracts.trace import Outcome
 from daq.traces.csv_table import export_csv
 from daq.traces.reader import read_trace
 from daq.traces.summary import joint_figures
-from server.api.parts import CursorOf, Identity, Limit, Operator, RobotPart, ServicesPart, Turn, Viewer
+from server.api.parts import CursorOf, Identity, Limit, Operator, RobotPart, ServicesPart, Turn, Viewer, let_others_ask
 from server.catalogue.thinning import thinned
 from server.catalogue.upload import store_upload
 from server.problems import PROBLEMS, TITLES
@@ -43,6 +42,7 @@ _BINARY = {"schema": {"type": "string", "format": "binary"}}
 
 @router.get("")
 async def list_traces(
+    connection: Request,
     one: RobotPart,
     found: ServicesPart,
     who: Viewer,
@@ -58,7 +58,10 @@ async def list_traces(
 ) -> Page[CatalogueEntry]:
     """Traces, the newest first."""
     search = TraceSearch(q, tag, source, outcome, kind, since, until)
-    async with nullcontext() if q is None else found.lanes.turn(who.name):
+    if q is None:
+        return await found.traces.page.told(one.robot.name, search, cursor, limit)
+    let_others_ask(connection)
+    async with found.lanes.turn(who.name):
         return await found.traces.page.told(one.robot.name, search, cursor, limit)
 
 

@@ -18,6 +18,10 @@ WAITS_AT_MOST = 2.0
 """s after which a quick order is not carried out any more: less than its asker waits for the answer (an assumption)."""
 
 
+BEGINS_WITHIN = 5.0
+"""s after which an order that moves the arm is not begun any more: its process was put aside, say, and goes on now."""
+
+
 class _Message(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -51,7 +55,13 @@ class _QuickRequest(_Request):
     asked: float
 
 
-class RunExperiment(_Request):
+class _LongRequest(_Request):
+    """As a quick one: one that has waited longer than BEGINS_WITHIN moves nothing, since nobody expects it any more."""
+
+    asked: float
+
+
+class RunExperiment(_LongRequest):
     """Runs an experiment; answered when its trace is closed."""
 
     activity: ClassVar[Activity] = "experiment"
@@ -61,7 +71,7 @@ class RunExperiment(_Request):
     moves_real_arm: StrictBool
 
 
-class JogBegin(_Request):
+class JogBegin(_LongRequest):
     """Jogging until `Finish`; answered at its end."""
 
     activity: ClassVar[Activity] = "jog"
@@ -77,7 +87,7 @@ class JogDrive(_Message):
     said: float
 
 
-class RunProgram(_Request):
+class RunProgram(_LongRequest):
     """Carries out a taught program, or the one instruction of a step; answered at its end."""
 
     kind: Literal["program"] = "program"
@@ -85,7 +95,7 @@ class RunProgram(_Request):
     program: Program
 
 
-class LeadBegin(_Request):
+class LeadBegin(_LongRequest):
     """Joints are led by hand until `Finish`; answered with the recorded path."""
 
     activity: ClassVar[Activity] = "lead"
@@ -125,18 +135,20 @@ class ReadProcess(_QuickRequest):
 
 
 class WriteOutput(_QuickRequest):
-    """One process output, 0 to 7."""
+    """One process output, 0 to 7. Refused while the arm is stopped, unless `while_stopped`."""
 
     kind: Literal["write_output"] = "write_output"
     output: int
     on: StrictBool
+    while_stopped: StrictBool = False
 
 
 class MoveGripper(_QuickRequest):
-    """Closes or opens the gripper."""
+    """Closes or opens the gripper. Refused while the arm is stopped, unless `while_stopped`."""
 
     kind: Literal["gripper"] = "gripper"
     closed: StrictBool
+    while_stopped: StrictBool = False
 
 
 class Reset(_QuickRequest):

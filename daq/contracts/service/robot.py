@@ -126,15 +126,17 @@ class ProcessState(Wire):
 
 
 class OutputRequest(Wire):
-    """One process output."""
+    """One process output. Refused while the arm is stopped, unless `while_stopped`."""
 
     on: StrictBool
+    while_stopped: StrictBool = False
 
 
 class GripperRequest(Wire):
-    """The gripper."""
+    """The gripper. Refused while the arm is stopped, unless `while_stopped`: it may hold a load, or somebody's hand."""
 
     closed: StrictBool
+    while_stopped: StrictBool = False
 
 
 class Done(Wire):
