@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from daq.contracts.errors import DaqError
 from daq.contracts.service.problems import FieldProblem, ProblemDetails
 from daq.transport import PortBusyError
-from server.store.database_errors import BRING_BACK, DamagedError, line_of
+from server.store.database_errors import BRING_BACK, DamagedError, advice_of, line_of
 
 if TYPE_CHECKING:
     from fastapi import FastAPI, Request
@@ -96,8 +96,7 @@ def of_database(error: DatabaseError) -> ProblemError:
     log.error("database: %s", line)
     if "full" in str(error.orig):
         return ProblemError(507, "no-room", "the disk of the database is full", "make room on it")
-    passes = "locked" in line or "busy" in line
-    return ProblemError(503, "database", f"the database: {line}", "try again" if passes else BRING_BACK)
+    return ProblemError(503, "database", f"the database: {line}", advice_of(line))
 
 
 def no_room(error: OSError) -> ProblemError:

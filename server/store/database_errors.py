@@ -33,6 +33,14 @@ def line_of(error: DatabaseError) -> str:
     return f"{f'table {table}: ' if table else ''}{one_line(error.orig or error)}"
 
 
+def advice_of(line: str) -> str:
+    """What helps against it: a backup against damage, room or patience against the rest."""
+    if "full" in line:
+        return "make room on its disk"
+    passes = ("locked", "busy", "readonly", "unable to open")
+    return "try again" if any(word in line for word in passes) else BRING_BACK
+
+
 def one_line(error: object) -> str:
     """The beginning of what something says."""
     return " ".join(str(error).split())[:_LONGEST]

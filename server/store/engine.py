@@ -20,7 +20,7 @@ from sqlalchemy.orm import Session, sessionmaker
 
 from daq.contracts.errors import DaqError
 from server.store.damage import require_sound
-from server.store.database_errors import BRING_BACK, DamagedError, line_of, one_line, table_of
+from server.store.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
 
 BUSY_TIMEOUT_MS = 5000
 """Another process (`daq token`, a backup) may hold the write lock for a moment."""
@@ -67,7 +67,8 @@ class Store:
                 command.upgrade(config, "head")
                 connection.commit()
         except OperationalError as error:
-            raise StoreError(f"database {self.url}: cannot be opened: {line_of(error)}; {BRING_BACK}") from error
+            line = line_of(error)
+            raise StoreError(f"database {self.url}: cannot be opened: {line}; {advice_of(line)}") from error
         except DatabaseError as error:
             raise StoreError(f"database {self.url}: {line_of(error)}; {BRING_BACK}") from error
         except Exception as error:
