@@ -10,7 +10,7 @@ from typing import Any
 from fastapi import FastAPI, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
-from server.api.examples import UNTYPED, examples
+from server.api.examples import examples, untyped
 from server.api.problem_examples import PROBLEM_EXAMPLES
 from server.problems import MEDIA_TYPE
 
@@ -82,8 +82,8 @@ def _problems(status: int, operation: str) -> Document:
 
 def _examples(schema: Document, operation: str) -> Document:
     """By the names of the schemas that they are of."""
-    if operation in UNTYPED and "$ref" not in schema:
-        return {operation: {"value": UNTYPED[operation]}}
+    if operation in untyped() and "$ref" not in schema:
+        return {operation: {"value": untyped()[operation]}}
     if schema.get("type") == "array":
         return {f"{name}s": {"value": [one["value"]]} for name, one in _examples(schema["items"], operation).items()}
     refs = [schema, *schema.get("oneOf", ())]

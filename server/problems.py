@@ -6,17 +6,19 @@ import errno
 import logging
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
-
-from fastapi import FastAPI, Request
-from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
-from sqlalchemy.exc import OperationalError
-from starlette.exceptions import HTTPException
+from typing import TYPE_CHECKING, Any
 
 from daq.contracts.errors import DaqError
 from daq.contracts.service.problems import FieldProblem, ProblemDetails
 from daq.transport import PortBusyError
+from server.store.database_errors import BRING_BACK, DamagedError, advice_of, line_of
+
+if TYPE_CHECKING:
+    from fastapi import FastAPI, Request
+    from fastapi.exceptions import RequestValidationError
+    from fastapi.responses import JSONResponse
+    from sqlalchemy.exc import DatabaseError
+    from starlette.exceptions import HTTPException
 
 MEDIA_TYPE = "application/problem+json"
 log = logging.getLogger("server")
@@ -30,9 +32,11 @@ TITLES = {
     406: "Not in that form",
     409: "Not now",
     413: "Too large",
+    414: "Too long an address",
     415: "In no form that is understood here",
     422: "The request is not valid",
     429: "Too many requests",
+    431: "Too many or too long headers",
     500: "A fault of this program",
     503: "Something that this needs cannot be reached",
     507: "No room",
@@ -86,6 +90,15 @@ def of_error(error: DaqError) -> ProblemError:
     return of_exit_code(error.exit_code, str(error))
 
 
+def of_database(error: DatabaseError) -> ProblemError:
+    """A 503 that names the table, or a 507."""
+    line = line_of(error)
+    log.error("database: %s", line)
+    if "full" in str(error.orig):
+        return ProblemError(507, "no-room", "the disk of the database is full", "make room on it")
+    return ProblemError(503, "database", f"the database: {line}", advice_of(line))
+
+
 def no_room(error: OSError) -> ProblemError:
     """A 507: the disk takes no more."""
     log.error("disk: %s", error)
@@ -118,12 +131,18 @@ def details_of(problem: ProblemError, request_id: str | None = None) -> ProblemD
 
 def response(request: Request, problem: ProblemError) -> JSONResponse:
     """A problem on its way out."""
+    from fastapi.responses import JSONResponse
+
     details = details_of(problem, getattr(request.state, "request_id", None))
     return JSONResponse(details.model_dump(mode="json"), problem.status, headers=problem.headers, media_type=MEDIA_TYPE)
 
 
 def install(app: FastAPI) -> None:
     """Every error of `app` leaves it as a problem."""
+    # Here alone: the stop listener tells problems too, and starts without the web framework and the database's.
+    from fastapi.exceptions import RequestValidationError
+    from sqlalchemy.exc import DatabaseError
+    from starlette.exceptions import HTTPException
 
     @app.exception_handler(ProblemError)
     async def problem(request: Request, error: ProblemError) -> JSONResponse:
@@ -143,19 +162,19 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(HTTPException)
     async def http(request: Request, error: HTTPException) -> JSONResponse:
         kind = {404: "not-found", 405: "no-such-method"}.get(error.status_code, "http")
-        path = request.url.path
+        path = request.url.path[:100]
         detail = f"{request.method} {path}: {error.detail}"
         advice = "/api/v1/openapi.json lists every address"
         return response(request, ProblemError(error.status_code, kind, detail, advice, (), error.headers))
 
-    @app.exception_handler(OperationalError)
-    async def database(request: Request, error: OperationalError) -> JSONResponse:
-        log.error("database: %s", error.orig)
-        if "full" in str(error.orig):
-            return response(
-                request, ProblemError(507, "no-room", "the disk of the database is full", "make room on it")
-            )
-        return response(request, ProblemError(503, "database", f"the database: {error.orig}", "try again"))
+    @app.exception_handler(DatabaseError)
+    async def database(request: Request, error: DatabaseError) -> JSONResponse:
+        return response(request, of_database(error))
+
+    @app.exception_handler(DamagedError)
+    async def damaged(request: Request, error: DamagedError) -> JSONResponse:
+        log.error("database: %s", error)
+        return response(request, ProblemError(503, "database", f"the database: {error}", BRING_BACK))
 
     @app.exception_handler(OSError)
     async def disk(request: Request, error: OSError) -> JSONResponse:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import signal
 import socket
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
+from types import FrameType
 
 import uvicorn
 
@@ -13,18 +14,18 @@ from daq.config import Settings
 from daq.config.service import ServiceSettings
 from daq.contracts.errors import SpecError
 from server import logs
-from server.access.caller import Caller
 from server.access.gate import Gate
 from server.access.origin import is_loopback
-from server.access.stop_gate import StopGate
 from server.access.tokens import KnownTokens
 from server.app import make_app
 from server.connections import Connection
+from server.ending import EndInTime
 from server.listening import listening
 from server.services import Services
 from server.steady import keep_steady
-from server.stop_listener import StopListener
-from server.store.lock import sole_use
+from server.stopping.door import StopDoor
+from server.stopping.messages import Begin, Stopped
+from server.store.lock import sole_use, sqlite_file
 
 KEEP_ALIVE = 60
 """s that a silent connection stays open. Clients hang up after a few seconds of their own accord (httpx: 5 s); were the
@@ -35,10 +36,15 @@ GRACE = 1
 
 def serve(settings: Settings, ready: Callable[[str], None]) -> None:
     """Serves until a signal ends it. `ready` is called with the address. Raises ListenError, InUseError, StoreError,
-    SpecError."""
+    SpecError, StopDoorError."""
     logs.begin()
     section = settings.server
-    with sole_use(section.database_url), listening(section) as (listener, beside):
+    with (
+        sole_use(section.database_url),
+        listening(section) as (listener, beside),
+        # Begun first: it gets ready beside this process, and ends when this one does, however that comes about.
+        closing(StopDoor(beside, _begin(settings, listener))) as door,
+    ):
         services = Services(settings)
         try:
             gate = _gate(services, section, beside.getsockname()[1])
@@ -61,25 +67,25 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         )
         host, port = listener.getsockname()[:2]
         address = f"http://{f'[{host}]' if ':' in host else host}:{port}"
-        stop_listener = _stop_listener(services, gate, beside, port)
+        _connect(services, door, beside)
 
         def ending() -> None:
             for one in services.robots():
                 one.hub.end_waiting()
+            services.uploads.close()
+            services.motions.close()
 
         # The web server raises its signal again when it has ended in order; the rest ends in order after it.
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        try:
-            with suppress(KeyboardInterrupt):  # the service has ended in order by then
-                _Server(config, lambda: ready(address), ending).run([listener])
-        finally:
-            stop_listener.close()
+        door.wait_ready()
+        with suppress(KeyboardInterrupt):  # the service has ended in order by then
+            _Server(config, lambda: ready(address), ending, EndInTime(services.end_processes).arm).run([listener])
 
 
 def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
     """Raises SpecError where tokens are needed and there is none."""
     loopback = is_loopback(section.host)
-    local = loopback and section.tokens != "always"
+    local = _is_open_here(section)
     if not local and all(token.revoked is not None for token in services.tokens.all()):
         why, instead = 'server.tokens is "always"', 'say "remote"'
         if not loopback:
@@ -92,24 +98,57 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
     return Gate(known, services.tickets, local, names, stop_port, services.metrics.request)
 
 
-def _stop_listener(services: Services, gate: Gate, listener: socket.socket, service_port: int) -> StopListener:
-    def told(robot: str, text: str, caller: Caller) -> None:
-        with suppress(RuntimeError):  # the service is ending, and writes nothing down any more
-            services.tell_later(robot, "stop", text, actor=caller.name)
+def _is_open_here(section: ServiceSettings) -> bool:
+    """Whether this computer's users need no token."""
+    return is_loopback(section.host) and section.tokens != "always"
 
-    stop_gate = StopGate(gate.tokens, gate.open_on_loopback, gate.names, service_port)
+
+def _begin(settings: Settings, listener: socket.socket) -> Begin:
+    """What the stop listener knows from its first moment on."""
+    section = settings.server
+    return Begin(
+        descriptor=-1,  # the door's
+        service_port=listener.getsockname()[1],
+        open_on_loopback=_is_open_here(section),
+        names=tuple(name.lower() for name in section.names),
+        urls={settings.robot.name: settings.port},
+        database_url=section.database_url,
+        sqlite=sqlite_file(section.database_url),
+    )
+
+
+def _connect(services: Services, door: StopDoor, listener: socket.socket) -> None:
+    """The service hears of stops at the listener, which hears how each robot is reached."""
+
+    def stopped(news: Stopped) -> None:
+        with suppress(RuntimeError):  # the service is ending, and writes nothing down any more
+            services.tell_later(news.robot, "stop", news.text, actor=news.actor)
+
     services.stop_port = listener.getsockname()[1]
-    stops = {one.robot.name: one.stop.stop_now for one in services.robots()}
-    return StopListener(listener, stop_gate, stops, told)
+    door.stopped = stopped
+    for one in services.robots():
+        one.robot.reached.append(lambda reach: door.owned(reach.robot, reach.owner, reach.terminal))
 
 
 class _Server(uvicorn.Server):
     """Says when it answers, and when it begins to end."""
 
-    def __init__(self, config: uvicorn.Config, ready: Callable[[], None], ending: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        ready: Callable[[], None],
+        ending: Callable[[], None],
+        told_to_end: Callable[[], None],
+    ) -> None:
         super().__init__(config)
         self._ready = ready
         self._ending = ending
+        self._told_to_end = told_to_end
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """As uvicorn's. From now on the end comes in time."""
+        self._told_to_end()
+        super().handle_exit(sig, frame)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """As uvicorn's, then ready."""

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -17,8 +20,11 @@ from daq.contracts.errors import DaqError
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.live import EventMessage, JobMessage
 from daq.trajectories import control_period
+from server.access.lanes import Lanes
 from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
+from server.bounded.messages import Limits
+from server.bounded.workers import Workers
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock, SystemClock
 from server.jobs.desk import JobDesk, JobParts
@@ -45,8 +51,8 @@ from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
 
-SHUTDOWN = 4.0
-"""s for the arm to be frozen and the trace to be closed when the service ends."""
+SHUTDOWN, TIDYING = 2.0, 0.5
+"""s for the arm to be frozen and the trace to be closed when the service ends; the arm's owner goes on alone then."""
 log = logging.getLogger("server")
 
 
@@ -82,6 +88,7 @@ class Services:
         self.clock = clock or SystemClock()
         self.store = Store(settings.server.database_url)
         self.store.migrate()
+        self.store.require_sound()
         self.experiments = ExperimentStore(self.store)
         self.schedules = ScheduleStore(self.store)
         self.traces = TraceStore(self.store)
@@ -93,7 +100,12 @@ class Services:
         self.begun = self.clock.monotonic()
         self.stop_port = 0
         """Of the stop listener, once there is one."""
+        self.lanes = Lanes()
         self.metrics = Metrics()
+        limits = Limits(memory=settings.server.upload_memory << 20, seconds=settings.server.upload_time)
+        self.uploads = Workers(limits, 1)
+        self.motions = Workers(limits, 1)
+        """Apart, so that whoever uploads holds up no preview."""
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
         self._robots: dict[str, RobotServices] = {}
@@ -107,7 +119,7 @@ class Services:
     def robot(self, name: str) -> RobotServices:
         """Raises a 404."""
         if name not in self._robots:
-            raise not_found(f"robot {name!r}", f"this service has {', '.join(self._robots)}")
+            raise not_found(f"robot {name!r:.60}", f"this service has {', '.join(self._robots)}")
         return self._robots[name]
 
     def start(self) -> None:
@@ -120,17 +132,26 @@ class Services:
             one.keeper.start(connect=self.settings.server.connect_at_start)
 
     def close(self) -> None:
-        """Freezes what moves, closes traces, ends threads and processes. Within SHUTDOWN s, or it says so."""
-        for one in self.robots():
-            closing = threading.Thread(target=one.keeper.close, args=(SHUTDOWN,))
-            closing.start()
-            one.queue.close(SHUTDOWN)
-            one.jobs.close(SHUTDOWN)
-            closing.join()
-            one.control.close()
-            one.stop.close()
-        self._later.shutdown(wait=True)
+        """Freezes what moves, closes traces, ends threads and processes. Within SHUTDOWN s; what is not done by then
+        ends with this process."""
+        self.end_processes()
+        every = self.robots()
+        for one in every:
+            one.queue.take_no_more()  # first: the end of the connection is no reason to find the queue held
+        _all_within(
+            SHUTDOWN,
+            [partial(close, SHUTDOWN) for o in every for close in (o.keeper.close, o.queue.close, o.jobs.close)],
+        )
+        _all_within(
+            TIDYING, [self._later.shutdown, *(close for o in every for close in (o.control.close, o.stop.close))]
+        )
         self.store.close()
+
+    def end_processes(self) -> None:
+        """Those that read and plan for somebody, at once. The owner of a robot's port ends by itself, jobs with this
+        process."""
+        self.uploads.close()
+        self.motions.close()
 
     def _make_robot(self, settings: Settings) -> RobotServices:
         name, folder = settings.robot.name, settings.traces.folder.absolute()
@@ -139,8 +160,10 @@ class Services:
             load_memory_map(settings.robot.memory_map)
             memory_map = settings.robot.memory_map.read_text("utf-8")
         robot = Robot(RobotPlace(name, settings.port, settings.machine(), folder, memory_map), self.clock)
-        control = ControlDesk(self.clock, lambda holder: self._lapsed(robot, holder))
-        catalogue = Catalogue(folder, name, self.traces, self.experiments)
+        control = ControlDesk(
+            self.clock, lambda holder: self._lapsed(robot, holder), lambda holder: self._given_back(robot, holder)
+        )
+        catalogue = Catalogue(folder, name, self.traces, self.experiments, settings.traces.limits)
 
         def told(kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
             self.tell(name, kind, text, actor=actor, experiment=experiment)
@@ -169,11 +192,13 @@ class Services:
                 queue.progressed(report.fraction, report.text)
             elif isinstance(report, ArmReport):
                 queue.hear(report)
-            elif isinstance(report, Opened | EventHappened):
+            elif isinstance(report, Opened):
+                queue.connection_made()
+            elif isinstance(report, EventHappened):
                 queue.wake()
 
         robot.listeners.append(heard)
-        robot.disconnected.append(lambda _why: queue.wake())
+        robot.disconnected.append(queue.connection_ended)
         # After the loss of a process that wrote a trace, its part file is finished and found.
         robot.disconnected.append(lambda _why: self._take_in(catalogue))
         teaching = TeachingDesk(robot, lambda line: self.tell_later(name, "teaching", line))
@@ -182,7 +207,7 @@ class Services:
         robot.listeners.append(hub.hear)
         robot.listeners.append(lambda report: self.metrics.hear(name, report))
         robot.disconnected.append(lambda _why: hub.look())
-        stop = StopDesk(robot, self.clock)
+        stop = StopDesk(robot)
         models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
         jobs = JobDesk(
             JobParts(
@@ -223,14 +248,30 @@ class Services:
         self._later.submit(self.tell, robot, kind, text, actor=actor)
 
     def _lapsed(self, robot: Robot, holder: str) -> None:
-        """A client went silent: the arm holds."""
+        """A client went silent: the arm holds, and the queue waits for a person."""
         one = self._robots.get(robot.name)
         if one is not None:
+            one.queue.control_lapsed(holder)
             one.teaching.hold()
         self.tell(robot.name, "control", f"the control of {holder} has lapsed: the arm holds", actor=holder)
+
+    def _given_back(self, robot: Robot, holder: str) -> None:
+        one = self._robots.get(robot.name)
+        if one is not None:
+            one.queue.control_given_back(holder)
 
     def _take_in(self, catalogue: Catalogue) -> None:
         try:
             catalogue.bring_up_to_date()
         except (DaqError, ProblemError, OSError, SQLAlchemyError) as error:
             log.warning("catalogue: %s", error)
+
+
+def _all_within(seconds: float, steps: Iterable[Callable[[], object]]) -> None:
+    """Each on a thread of its own; one that takes longer is left alone."""
+    until = time.monotonic() + seconds
+    threads = [threading.Thread(target=step, name="closing", daemon=True) for step in steps]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(max(0.0, until - time.monotonic()))

@@ -39,6 +39,7 @@ DETERMINISTIC = (
     "server/test_jog_moments.py",
     "server/test_owner_inbox.py",
     "server/test_queue_desk.py",
+    "server/test_queue_holds.py",
     "server/test_queue_rules.py",
     "server/test_store.py",
 )

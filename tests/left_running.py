@@ -33,7 +33,10 @@ class Running:
         return cls(frozenset(threading.enumerate()), frozenset(_marked_processes() | _forked_processes()))
 
     def __sub__(self, earlier: "Running") -> "Running":
-        return Running(self.threads - earlier.threads, self.processes - earlier.processes)
+        """What was not there earlier, and was not begun by what was: a service that several tests share may begin
+        processes of its own, which the end of the tests looks for."""
+        begun = {process for process in self.processes if _parent(process) not in earlier.processes}
+        return Running(self.threads - earlier.threads, frozenset(begun - earlier.processes))
 
     def __bool__(self) -> bool:
         return bool(self.threads or self.processes)
@@ -86,6 +89,13 @@ def _serves_multiprocessing(process: int | str) -> bool:
     """Whether it is the standard library's own helper, which lives as long as the process that first needed it."""
     command = _command_line(process)
     return "multiprocessing.resource_tracker" in command or "multiprocessing.forkserver" in command
+
+
+def _parent(process: int) -> int:
+    try:
+        return int(Path(f"/proc/{process}/stat").read_text("utf-8").rpartition(")")[2].split()[1])
+    except OSError:  # it has ended
+        return 0
 
 
 def _command_line(process: int | str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, TypeAdapter
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import Limits
@@ -31,7 +31,7 @@ class Job(_Message):
     robot: str = "ma2000"
     memory_map: str | None = None
     """Text of a memory map file; None for the one that ships."""
-    moves_real_arm: bool = False
+    moves_real_arm: StrictBool = False
     late_stop_window: Annotated[float, Field(ge=0)] = 10.0
     """s after the loss of the link in which the stop is still tried: an assumption, time enough to push a plug in."""
     report_samples: bool = False

@@ -41,7 +41,7 @@ def gain(
         path = acquire_whole(call, gain_experiment(wanted), call.machine, place, yes).trace
     else:
         path = call.find_trace(place, trace)
-    measured = read_trace(path)
+    measured = read_trace(path, call.trace_limits)
     # counts and radians of a trace belong to the calibration that it was made with, whatever is configured by now
     machine = measured.record.machine or call.machine
     found = [one for one in gains_from_trace(measured, machine) if one.joint in wanted]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from dataclasses import dataclass, field
 from functools import cache, cached_property
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from daq.config import Settings
     from daq.contracts.machine import Machine
+    from daq.contracts.trace_limits import TraceLimits
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")]
 YesOption = Annotated[bool, typer.Option("--yes", help="Consent to moving a real arm without being asked.")]
@@ -31,6 +33,11 @@ def console() -> Console:
     from rich.console import Console
 
     return Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
+
+
+def printable(text: str) -> str:
+    """Text of a file that somebody else may have made, without what would command the terminal."""
+    return "".join(sign if sign.isprintable() or sign == "\n" else "\N{REPLACEMENT CHARACTER}" for sign in text)
 
 
 def print_table(table: Table, width: int | None = None) -> None:
@@ -87,10 +94,10 @@ class Invocation:
 
         Raises TraceError, ServiceError, ServiceNotReachedError.
         """
-        if self.server is None or Path(wanted).is_file():
+        if self.server is None or os.path.isfile(wanted):
             from daq.traces.catalogue import find_trace
 
-            return find_trace(folder, wanted)
+            return find_trace(folder, wanted, self.trace_limits)
         from daq.cli.remote.traces import fetched_trace
 
         return fetched_trace(self, folder, wanted)
@@ -110,6 +117,11 @@ class Invocation:
     def trace_folder(self) -> Path:
         """Where traces are kept."""
         return self.settings.traces.folder
+
+    @property
+    def trace_limits(self) -> TraceLimits:
+        """How large a trace may be that is read."""
+        return self.settings.traces.limits
 
 
 def invocation(context: typer.Context) -> Invocation:

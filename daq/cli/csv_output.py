@@ -36,7 +36,7 @@ def check_csv(path: Path) -> None:
         return
     try:
         found = Beside.model_validate(tomllib.loads(toml.read_text("utf-8")))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, ValidationError):
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError, ValidationError):
         found = Beside()
     if not found.model_fields_set >= WRITTEN:
         raise SpecError(f"{path}: {toml} would be replaced, and is no trace's; give the CSV another name or folder")

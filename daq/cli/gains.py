@@ -6,11 +6,10 @@ from typing import Annotated
 
 import typer
 
-from daq.cli.consent import agreed
+from daq.cli.consent import require_consent
 from daq.cli.context import JsonOption, YesOption, console, invocation, print_json
 from daq.cli.quantities import parse_gains
 from daq.cli.robot import connected
-from daq.contracts.errors import SafetyError
 from daq.contracts.limp import limp_line, require_no_jump
 from firmware_protocol.requests import SetGains
 
@@ -53,8 +52,13 @@ def set_gains(
         set_gains_at_server(call, wanted, yes)
         return
     with connected(call) as controller:
-        if not controller.identity.simulated and not yes and not agreed(call.port):
-            raise SafetyError(f"{call.port} is a real arm: its gains change only with the operator's consent (--yes)")
+        require_consent(
+            call.port,
+            simulated=controller.identity.simulated,
+            consent=yes,
+            what="its gains will change",
+            refused="its gains change",
+        )
         readings = controller.next_snapshot().joints
         require_no_jump({joint: reading.error for joint, reading in readings}, wanted)
         for joint, (p, i, d) in wanted.items():

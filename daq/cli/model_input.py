@@ -105,7 +105,7 @@ def read_traces(call: Invocation, folder: Path | None, names: Sequence[str]) -> 
         if Path(name).suffix == ".csv" and Path(name).is_file():
             trace = import_csv(Path(name))
         else:
-            trace = read_trace(call.find_trace(place, name))
+            trace = read_trace(call.find_trace(place, name), call.trace_limits)
         found.append(trace)
     return found
 

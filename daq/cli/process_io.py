@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq.cli.context import Invocation, JsonOption, invocation, print_json
+from daq.cli.consent import require_consent
+from daq.cli.context import Invocation, JsonOption, YesOption, invocation, print_json
 from daq.cli.robot import connected
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import DaqError, SafetyError, SpecError
+
+if TYPE_CHECKING:
+    from daq.driver import Controller
 
 app = typer.Typer(add_completion=False, help="Process inputs and outputs, and the gripper.", no_args_is_help=True)
 BITS = 8
+WhileStoppedOption = Annotated[
+    bool, typer.Option("--while-stopped", help="Also on an arm that has been stopped: it may hold a load.")
+]
 
 
 @app.command()
@@ -25,40 +33,88 @@ def show(context: typer.Context, json: JsonOption = False) -> None:
     print(f"inputs  {inputs:08b}\noutputs {outputs:08b}\ngripper {gripper}")
 
 
+@dataclass(frozen=True)
+class SwitchConsent:
+    """What the operator has said beforehand about a switching: `what` will happen, which is what is `refused`."""
+
+    consent: bool
+    while_stopped: bool
+    what: str
+    refused: str
+
+
+class NotSwitchedError(DaqError):
+    """The controller reads back something else than was written."""
+
+    exit_code = 3
+
+
 @app.command("set")
 def set_output(
     context: typer.Context,
     output: Annotated[int, typer.Argument(help="Number of the output, 0 to 7.")],
     value: Annotated[str, typer.Argument(help="on or off.")],
+    yes: YesOption = False,
+    while_stopped: WhileStoppedOption = False,
 ) -> None:
-    """Switch one process output."""
+    """Switch one process output, and read it back."""
     if not 0 <= output < BITS:
         raise SpecError(f"output {output}: allowed are 0 to {BITS - 1}")
     if value not in ("on", "off"):
         raise SpecError(f"output {output} {value!r}: allowed are on and off")
-    call = invocation(context)
+    call, on = invocation(context), value == "on"
+    asked = SwitchConsent(yes, while_stopped, f"its output {output} will be switched {value}", "its outputs change")
     if call.server is not None:
         from daq.cli.remote.control import set_output_at_server
 
-        set_output_at_server(call, output, on=value == "on")
-        return
-    with connected(call) as controller:
-        controller.write_outputs(1 << output, (value == "on") << output)
+        found = set_output_at_server(call, output, on=on, asked=asked).outputs[output]
+    else:
+        with connected(call) as controller:
+            _require_allowed(call, controller, asked)
+            controller.write_outputs(1 << output, on << output)
+            found = bool(controller.process().outputs >> output & 1)
+    _tell(f"output {output}", value, "on" if found else "off")
 
 
 @app.command()
-def gripper(context: typer.Context, value: Annotated[str, typer.Argument(help="open or close.")]) -> None:
-    """Open or close the gripper."""
+def gripper(
+    context: typer.Context,
+    value: Annotated[str, typer.Argument(help="open or close.")],
+    yes: YesOption = False,
+    while_stopped: WhileStoppedOption = False,
+) -> None:
+    """Open or close the gripper, and read it back."""
     if value not in ("open", "close"):
         raise SpecError(f"gripper {value!r}: allowed are open and close")
-    call = invocation(context)
+    call, closed = invocation(context), value == "close"
+    asked = SwitchConsent(yes, while_stopped, f"its gripper will {value}", "its gripper moves")
     if call.server is not None:
         from daq.cli.remote.control import set_gripper_at_server
 
-        set_gripper_at_server(call, closed=value == "close")
-        return
-    with connected(call) as controller:
-        controller.set_gripper(closed=value == "close")
+        found = set_gripper_at_server(call, closed=closed, asked=asked).gripper == "closed"
+    else:
+        with connected(call) as controller:
+            _require_allowed(call, controller, asked)
+            controller.set_gripper(closed=closed)
+            found = bool(controller.process().gripper)
+    _tell("gripper", "closed" if closed else "open", "closed" if found else "open")
+
+
+def _require_allowed(call: Invocation, controller: Controller, asked: SwitchConsent) -> None:
+    """Raises SafetyError without the operator's word on a real arm, and for one that has been stopped."""
+    from firmware_protocol.commands import StatusFlag
+
+    if StatusFlag.FROZEN in controller.status().flags and not asked.while_stopped:
+        raise SafetyError("the arm has been stopped: `daq reset` first, or --while-stopped; nothing was switched")
+    simulated = controller.identity.simulated
+    require_consent(call.port, simulated=simulated, consent=asked.consent, what=asked.what, refused=asked.refused)
+
+
+def _tell(what: str, wanted: str, found: str) -> None:
+    """Raises NotSwitchedError."""
+    if found != wanted:
+        raise NotSwitchedError(f"{what}: written as {wanted}, read back as {found}")
+    print(f"{what} {found}, read back")
 
 
 def _read(call: Invocation) -> tuple[int, int, str]:

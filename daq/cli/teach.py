@@ -102,7 +102,7 @@ def jog(
 
             def commands(row: SampleRow) -> JogCommand | None:
                 command = pendant.command(keyboard.pressed(), robot.controller.clock.now())
-                if pendant.gripper is not None:
+                if pendant.gripper is not None and robot.ended() is None:
                     robot.controller.set_gripper(closed=pendant.gripper)
                     pendant.gripper = None
                 if pendant.keep:

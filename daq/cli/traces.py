@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq.cli.context import Invocation, JsonOption, console, invocation, print_json, print_table
+from daq.cli.context import Invocation, JsonOption, console, invocation, print_json, print_table, printable
 from daq.contracts.errors import SpecError, TraceError
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from daq.contracts.trace import Trace, TraceRecord
     from daq.traces.catalogue import TraceSummary
+    from daq.traces.salvage import Salvaged
 
 app = typer.Typer(add_completion=False, help="List, show, plot, convert and verify traces.", no_args_is_help=True)
 
@@ -37,6 +38,13 @@ def _path(context: typer.Context, wanted: str, folder: Path | None) -> Path:
     return call.find_trace(_folder(call, folder), wanted)
 
 
+def _read(context: typer.Context, wanted: str, folder: Path | None) -> tuple[Path, Trace]:
+    from daq.traces.reader import read_trace
+
+    path = _path(context, wanted, folder)
+    return path, read_trace(path, invocation(context).trace_limits)
+
+
 @app.command("ls")
 def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOption = False) -> None:
     """List traces, the oldest first."""
@@ -57,9 +65,9 @@ def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOpti
         moment = one.created.strftime("%Y-%m-%d %H:%M") if one.created else "?"
         ended = one.outcome or one.state
         table.add_row(
-            (one.trace_id or one.path.name)[:SHOWN_DIGITS],
+            printable((one.trace_id or one.path.name)[:SHOWN_DIGITS]),
             moment,
-            f"{one.name or one.kind or one.source or one.problem}",
+            printable(f"{one.name or one.kind or one.source or one.problem}"),
             joints_text(one.joints),
             "?" if one.samples is None else str(one.samples),
             "?" if one.duration is None else f"{one.duration:.2f}",
@@ -77,7 +85,7 @@ def _summaries(call: Invocation, folder: Path | None) -> tuple[Sequence[TraceSum
     from daq.traces.catalogue import list_traces
 
     place = _folder(call, folder)
-    return list_traces(place) if place.is_dir() else (), str(place)
+    return list_traces(place, call.trace_limits) if place.is_dir() else (), str(place)
 
 
 def joints_text(joints: tuple[int, ...]) -> str:
@@ -92,11 +100,9 @@ def show(
     context: typer.Context, trace: TraceArgument = "last", folder: FolderOption = None, json: JsonOption = False
 ) -> None:
     """Show what a trace says about itself, and its figures by joint."""
-    from daq.traces.reader import read_trace
     from daq.traces.summary import joint_figures
 
-    path = _path(context, trace, folder)
-    found = read_trace(path)
+    path, found = _read(context, trace, folder)
     figures = joint_figures(found)
     if json:
         data = found.record.model_dump(mode="json", exclude={"machine", "memory_map"})
@@ -105,14 +111,14 @@ def show(
         return
     record = found.record
     what = record.spec.trajectory.kind if record.spec else "import"
-    print(f"{record.trace_id}: {what} on {record.robot} ({record.source}), {_ended(record)}")
-    print(f"recorded {record.created:%Y-%m-%d %H:%M:%S %Z} with {record.software}")
+    print(printable(f"{record.trace_id}: {what} on {record.robot} ({record.source}), {_ended(record)}"))
+    print(printable(f"recorded {record.created:%Y-%m-%d %H:%M:%S %Z} with {record.software}"))
     print(f"{len(found)} samples on joints {', '.join(map(str, found.joints))}, {found.missing} missing")
     if record.operator or record.notes:
-        print(f"operator {record.operator or '?'}: {record.notes}")
+        print(printable(f"operator {record.operator or '?'}: {record.notes}"))
     print_figures(found)
     for event in found.events:
-        print(f"  {event.time:8.2f} s  {event.kind.replace('_', ' ')}: {event.message}")
+        print(printable(f"  {event.time:8.2f} s  {event.kind.replace('_', ' ')}: {event.message}"))
     print(f"file: {path}")
 
 
@@ -162,10 +168,9 @@ def plot(
 ) -> None:
     """Draw a trace: set point and position, error and drive of every joint."""
     from daq.traces.plot import plot_trace
-    from daq.traces.reader import read_trace
 
-    path = _path(context, trace, folder)
-    print(plot_trace(read_trace(path), output or path.with_suffix(".png")))
+    path, found = _read(context, trace, folder)
+    print(plot_trace(found, output or path.with_suffix(".png")))
 
 
 @app.command("export")
@@ -179,10 +184,9 @@ def export(
 ) -> None:
     """Write a trace as plain CSV, with a TOML file for what columns cannot say."""
     from daq.cli.csv_output import write_csv
-    from daq.traces.reader import read_trace
 
-    path = _path(context, trace, folder)
-    print(write_csv(read_trace(path), output or path.with_suffix(".csv")))
+    path, found = _read(context, trace, folder)
+    print(write_csv(found, output or path.with_suffix(".csv")))
 
 
 @app.command("import")
@@ -209,7 +213,7 @@ def import_(
         upload(call, file)
         return
     place = _folder(call, folder)
-    found = import_csv(file)
+    found = import_csv(file, call.trace_limits)
     try:
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -224,12 +228,12 @@ def check(
     """Check a trace from its checksums to its signals; ends with 5 when it is not to be trusted."""
     from daq.traces.verify import verify
 
-    found = verify(_path(context, trace, folder))
+    found = verify(_path(context, trace, folder), invocation(context).trace_limits)
     if json:
         print_json(found.model_dump(mode="json") | {"trustworthy": found.trustworthy})
     else:
         for finding in found.findings:
-            print(f"{finding.level}: {finding.message}")
+            print(printable(f"{finding.level}: {finding.message}"))
         print("trustworthy" if found.trustworthy else "NOT to be trusted")
     if not found.trustworthy:
         raise typer.Exit(EXIT_NOT_TRUSTWORTHY)
@@ -243,13 +247,22 @@ def salvage(context: typer.Context, folder: FolderOption = None, json: JsonOptio
     call = invocation(context)
     if call.server is not None:
         raise SpecError("--server: `daq traces salvage` is for this computer's traces; a service salvages its own")
-    results = salvage_folder(_folder(call, folder))
+    results = salvage_folder(_folder(call, folder), call.trace_limits)
     if json:
         print_json([vars(result) for result in results])
         return
     for result in results:
-        print(f"{result.path}: salvaged from {result.part.name}" if result.path else f"{result.part}: {result.problem}")
+        print(printable(_salvage_line(result)))
     if not results:
         console().print("nothing to salvage")
     if any(result.path is None for result in results):
         raise typer.Exit(EXIT_NOT_TRUSTWORTHY)
+
+
+def _salvage_line(result: Salvaged) -> str:
+    if result.path is None:
+        return f"{result.part}: {result.problem}"
+    line = f"{result.path}: salvaged from {result.part.name}"
+    if result.kept is None:
+        return line
+    return f"{line} up to its damage; the {result.dropped_bytes} bytes after it are in {result.kept.name}"

@@ -16,6 +16,7 @@ from daq.contracts.experiment import Gain
 from daq.contracts.service.queue import ControlLease, ControlRequest
 from daq.contracts.service.robot import GripperRequest, JointGains, OutputRequest, ProcessState
 from daq.contracts.service.teaching import JogRequest, LeadRequest, StepRequest, TeachingStatus
+from daq.contracts.word import require_word
 
 HEADER = "Control-Lease"
 T = TypeVar("T")
@@ -36,7 +37,7 @@ class HeldControl:
     def __init__(self, connection: Connection, robot: str, *, moves_real_arm: bool = False) -> None:
         self._connection = connection
         self._path = robot
-        self._moves_real_arm = moves_real_arm
+        self._moves_real_arm = require_word(moves_real_arm)
         self._lease: ControlLease | None = None
         self._ended = threading.Event()
         self._lost = ""
@@ -99,13 +100,14 @@ class HeldControl:
         """Writes gains of the joints named, and reads all back."""
         return self._put(JointGains, "gains", JointGains(gains=dict(gains)))
 
-    def set_output(self, output: int, *, on: bool) -> ProcessState:
-        """Switches one process output, 0 to 7."""
-        return self._put(ProcessState, f"process/outputs/{output}", OutputRequest(on=on))
+    def set_output(self, output: int, *, on: bool, while_stopped: bool = False) -> ProcessState:
+        """Switches one process output, 0 to 7. Refused while the arm is stopped, unless `while_stopped`."""
+        request = OutputRequest(on=on, while_stopped=while_stopped)
+        return self._put(ProcessState, f"process/outputs/{output}", request)
 
-    def set_gripper(self, *, closed: bool) -> ProcessState:
-        """Closes or opens the gripper."""
-        return self._put(ProcessState, "gripper", GripperRequest(closed=closed))
+    def set_gripper(self, *, closed: bool, while_stopped: bool = False) -> ProcessState:
+        """Closes or opens the gripper. Refused while the arm is stopped, unless `while_stopped`."""
+        return self._put(ProcessState, "gripper", GripperRequest(closed=closed, while_stopped=while_stopped))
 
     def _teaching(self, what: str, body: BaseModel | None) -> TeachingStatus:
         request = Request("POST", f"{self._path}/teaching/{what}", body, headers=self._headers())

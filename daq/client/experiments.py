@@ -21,6 +21,7 @@ from daq.contracts.service.experiments import (
     ScheduleRequest,
 )
 from daq.contracts.service.queue import QueueResume, QueueStatus
+from daq.contracts.word import require_word
 
 WAIT = 30.0
 """s that one question about the end of something waits at the service."""
@@ -104,7 +105,7 @@ class Queue:
 
     def resume(self, *, moves_real_arm: bool = False) -> QueueStatus:
         """The operator's word that the queue may move the arm."""
-        body = QueueResume(moves_real_arm=moves_real_arm)
+        body = QueueResume(moves_real_arm=require_word(moves_real_arm))
         return self._connection.ask(QueueStatus, Request("POST", f"{self._path}/resume", body))
 
     def attend(self, *, within: float | None = None) -> QueueStatus:

@@ -5,9 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator
 
 DEFAULT_PORT = 8300
+
+
+def _true_or_false(given: object) -> object:
+    """Raises ValueError for anything but the two; an environment variable has them as text."""
+    if isinstance(given, bool) or given in ("true", "false"):
+        return given
+    raise ValueError("must be true or false")
+
+
+Consent = Annotated[bool, BeforeValidator(_true_or_false)]
+"""Something that may move an arm: `true` and nothing that merely looks like it."""
 
 
 class ServiceSettings(BaseModel):
@@ -30,12 +41,18 @@ class ServiceSettings(BaseModel):
     """URL of the database; None for a SQLite file in `folder`."""
     connect_at_start: bool = True
     """Connecting moves nothing."""
-    unattended: bool = False
+    unattended: Consent = False
     """Whether the queue may move a real arm while no operator says to be there."""
     jobs_at_once: Annotated[int, Field(ge=1, le=64)] = 1
     """Worker processes for fits, validations and comparisons."""
     history: Annotated[float, Field(ge=10, le=3600)] = 300.0
     """s of live samples that a client finds when it joins."""
+    upload_size: Annotated[int, Field(ge=1, le=65536)] = 512
+    """MB that an uploaded trace may have."""
+    upload_memory: Annotated[int, Field(ge=64, le=1 << 20)] = 2048
+    """MB of memory for the process that reads it."""
+    upload_time: Annotated[float, Field(ge=1, le=3600)] = 60.0
+    """s that it may take."""
     names: tuple[Annotated[str, Field(max_length=253)], ...] = ()
     """Names by which browsers reach this service, beside its address: others are refused."""
 

@@ -22,6 +22,7 @@ from daq.config.service import ServiceSettings
 from daq.contracts.errors import SpecError
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine, load_machine
+from daq.contracts.trace_limits import TraceLimits
 
 APP = "ma2000-daq"
 LOCAL_FILE = "daq.toml"
@@ -44,11 +45,13 @@ class RobotSettings(BaseModel):
 
 
 class TraceSettings(BaseModel):
-    """Where traces are kept."""
+    """Where traces are kept, and how large they may be."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     folder: Path = Path("traces")
+    limits: TraceLimits = TraceLimits()
+    """How large a file may be that is read, whoever made it."""
 
     @field_validator("folder")
     @classmethod

@@ -6,7 +6,7 @@ import math
 import re
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool, ValidationError, model_validator
 
 from daq.contracts.errors import SpecError
 
@@ -55,7 +55,7 @@ class Staircase(_Part):
     amplitude: Amplitude = DEFAULT_AMPLITUDE
     steps: Annotated[int, Field(ge=1, le=200)] = 8
     dwell: Duration = 0.5
-    back: bool = True
+    back: StrictBool = True
 
 
 class SlowRamp(_Part):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec, Gain
@@ -25,6 +25,23 @@ EventKind = Literal[
     "start", "ramp_start", "ramp_end", "reversal", "gains", "limit", "pause", "resume", "retry", "missing",
     "missed_set_point", "restart", "link_lost", "stop", "fault", "note", "end",
 ]  # fmt: skip
+
+
+EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(2262, 1, 1, tzinfo=UTC)
+"""Between them a moment fits into 64 bits of ns since 1970, as time stamps are written."""
+
+
+def _stamped_by_64_bits(moment: datetime) -> datetime:
+    """Raises ValueError for a moment outside of EARLIEST to LATEST."""
+    # Compared, not converted: near the year 9999 a moment may have no UTC.
+    aware = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
+    if not EARLIEST <= aware < LATEST:
+        raise ValueError("a moment of the years 1970 to 2261 is expected")
+    return moment
+
+
+Moment = Annotated[datetime, AfterValidator(_stamped_by_64_bits)]
+"""A moment that a trace can have been recorded at."""
 
 
 class TraceEvent(BaseModel):
@@ -46,7 +63,7 @@ class TraceRecord(BaseModel):
 
     format: Annotated[int, Field(le=TRACE_FORMAT)] = TRACE_FORMAT
     trace_id: str
-    created: datetime
+    created: Moment
     """UTC of the record's start, `time` = 0."""
     software: str
     source: Literal["mock", "real", "imported"]

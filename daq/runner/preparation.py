@@ -11,6 +11,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
+from daq.contracts.word import require_word
 from daq.driver import EVERY_JOINT, Controller
 from daq.runner.rows import RowMaker
 from daq.safety import Violation, check_move_to_start, check_plan
@@ -30,6 +31,10 @@ class Consent:
     """What the operator has agreed to. A controller with an arm behind it is not moved without `moves_real_arm`."""
 
     moves_real_arm: bool = False
+
+    def __post_init__(self) -> None:
+        """Raises SpecError for what only counts as true."""
+        require_word(self.moves_real_arm)
 
 
 class MissingConsentError(SafetyError):

@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool, ValidationError
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import Angle, Duration, JointNumber
@@ -63,7 +63,7 @@ class SetOutput(_Part):
 
     kind: Literal["output"] = "output"
     line: Line
-    on: bool
+    on: StrictBool
 
 
 class AwaitInput(_Part):
@@ -71,7 +71,7 @@ class AwaitInput(_Part):
 
     kind: Literal["input"] = "input"
     line: Line
-    on: bool
+    on: StrictBool
     longest: Duration = 60.0
 
 
@@ -79,7 +79,7 @@ class Gripper(_Part):
     """Closes or opens the gripper."""
 
     kind: Literal["gripper"] = "gripper"
-    closed: bool
+    closed: StrictBool
 
 
 Instruction = Annotated[

@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import json
 import os
-import struct
 import tempfile
-import zipfile
 import zlib
 from pathlib import Path
 
 import numpy as np
 
 from daq.contracts.trace import Trace, TraceEvent, TraceRecord
+from daq.traces import layout
 
 FOLDER = ".cache"
 WORTH_IT = 1_000_000
@@ -27,9 +26,6 @@ WORTH_IT = 1_000_000
 _VERSION = 1
 _PIECE = 1 << 19
 """Bytes read at a time: they stay in the processor's cache while their checksum is computed."""
-_SIGNALS = (
-    "time", "position", "set_point", "error", "drive", "velocity", "power_raw", "tick", "host_time", "status",
-)  # fmt: skip
 
 
 def cache_path(path: Path) -> Path:
@@ -58,9 +54,9 @@ def load(path: Path, key: str) -> Trace | None:
                 TraceRecord.model_validate_json(json.dumps(head["record"])),
                 tuple(head["joints"]),
                 events=tuple(TraceEvent.model_validate(event) for event in head["events"]),
-                **{name: stored[name] for name in _SIGNALS if name in stored},
+                **{name: stored[name] for name in layout.ALL_SIGNALS if name in stored},
             )
-    except (OSError, EOFError, ValueError, KeyError, TypeError, struct.error, zipfile.BadZipFile):
+    except Exception:  # noqa: BLE001  # numpy and zipfile raise what they like on a damaged file
         return None
 
 
@@ -71,7 +67,7 @@ def store(path: Path, key: str, trace: Trace) -> bool:
         "joints": trace.joints,
         "events": [event.model_dump(exclude_none=True) for event in trace.events],
     }
-    columns = {name: getattr(trace, name) for name in _SIGNALS if getattr(trace, name) is not None}
+    columns = {name: getattr(trace, name) for name in layout.ALL_SIGNALS if getattr(trace, name) is not None}
     target = cache_path(path)
     unfinished: Path | None = None
     try:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import os
 from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
-from mcap.exceptions import McapError
-from mcap.reader import make_reader
 from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Outcome, TraceRecord
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
-from daq.traces.reader import read_trace, record_of
-from daq.traces.scan import first_metadata
+from daq.traces.ends import Texts, first_metadata, indexed_metadata
+from daq.traces.metadata import extent_of, joints_of, record_of
+from daq.traces.reader import TOO_LARGE
+from daq.traces.scan import UNREADABLE, scan
 
 State = Literal["finished", "recording", "unfinished", "unreadable"]
 """`recording`: a living process writes it; `unfinished`: left by a crash, `salvage` finishes it."""
@@ -49,7 +51,7 @@ class TraceSummary(BaseModel):
     problem: str | None = None
 
 
-def list_traces(folder: Path) -> tuple[TraceSummary, ...]:
+def list_traces(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> tuple[TraceSummary, ...]:
     """Summaries of all traces in a folder, the oldest first, unreadable ones with their problem.
 
     Raises TraceError when the folder cannot be read.
@@ -62,13 +64,13 @@ def list_traces(folder: Path) -> tuple[TraceSummary, ...]:
     summaries = []
     for path in paths:
         try:
-            summaries.append(summary_of(path))
+            summaries.append(summary_of(path, limits))
         except FileNotFoundError:
             continue  # finished, salvaged or deleted in this moment
     return tuple(sorted(summaries, key=lambda summary: (_moment(summary), summary.path.name)))
 
 
-def summary_of(path: Path) -> TraceSummary:
+def summary_of(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> TraceSummary:
     """What one file says about itself. Raises FileNotFoundError when it is not there."""
     path = Path(path)
     size = path.stat().st_size
@@ -76,36 +78,35 @@ def summary_of(path: Path) -> TraceSummary:
     try:
         if unfinished:
             state: State = "recording" if disk.is_being_written(path) else "unfinished"
-            start, end = _beginning(path), None
+            start, end = _beginning(path, limits), None
         else:
             state = "finished"
-            start, end = _metadata(path)
+            start, end = _metadata(path, limits)
         record = record_of(start, end, str(path))
-        joints = tuple(int(joint) for joint in start["joints"].split())
-        extent = (int(end["samples"]), float(end["duration"])) if end else (None, None)
+        joints = joints_of(start, limits, str(path))
+        extent = extent_of(end, str(path)) if end else (None, None)
     except FileNotFoundError:
         raise
     except OSError as error:
         problem = f"{path}: cannot be read: {disk.reason(error)}"
     except TraceError as error:
         problem = str(error)
-    except (KeyError, ValueError) as error:
-        problem = f"{path}: its metadata is not that of a trace: {error}"
+    except MemoryError:
+        problem = f"{path}: {TOO_LARGE}"
     else:
         return _summary(path, state, size, record, joints, *extent)
     return TraceSummary(path=path, state="unreadable", size=size, problem=problem)
 
 
-def find_trace(folder: Path, wanted: str) -> Path:
+def find_trace(folder: Path, wanted: str, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Path:
     """The trace that `wanted` names: a path, `last`, or the beginning of a trace's number or of a file's name.
 
     Raises TraceError when there is none, or when several begin so.
     """
-    path = Path(wanted)
-    if path.is_file():
-        return path
+    if os.path.isfile(wanted):  # pathlib's raises for a name that is too long
+        return Path(wanted)
     folder = Path(folder)
-    summaries = list_traces(folder) if folder.is_dir() else ()
+    summaries = list_traces(folder, limits) if folder.is_dir() else ()
     if wanted == LAST:
         finished = [summary for summary in summaries if summary.state == "finished"]
         if not finished:
@@ -159,23 +160,31 @@ def _summary(
     )
 
 
-def _metadata(path: Path) -> tuple[dict[str, str], dict[str, str] | None]:
-    """Metadata at the start and the end of a finished trace, through its index. Raises TraceError."""
-    try:
-        with path.open("rb") as stream:
-            found = {metadata.name: metadata.metadata for metadata in make_reader(stream).iter_metadata()}
-    except (McapError, ValueError) as error:
-        read_trace(path)  # says in one line what is wrong with it
-        raise TraceError(f"{path}: its index cannot be read: {error}") from error
+def _metadata(path: Path, limits: TraceLimits) -> tuple[Texts, Texts | None]:
+    """Metadata at the start and the end of a finished trace, through its index. Raises TraceError, OSError."""
+    with disk.open_regular(path) as stream:
+        try:
+            found = indexed_metadata(stream, limits)
+        except UNREADABLE:
+            stream.seek(0)
+            found = _scanned_metadata(path, disk.read_at_most(stream, limits.file_bytes, str(path)), limits)
     if layout.START_METADATA not in found:
         raise TraceError(f"{path}: is an MCAP file, but not a trace: it has no metadata {layout.START_METADATA!r}")
     return found[layout.START_METADATA], found.get(layout.END_METADATA)
 
 
-def _beginning(path: Path) -> dict[str, str]:
-    """Metadata at the start of a file that has no end yet. Raises TraceError."""
-    with path.open("rb") as stream:
-        name, metadata = first_metadata(stream, str(path))
+def _scanned_metadata(path: Path, data: bytes, limits: TraceLimits) -> dict[str, Texts]:
+    """The same from the whole file, which also says what is wrong with it. Raises TraceError."""
+    found = scan(data, str(path), limits)
+    if found.damage is not None:
+        raise TraceError(f"{path}: is damaged after byte {found.good_bytes} of {len(data)}: {found.damage}")
+    return found.metadata
+
+
+def _beginning(path: Path, limits: TraceLimits) -> Texts:
+    """Metadata at the start of a file that has no end yet. Raises TraceError, OSError."""
+    with disk.open_regular(path) as stream:
+        name, metadata = first_metadata(stream, limits, str(path))
     if name != layout.START_METADATA:
         raise TraceError(f"{path}: is an MCAP file, but not a trace: it does not begin as one")
     return metadata

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 import re
 import tomllib
+from array import array
 from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,8 +19,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from daq.contracts.errors import DaqError, TraceError
 from daq.contracts.machine import load_machine, shipped_machines
-from daq.contracts.trace import Floats, Outcome, Trace, TraceRecord
-from daq.traces import disk
+from daq.contracts.trace import Floats, Moment, Outcome, Trace, TraceRecord
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
+from daq.traces import bounds, disk
 from daq.traces.naming import trace_id_of
 from daq.traces.recording import software
 
@@ -44,7 +47,7 @@ class Beside(BaseModel):
     """Joints to take from the columns; all of them when None."""
     drive_unit: Literal["V", "N·m", "N"] | None = None
     period: Annotated[float, Field(gt=0)] | None = None
-    created: datetime | None = None
+    created: Moment | None = None
     outcome: Outcome | None = None
     operator: str | None = None
     notes: str = ""
@@ -81,21 +84,18 @@ def export_csv(trace: Trace, path: Path) -> Path:
     return path
 
 
-def import_csv(path: Path) -> Trace:
+def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
     """The trace in a CSV file and, where there is one, the TOML beside it.
 
     Raises TraceError with one line that names the row (from 1, the header is row 1) and the column of what is wrong:
     a missing or unknown column, text, NaN, time that does not increase, rows of unequal length.
     """
     path = Path(path)
-    beside = _read_beside(toml_path(path))
-    header, table = _read_table(path)
+    data, beside_data = _read(path, limits), _read_beside(toml_path(path), limits)
+    beside = _beside(toml_path(path), beside_data)
+    header, table = _read_table(path, data, limits)
     joints = _joints(path, header, beside)
-    wrong = np.argwhere(np.diff(table[:, 0]) <= 0)
-    if len(wrong):
-        row = int(wrong[0][0]) + 1
-        before, value = table[row - 1, 0], table[row, 0]
-        raise TraceError(f"{path}: row {row + 2}, column 'time': {value} does not increase after {before}")
+    _check_bounds(path, header, table)
     signals: dict[str, Any] = {}
     for name in SIGNALS:
         having = [joint for joint in joints if f"{name}_{joint}" in header]
@@ -104,10 +104,12 @@ def import_csv(path: Path) -> Trace:
             raise TraceError(f"{path}: row 1: column '{name}_{lacking}' is missing; joint {having[0]} has one")
         if having:
             signals[name] = table[:, [header.index(f"{name}_{joint}") for joint in joints]]
-    record = _record(path, beside)
+    record = _record(path, beside, trace_id_of(data, *([] if beside_data is None else [beside_data])))
     if "position" not in signals:
         signals["position"] = _travelled(table[:, 0], signals["velocity"])
+        bounds.check_signals({"position": signals["position"]}, f"{path}: integrals of the speeds")
         record = record.model_copy(update={"notes": f"{record.notes} {INTEGRATED}".strip()})
+    bounds.check_record(record, (), str(path))
     return Trace(record, joints, table[:, 0], **signals)
 
 
@@ -117,7 +119,8 @@ def _travelled(time: Floats, velocity: Floats) -> Floats:
     return np.concatenate([np.zeros((1, velocity.shape[1])), np.cumsum(steps, axis=0)])
 
 
-def _record(path: Path, beside: Beside) -> TraceRecord:
+def _record(path: Path, beside: Beside, identity: str) -> TraceRecord:
+    """`identity` is that of the file and the TOML beside it, so that a model fitted to them goes on naming them."""
     machine = None
     if beside.machine is not None:
         named = beside.machine in shipped_machines()
@@ -127,7 +130,7 @@ def _record(path: Path, beside: Beside) -> TraceRecord:
             raise TraceError(f"{toml_path(path)}: machine: {error}") from error
     own_name = machine.name if machine else path.stem
     return TraceRecord(
-        trace_id=_identity(path),
+        trace_id=identity,
         created=beside.created or datetime.now(UTC),
         software=software(),
         source=beside.source,
@@ -139,14 +142,6 @@ def _record(path: Path, beside: Beside) -> TraceRecord:
         notes=beside.notes,
         outcome=beside.outcome,
     )
-
-
-def _identity(path: Path) -> str:
-    """Of the file and the TOML beside it, so that a model fitted to them goes on naming them. Raises TraceError."""
-    try:
-        return trace_id_of(*(p.read_bytes() for p in (path, toml_path(path)) if p.exists()))
-    except OSError as error:
-        raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
 
 
 def _joints(path: Path, header: list[str], beside: Beside) -> tuple[int, ...]:
@@ -161,16 +156,13 @@ def _joints(path: Path, header: list[str], beside: Beside) -> tuple[int, ...]:
     return wanted
 
 
-def _read_table(path: Path) -> tuple[list[str], Floats]:
+def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str], Floats]:
     """Header and numbers (rows, columns), all finite. Raises TraceError."""
     try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            rows = csv.reader(stream)
-            header = [name.strip() for name in next(rows, [])]
-            _check_header(path, header)
-            return header, np.array(list(_numbers(path, header, rows))).reshape(-1, len(header))
-    except OSError as error:
-        raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
+        rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""))
+        header = [name.strip() for name in next(rows, [])]
+        _check_header(path, header)
+        return header, _numbers(path, header, rows, limits)
     except UnicodeDecodeError as error:
         raise TraceError(f"{path}: is not text in UTF-8") from error
     except csv.Error as error:
@@ -192,7 +184,10 @@ def _check_header(path: Path, header: list[str]) -> None:
         raise TraceError(f"{path}: row 1: the first column must be 'time', it is {header[0]!r}")
 
 
-def _numbers(path: Path, header: list[str], rows: Iterable[list[str]]) -> Iterable[list[float]]:
+def _numbers(path: Path, header: list[str], rows: Iterable[list[str]], limits: TraceLimits) -> Floats:
+    """The numbers (rows, columns), all finite. Raises TraceError."""
+    found = array("d")
+    most = limits.records // _records_of_a_row(header)
     for number, row in enumerate(rows, start=2):
         if not row:
             continue
@@ -204,7 +199,33 @@ def _numbers(path: Path, header: list[str], rows: Iterable[list[str]]) -> Iterab
             values = [math.nan]
         if not math.isfinite(sum(values)) or "_" in "".join(row):
             _refuse_value(path, number, header, row)
-        yield values
+        found.extend(values)
+        if len(found) > most * len(header):
+            raise TraceError(f"{path}: row {number}: up to {most} samples are read (traces.limits.records)")
+    return np.frombuffer(found, dtype=np.float64).reshape(-1, len(header))
+
+
+def _records_of_a_row(header: list[str]) -> int:
+    """Messages that a row becomes in a trace: one a joint, and one for all of them."""
+    return 1 + len({name.rpartition("_")[2] for name in header[1:]})
+
+
+def _check_bounds(path: Path, header: list[str], table: Floats) -> None:
+    """Raises TraceError for the first value that no rig can have measured, and for time that does not increase."""
+    for column, name in enumerate(header):
+        signal = name.rpartition("_")[0] or name
+        outside = bounds.first_outside(signal, table[:, column])
+        if outside is not None:
+            value = table[outside[0], column]
+            place = f"row {outside[0] + 2}, column {name!r}"
+            raise TraceError(f"{path}: {place}: {value:g} is too large, {bounds.allowed(signal)}")
+    row = bounds.first_short_step(table[:, 0])
+    if row is not None:
+        before, value = table[row - 1, 0], table[row, 0]
+        raise TraceError(
+            f"{path}: row {row + 2}, column 'time': {value} does not increase after {before}"
+            f"{'' if value <= before else f' by {bounds.SMALLEST_STEP:g} s at least'}"
+        )
 
 
 def _refuse_value(path: Path, number: int, header: list[str], row: list[str]) -> None:
@@ -218,19 +239,32 @@ def _refuse_value(path: Path, number: int, header: list[str], row: list[str]) ->
             raise TraceError(f"{path}: row {number}, column {name!r}: {text!r} is not a finite number")
 
 
-def _read_beside(path: Path) -> Beside:
-    if not path.exists():
-        return Beside()
+def _read(path: Path, limits: TraceLimits) -> bytes:
     try:
-        return Beside.model_validate(tomllib.loads(path.read_text("utf-8")))
+        with disk.open_regular(path) as stream:
+            return disk.read_at_most(stream, limits.file_bytes, str(path))
     except OSError as error:
         raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise TraceError(f"{path}: is not TOML: {error}") from error
+
+
+def _read_beside(path: Path, limits: TraceLimits) -> bytes | None:
+    return _read(path, limits) if path.exists() else None
+
+
+def _beside(path: Path, data: bytes | None) -> Beside:
+    if data is None:
+        return Beside()
+    try:
+        beside = Beside.model_validate(tomllib.loads(data.decode("utf-8")))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        raise TraceError(f"{path}: {where}: {first['msg']} (got {first['input']!r})") from error
+        raise TraceError(f"{path}: {where}: {first['msg']} (got {str(first['input'])[:80]!r})") from error
+    except (ValueError, RecursionError) as error:
+        raise TraceError(f"{path}: is not TOML: {error}") from error
+    if beside.created is not None and beside.created.tzinfo is None:
+        raise TraceError(f"{path}: created: {beside.created.isoformat()} has no time zone; write Z behind it for UTC")
+    return beside
 
 
 def _beside_text(trace: Trace) -> str:

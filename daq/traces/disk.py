@@ -2,12 +2,39 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
+import stat
 from pathlib import Path
 from typing import IO
 
 from daq.contracts.errors import TraceError
+
+
+def open_regular(path: Path) -> IO[bytes]:
+    """A file to read. Raises OSError, also for what is no file: opening a pipe would wait for its writer."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    mode = os.fstat(descriptor).st_mode
+    if stat.S_ISREG(mode):
+        return os.fdopen(descriptor, "rb")
+    os.close(descriptor)
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    raise OSError(errno.EINVAL, "it is no file")
+
+
+def size_of(stream: IO[bytes]) -> int:
+    """Bytes of an open file."""
+    return os.fstat(stream.fileno()).st_size
+
+
+def read_at_most(stream: IO[bytes], most: int, origin: str) -> bytes:
+    """All of a file. Raises TraceError when it has more than `most` bytes, without reading them; OSError."""
+    size = size_of(stream)
+    if size > most:
+        raise TraceError(f"{origin}: has {size} bytes; up to {most} are read (traces.limits.file_bytes)")
+    return stream.read(size)  # of what it has now: a read of `most` bytes would make room for as many
 
 
 def create_locked(path: Path) -> IO[bytes]:
@@ -37,7 +64,7 @@ def try_lock(stream: IO[bytes]) -> bool:
 
 def is_being_written(path: Path) -> bool:
     """Whether a living process is writing this file. Raises OSError when it cannot be opened."""
-    with path.open("rb") as stream:
+    with open_regular(path) as stream:
         try:
             fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:

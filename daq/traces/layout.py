@@ -11,8 +11,10 @@ import struct
 from datetime import datetime
 from functools import cache
 from importlib import resources
+from typing import Any
 
 import numpy as np
+from pydantic_core import from_json
 
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import EventKind, TraceEvent, TraceRecord
@@ -39,6 +41,11 @@ OPTIONAL_SIGNALS = ("set_point", "error", "drive", "velocity")
 """Signals a sample may lack (NaN)."""
 RECORDED_SIGNALS = ("tick", "host_time", "status", "set_point", "position", "error", "drive", "power_raw")
 """What a record of the controller holds."""
+
+ALL_SIGNALS = (
+    "time", "position", "set_point", "error", "drive", "velocity", "power_raw", "tick", "host_time", "status",
+)  # fmt: skip
+"""Columns of a trace."""
 
 _CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 _JOINT_SAMPLE = struct.Struct("<4s2dq5diI")
@@ -123,9 +130,17 @@ def event_message(event: TraceEvent, utc_ns: int) -> bytes:
 
 def event_of(message: bytes) -> TraceEvent:
     """The event in a message of the events' topic. Raises ValueError for anything else."""
-    fields = json.loads(message)
+    fields = json_object(message)
     own = {key: fields[key] for key in ("time", "message", "tick", "joint") if key in fields}
     return TraceEvent.model_validate(own | {"kind": fields.get("name")})
+
+
+def json_object(text: str | bytes) -> dict[str, Any]:
+    """An object of JSON, nested 200 deep at most and without NaN. Raises ValueError."""
+    found = from_json(text, allow_inf_nan=False)
+    if not isinstance(found, dict):
+        raise ValueError("it is no JSON object")  # noqa: TRY004  # what is wrong is the text, not a type here
+    return found
 
 
 def joint_names(record: TraceRecord, joints: tuple[int, ...]) -> tuple[str, ...]:

@@ -41,7 +41,7 @@ def outcome_metadata(
 class Recording:
     """One trace on its way into `stream`: the start metadata at once, then rows and events, then `finish`.
 
-    Raises TraceError when `record` has no time zone, and OSError whenever the stream does.
+    Raises TraceError when `record` has no time zone or a time has no stamp, and OSError whenever the stream does.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Recording:
         self.last_time = 0.0
         self._first: SampleRow | None = None
         self._events = 0
-        self._start_ns = layout.nanoseconds(record.created.astimezone(UTC))
+        self._start_ns = layout.nanoseconds(record.created)
         self._names = layout.joint_names(record, joints)
         self._effort = record.drive_unit in ("N·m", "N") and "drive" in signals
         self._mcap = open_mcap(stream)
@@ -91,8 +91,8 @@ class Recording:
         record's start: a UTC clock that is set back meanwhile moves nothing.
         """
         first = self._first = self._first or row
-        published = self._start_ns + round(row.time * 1e9)
-        logged = self._start_ns + round((first.time + row.host_time - first.host_time) * 1e9)
+        published = self._stamp(row.time)
+        logged = self._stamp(first.time + row.host_time - first.host_time)
         states = layout.joint_states(row, published, self._names, self._effort)
         self._mcap.add_message(self._states, logged, states, published, self.samples)
         for column, channel in enumerate(self._joints):
@@ -102,9 +102,16 @@ class Recording:
 
     def event(self, event: TraceEvent) -> None:
         """Add an event."""
-        moment = self._start_ns + round(event.time * 1e9)
+        moment = self._stamp(event.time)
         self._mcap.add_message(self._log, moment, layout.event_message(event, moment), moment, self._events)
         self._events += 1
+
+    def _stamp(self, time: float) -> int:
+        """UTC in ns since 1970 of a time (s) that counts from the record's start."""
+        stamp = self._start_ns + round(time * 1e9)
+        if not 0 <= stamp < 1 << 64:
+            raise TraceError(f"time {time:g} s after the start of the record is before 1970 or after 2554")
+        return stamp
 
     def flush(self) -> None:
         """End the chunk: what was added so far can be read back once the stream's bytes are."""

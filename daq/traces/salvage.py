@@ -1,38 +1,75 @@
-"""Finishing the traces that a crash or a power cut left without an end. What was synced is kept; none is complete."""
+"""Finishing the traces that a crash or a power cut left without an end. What was synced is kept; none is complete.
+
+No file keeps the next one from being salvaged, whatever is in it, and no byte of what could not be read is deleted.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from mcap.writer import Writer
 
 from daq.contracts.errors import TraceError
-from daq.contracts.trace import TraceRecord
+from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
+from daq.traces.decode import cut_to_what_decodes
+from daq.traces.ends import Texts
+from daq.traces.metadata import NewerTraceError, joints_of, record_of
 from daq.traces.naming import finished_path
-from daq.traces.reader import read_trace, record_of, trace_of
+from daq.traces.reader import TOO_LARGE, read_trace, trace_of
 from daq.traces.recording import open_mcap, outcome_metadata
 from daq.traces.scan import Scan, messages, scan
 
+NO_SCHEMA = 0
+"""MCAP's number of the schema of a channel that has none."""
 SALVAGE_SUFFIX = ".salvage"
 """Of the new file until it is safe; one that is found was left by a salvage that did not end, and is made again."""
 UNREADABLE_SUFFIX = ".unreadable"
 """Of a part file that holds no trace at all: it is put aside, never deleted."""
+DAMAGED_SUFFIX = ".damaged"
+"""Of a part file that was salvaged up to its damage, where something follows that might be of use to somebody."""
 
 
 @dataclass(frozen=True)
 class Salvaged:
-    """One part file. `path` is the trace made from it, or None with the `problem` that kept it from being made."""
+    """One part file. `path` is the trace made from it, or None with the `problem` that kept it from being made.
+
+    `kept` is where the part file is now: None when all of it is in the trace.
+    """
 
     part: Path
     path: Path | None
     samples: int = 0
     dropped_bytes: int = 0
     problem: str | None = None
+    kept: Path | None = None
 
 
-def salvage_folder(folder: Path) -> tuple[Salvaged, ...]:
+@dataclass(frozen=True)
+class _Readable:
+    """Of one part file: its records, the trace in them, and the counters at its end."""
+
+    found: Scan
+    trace: Trace
+    counters: dict[str, float]
+
+
+class PutAsideError(TraceError):
+    """A part file from which no trace can be made; it is at `kept` now."""
+
+    def __init__(self, problem: str, kept: Path) -> None:
+        super().__init__(f"{problem}; it was renamed to {kept.name}")
+        self.kept = kept
+
+
+class _NoTraceError(TraceError):
+    """A part file from which no trace can be made, by this version or a later one."""
+
+
+def salvage_folder(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> tuple[Salvaged, ...]:
     """Salvage every part file in a folder that no living process is writing. One that cannot be salvaged says why.
 
     Raises TraceError when the folder cannot be read.
@@ -45,95 +82,132 @@ def salvage_folder(folder: Path) -> tuple[Salvaged, ...]:
     for part in parts:
         try:
             if not disk.is_being_written(part):
-                found.append(salvage(part))
+                found.append(salvage(part, limits))
         except FileNotFoundError:
             continue  # another process salvaged it, or its writer finished it, in this moment
         except OSError as error:
-            found.append(Salvaged(part, None, problem=f"{part}: cannot be read: {disk.reason(error)}"))
+            found.append(Salvaged(part, None, problem=f"{part}: cannot be read: {disk.reason(error)}", kept=part))
+        except PutAsideError as error:
+            found.append(Salvaged(part, None, problem=str(error), kept=error.kept))
         except TraceError as error:
-            found.append(Salvaged(part, None, problem=str(error)))
+            found.append(Salvaged(part, None, problem=str(error), kept=part))
     return tuple(found)
 
 
-def salvage(part: Path) -> Salvaged:
+def salvage(part: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Salvaged:
     """Make a finished trace, marked `interrupted`, from a part file, and remove the part file once that is safe.
 
-    Everything up to the first damage is kept. Running it again after it was cut short itself gives the same trace.
-    Raises TraceError when a living process is writing the file, when another trace has its name, when it holds no
-    trace (it is then renamed, so that it is not tried again), or when reading or writing fails; the part file is then
-    as it was.
+    Everything up to the first damage is kept. Where something follows that was not read, the part file is renamed and
+    stays. Running it again after it was cut short itself gives the same trace.
+    Raises PutAsideError when no trace can be made from it: it has been renamed, so that it is not tried again. Raises
+    TraceError when a living process is writing the file, when another trace has its name, when a newer version wrote
+    it, or when reading or writing fails; the part file is then as it was.
     """
     part = Path(part)
     if not part.name.endswith(layout.PART_SUFFIX):
         raise TraceError(f"{part}: is not an unfinished trace (*{layout.PART_SUFFIX})")
     try:
-        with part.open("rb") as stream:
+        with disk.open_regular(part) as stream:
             if not disk.try_lock(stream):
                 raise TraceError(f"{part}: is being written by a running process")
             if not disk.is_still_at(stream, part):
                 raise TraceError(f"{part}: was salvaged or finished by another process")
-            return _salvage_locked(part, stream.read())
+            try:
+                return _salvage_locked(part, disk.read_at_most(stream, limits.file_bytes, str(part)), limits)
+            except _NoTraceError as error:
+                problem = str(error)
+            except (TraceError, OSError):
+                raise
+            except MemoryError as error:
+                raise TraceError(f"{part}: {TOO_LARGE}; it is unchanged") from error
+            except Exception as error:  # noqa: BLE001  # whatever a file does, the next one is salvaged
+                problem = " ".join(f"{part}: cannot be salvaged ({type(error).__name__}: {error})".split())
+            raise PutAsideError(problem, _put_aside(part, UNREADABLE_SUFFIX))
     except OSError as error:
         raise TraceError(f"{part}: cannot be salvaged: {disk.reason(error)}; it is unchanged") from error
 
 
-def _salvage_locked(part: Path, data: bytes) -> Salvaged:
-    found, record, samples, duration = _readable(part, data)
+def _salvage_locked(part: Path, data: bytes, limits: TraceLimits) -> Salvaged:
+    readable = _readable(part, data, limits)
+    found, trace = readable.found, readable.trace
     path = finished_path(part)
-    _refuse_another(path, record)
+    _refuse_another(path, trace.record, limits)
     unfinished = path.with_name(path.name + SALVAGE_SUFFIX)
     dropped = len(data) - found.good_bytes
+    duration = float(trace.time[-1] - trace.time[0]) if len(trace) else 0.0
     try:
         with unfinished.open("wb") as stream:
             writer = open_mcap(stream)
             _copy(found, writer)
             remark = f"salvaged; {dropped} bytes at the end could not be read"
-            end = outcome_metadata("interrupted", _counters(found, part), samples, duration, remark)
+            end = outcome_metadata("interrupted", readable.counters, len(trace), duration, remark)
             writer.add_metadata(layout.END_METADATA, end)
             writer.finish()  # type: ignore[no-untyped-call]
             disk.sync(stream)
-        _check_copy(unfinished, samples)
+        _check_copy(unfinished, trace, limits)
         disk.rename(unfinished, path)
     except BaseException:
         unfinished.unlink(missing_ok=True)
         raise
-    part.unlink()
-    disk.sync_folder(part.parent)
-    return Salvaged(part, path, samples, dropped)
+    # A power cut may leave zeros behind what was synced: there is nothing in them to keep.
+    kept = _put_aside(part, DAMAGED_SUFFIX) if any(data[found.good_bytes :]) else None
+    if kept is None:
+        part.unlink()
+        disk.sync_folder(part.parent)
+    return Salvaged(part, path, len(trace), dropped, kept=kept)
 
 
-def _readable(part: Path, data: bytes) -> tuple[Scan, TraceRecord, int, float]:
-    """What can be read, its record, its number of samples and its duration (s).
-
-    Raises TraceError; a file that was cut before it became a trace is put aside first.
-    """
+def _readable(part: Path, data: bytes, limits: TraceLimits) -> _Readable:
+    """What can be read. Raises NewerTraceError when a newer version may read it, else _NoTraceError."""
     try:
-        found = scan(data, str(part))
+        found = scan(data, str(part), limits)
+        end = found.metadata.pop(layout.END_METADATA, None)
+        trace = _trace_before_damage(found, str(part), limits)
+    except NewerTraceError:
+        raise
     except TraceError as error:
-        raise _put_aside(part, str(error)) from error
+        raise _NoTraceError(str(error)) from error
+    return _Readable(found, trace, _counters(found.metadata[layout.START_METADATA], end, part))
+
+
+def _trace_before_damage(found: Scan, origin: str, limits: TraceLimits) -> Trace:
+    """The trace in a scan, which is shortened to it where a chunk does not belong to it. Raises TraceError."""
     if layout.START_METADATA not in found.metadata:
-        raise _put_aside(part, f"{part}: holds no trace")
-    trace = trace_of(found, str(part))
-    duration = float(trace.time[-1] - trace.time[0]) if len(trace) else 0.0
-    return found, trace.record, len(trace), duration
+        raise TraceError(f"{origin}: holds no trace")
+    try:
+        return trace_of(found, origin, limits)
+    except NewerTraceError:
+        raise
+    except TraceError:
+        joints = joints_of(found.metadata[layout.START_METADATA], limits, origin)
+        cut_to_what_decodes(found, joints, limits, origin)
+        return trace_of(found, origin, limits)
 
 
-def _put_aside(part: Path, problem: str) -> TraceError:
-    aside = part.with_name(part.name + UNREADABLE_SUFFIX)
+def _put_aside(part: Path, suffix: str) -> Path:
+    """Rename a part file to a name that no file has. Raises OSError."""
+    aside = part.with_name(part.name + suffix)
+    number = 1
+    while aside.exists():
+        number += 1
+        aside = part.with_name(f"{part.name}{suffix}.{number}")
     disk.rename(part, aside)
-    return TraceError(f"{problem}; it was renamed to {aside.name}")
+    return aside
 
 
-def _counters(found: Scan, part: Path) -> dict[str, float]:
-    start, end = found.metadata[layout.START_METADATA], found.metadata.get(layout.END_METADATA)
-    return record_of(start, end, str(part)).counters
+def _counters(start: Texts, end: Texts | None, part: Path) -> dict[str, float]:
+    """What the link had counted, where the recording came to write it down."""
+    try:
+        return record_of(start, end, str(part)).counters
+    except TraceError:
+        return {}
 
 
-def _refuse_another(path: Path, record: TraceRecord) -> None:
+def _refuse_another(path: Path, record: TraceRecord, limits: TraceLimits) -> None:
     """A file with the final name may only be what an earlier salvage of the same part file made."""
     if not path.exists():
         return
-    there = read_trace(path).record
+    there = read_trace(path, limits).record
     if (there.trace_id, there.outcome) != (record.trace_id, "interrupted"):
         raise TraceError(f"{path}: exists beside its part file, and is not its salvage; move one of them away")
 
@@ -151,7 +225,7 @@ def _copy(found: Scan, writer: Writer) -> None:
     }
     channels = {
         number: writer.register_channel(
-            channel.topic, channel.message_encoding, schemas[channel.schema_id], channel.metadata
+            channel.topic, channel.message_encoding, schemas.get(channel.schema_id, NO_SCHEMA), channel.metadata
         )
         for number, channel in found.channels.items()
     }
@@ -163,11 +237,11 @@ def _copy(found: Scan, writer: Writer) -> None:
         writer.flush()  # type: ignore[no-untyped-call]
 
 
-def _check_copy(path: Path, samples: int) -> None:
-    """Read the copy back before the original goes. Raises TraceError when it does not hold as many samples."""
-    data = path.read_bytes()
-    found = scan(data, str(path))
-    copied = len(trace_of(found, str(path)))
-    if found.damage is not None or copied != samples:
-        problem = found.damage or f"{copied} samples of {samples}"
+def _check_copy(path: Path, trace: Trace, limits: TraceLimits) -> None:
+    """Read the copy back before the original goes. Raises TraceError when it does not hold the same samples."""
+    found = scan(path.read_bytes(), str(path), limits)
+    copy = trace_of(found, str(path), limits)
+    same = all(np.array_equal(getattr(copy, name), getattr(trace, name)) for name in layout.ALL_SIGNALS)
+    if found.damage is not None or not same:
+        problem = found.damage or f"{len(copy)} samples of {len(trace)}"
         raise TraceError(f"{path}: does not read back as it was written ({problem}); the part file is unchanged")

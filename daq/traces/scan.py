@@ -1,4 +1,4 @@
-"""Walking through the records of an MCAP file that may end anywhere, and through the messages of a chunk.
+"""Walking through the records of an MCAP file that may end anywhere, be damaged anywhere, or be made to do harm.
 
 mcap's own StreamReader reads the same records, but takes what is left of a cut record for the whole of it, and parses
 the index of every message, which costs more than all the rest of opening a trace.
@@ -10,26 +10,27 @@ import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from io import BytesIO
-from typing import IO
 
-import zstandard
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Metadata, Schema
-from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.records import Attachment, Channel, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from daq.contracts.errors import TraceError
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
+from daq.traces import fields, layout
+from daq.traces.inflate import INFLATE_ERRORS, inflate
 
-_HEAD = struct.Struct("<BQ")
+HEAD = struct.Struct("<BQ")
+"""Opcode and length (bytes) of every record."""
+UNREADABLE = (ValueError, struct.error, *INFLATE_ERRORS)
+"""What reading damaged bytes raises here."""
+
+NOT_IN_CHUNKS = "a chunk holds something else than schemas, channels and whole messages"
+
+_DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
 _MESSAGE = struct.Struct("<BQHIQQ")
 _CRC = struct.Struct("<I")
-_LARGEST_METADATA = 1 << 26
-"""Bytes: a length beyond it is damage, and is not read."""
-_UNREADABLE = (ValueError, struct.error, McapError, zstandard.ZstdError, RuntimeError, MemoryError)
-"""What mcap's parsers and the decompressors raise on damaged bytes."""
+_OURS = (layout.START_METADATA, layout.END_METADATA)
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,12 @@ class Message:
 class Scan:
     """What a file holds up to its end or its first damage.
 
-    chunks:       messages and all, uncompressed, in the order of the file
-    good_bytes:   length of the readable part
-    damage:       what is wrong after it; None when the file is whole
+    chunks:          messages and all, uncompressed, in the order of the file
+    chunk_starts:    where in the file each of them lies
+    good_bytes:      length of the readable part
+    damage:          what is wrong after it; None when the file is whole
+    records:         number of records outside of chunks
+    chunks_indexed:  number of chunks that the index tells of; None without an index
     """
 
     schemas: dict[int, Schema] = field(default_factory=dict)
@@ -57,31 +61,43 @@ class Scan:
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     attachments: list[Attachment] = field(default_factory=list)
     chunks: list[bytes] = field(default_factory=list)
+    chunk_starts: list[int] = field(default_factory=list)
     good_bytes: int = 0
     damage: str | None = None
+    records: int = 0
+    chunks_indexed: int | None = None
+
+    def cut_before_chunk(self, number: int, damage: str) -> None:
+        """Take chunk `number` (from 0) for the first damage."""
+        self.good_bytes, self.damage = self.chunk_starts[number], damage
+        del self.chunks[number:], self.chunk_starts[number:]
 
 
-def scan(data: bytes | memoryview, origin: str) -> Scan:
-    """Read everything readable. Raises TraceError when `data` is empty or does not begin as an MCAP file."""
+def scan(data: bytes | memoryview, origin: str, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Scan:
+    """Read everything readable. What exceeds a limit counts as damage from there on.
+
+    Raises TraceError when `data` is empty or does not begin as an MCAP file.
+    """
     if len(data) == 0:
         raise TraceError(f"{origin}: is empty")
     if bytes(data[: len(MCAP0_MAGIC)]) != MCAP0_MAGIC:
         raise TraceError(f"{origin}: is not an MCAP file")
     found = Scan(good_bytes=len(MCAP0_MAGIC))
     view = memoryview(data)
+    walk = _Walk(found, view, limits)
     opcode = 0
     while opcode != Opcode.FOOTER:
-        if len(view) - found.good_bytes < _HEAD.size:
+        if len(view) - found.good_bytes < HEAD.size:
             found.damage = "it ends before its last record"
             return found
-        opcode, length = _HEAD.unpack_from(view, found.good_bytes)
-        start = found.good_bytes + _HEAD.size
+        opcode, length = HEAD.unpack_from(view, found.good_bytes)
+        start = found.good_bytes + HEAD.size
         if opcode == 0 or start + length > len(view):
             found.damage = "a record is cut off or not a record"
             return found
         try:
-            _take(found, opcode, view[start : start + length], view)
-        except _UNREADABLE as error:
+            walk.take(opcode, view[start : start + length])
+        except UNREADABLE as error:
             found.damage = f"a record cannot be read ({str(error) or type(error).__name__})"
             return found
         found.good_bytes = start + length
@@ -94,92 +110,148 @@ def messages(chunk: bytes) -> Iterator[Message]:
     """The messages of an uncompressed chunk. Raises ValueError when a record does not end with the chunk."""
     position, end = 0, len(chunk)
     while position < end:
-        opcode, length = _HEAD.unpack_from(chunk, position)
-        following = position + _HEAD.size + length
-        if following > end:
-            raise ValueError("a record is longer than its chunk")
+        opcode, following = _record_at(chunk, position)
         if opcode == Opcode.MESSAGE:
             _, _, channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(chunk, position)
             yield Message(channel, sequence, log_time, publish_time, chunk[position + _MESSAGE.size : following])
         position = following
 
 
-def payloads(chunk: bytes, by_channel: dict[int, list[bytes]]) -> None:
-    """Append the data of each message to the list of its channel, where it has one: the short way to all samples."""
-    unpack, head, message = _MESSAGE.unpack_from, _HEAD.size, _MESSAGE.size
-    position, end = 0, len(chunk) - _MESSAGE.size
-    while position <= end:
+def payloads(chunk: bytes, by_channel: dict[int, list[bytes]], most: int) -> tuple[int, set[int]]:
+    """Append the data of each message to the list of its channel, where it has one: the short way to all samples.
+
+    Returns how many records the chunk has and which channels its messages are of. Raises ValueError or struct.error
+    when a record does not end with the chunk, or there are more than `most`.
+    """
+    unpack, head, message = _MESSAGE.unpack_from, HEAD.size, _MESSAGE.size
+    position, end, count = 0, len(chunk), 0
+    seen: set[int] = set()
+    last = end - message
+    while position <= last and count < most:
         opcode, length, channel, _, _, _ = unpack(chunk, position)
         following = position + head + length
-        if opcode == Opcode.MESSAGE and channel in by_channel:
-            by_channel[channel].append(chunk[position + message : following])
+        if opcode == Opcode.MESSAGE:
+            seen.add(channel)
+            if channel in by_channel:
+                by_channel[channel].append(chunk[position + message : following])
+        elif opcode not in _DEFINITIONS:
+            raise ValueError(NOT_IN_CHUNKS)
         position = following
+        count += 1
+    while position < end and count < most:  # what is too short for a message
+        opcode, position = _record_at(chunk, position)
+        if opcode not in _DEFINITIONS:
+            raise ValueError(NOT_IN_CHUNKS)
+        count += 1
+    if position < end:
+        raise ValueError("there are more records than are read (traces.limits.records)")
+    if position > end:
+        raise ValueError("a record is longer than its chunk")
+    return count, seen
 
 
-def _take(found: Scan, opcode: int, body: memoryview, whole: memoryview) -> None:
-    """Put one record where it belongs. Raises one of _UNREADABLE."""
-    if opcode == Opcode.CHUNK:
-        chunk = _uncompressed(Chunk.read(_stream(body)))
-        _take_definitions(found, chunk)
-        found.chunks.append(chunk)
-    elif opcode == Opcode.METADATA:
-        metadata = Metadata.read(_stream(body))
-        found.metadata[metadata.name] = metadata.metadata
-    elif opcode == Opcode.ATTACHMENT:
-        if zlib.crc32(body[: -_CRC.size]) != _CRC.unpack_from(body, len(body) - _CRC.size)[0]:
+def _record_at(chunk: bytes, position: int) -> tuple[int, int]:
+    """Opcode of the record at `position`, and where the next one begins. Raises ValueError, struct.error."""
+    opcode, length = HEAD.unpack_from(chunk, position)
+    following = position + HEAD.size + int(length)
+    if following > len(chunk):
+        raise ValueError("a record is longer than its chunk")
+    return opcode, following
+
+
+class _Walk:
+    """Puts one record after the other where it belongs, and counts what the limits are about."""
+
+    def __init__(self, found: Scan, whole: memoryview, limits: TraceLimits) -> None:
+        self._found = found
+        self._whole = whole
+        self._limits = limits
+        self._inflated = 0
+        self._attached = 0
+        self._definitions: set[tuple[int, bytes]] = set()
+
+    def take(self, opcode: int, body: memoryview) -> None:
+        """Raises one of UNREADABLE."""
+        found = self._found
+        found.records += 1
+        require(found.records, self._limits.records, "there are more than {} records", "records")
+        if opcode == Opcode.CHUNK:
+            self._take_chunk(body)
+        elif opcode == Opcode.METADATA:
+            self._take_metadata(body)
+        elif opcode == Opcode.ATTACHMENT:
+            self._take_attachment(body)
+        elif opcode in _DEFINITIONS:
+            self._take_definition(opcode, body)
+        elif opcode == Opcode.STATISTICS:
+            found.chunks_indexed = fields.chunks_counted(body)
+        elif opcode == Opcode.MESSAGE:
+            raise ValueError("messages outside of chunks are not read: write it with chunks")
+        elif opcode == Opcode.DATA_END:
+            if fields.data_end_of(body).data_section_crc not in (0, zlib.crc32(self._whole[: found.good_bytes])):
+                raise ValueError("the data section does not match its checksum")
+        elif opcode == Opcode.FOOTER:
+            self._check_footer(body)
+
+    def _take_chunk(self, body: memoryview) -> None:
+        packed = fields.chunk_of(body)
+        require(packed.size, self._limits.chunk_bytes, "a chunk declares more than {} bytes", "chunk_bytes")
+        self._inflated += packed.size
+        require(self._inflated, self._limits.total_bytes, "its chunks have more than {} bytes", "total_bytes")
+        chunk = inflate(packed)
+        position = 0
+        while position < len(chunk):
+            opcode, following = _record_at(chunk, position)
+            if opcode == Opcode.MESSAGE:
+                break  # definitions come before the messages that need them, in every chunk that has any
+            if opcode not in _DEFINITIONS:
+                raise ValueError(NOT_IN_CHUNKS)
+            self._take_definition(opcode, memoryview(chunk)[position + HEAD.size : following])
+            position = following
+        self._found.chunks.append(chunk)
+        self._found.chunk_starts.append(self._found.good_bytes)
+
+    def _take_metadata(self, body: memoryview) -> None:
+        require(len(body), self._limits.metadata_bytes, "metadata have more than {} bytes", "metadata_bytes")
+        metadata = fields.metadata_of(body)
+        if metadata.name in self._found.metadata:
+            raise ValueError(f"the metadata {metadata.name!r} come twice")
+        if metadata.name in _OURS:
+            self._found.metadata[metadata.name] = metadata.metadata
+
+    def _take_attachment(self, body: memoryview) -> None:
+        self._attached += len(body)
+        count = len(self._found.attachments) + 1
+        require(count, self._limits.attachments, "there are more than {} attachments", "attachments")
+        require(self._attached, self._limits.attachment_bytes, "attachments have more than {} bytes",
+                "attachment_bytes")  # fmt: skip
+        if len(body) < _CRC.size or zlib.crc32(body[: -_CRC.size]) != _CRC.unpack(body[-_CRC.size :])[0]:
             raise ValueError("an attachment does not match its checksum")
-        found.attachments.append(Attachment.read(_stream(body)))
-    elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-        _take_definition(found, opcode, body)
-    elif opcode == Opcode.DATA_END:
-        expected = DataEnd.read(_stream(body)).data_section_crc
-        if expected not in (0, zlib.crc32(whole[: found.good_bytes])):
-            raise ValueError("the data section does not match its checksum")
-    elif opcode == Opcode.FOOTER:
-        footer = Footer.read(_stream(body))
-        begin, end = footer.summary_start or found.good_bytes, found.good_bytes + _HEAD.size + len(body) - _CRC.size
-        if footer.summary_crc not in (0, zlib.crc32(whole[begin:end])):
+        self._found.attachments.append(fields.attachment_of(body))
+
+    def _take_definition(self, opcode: int, body: memoryview) -> None:
+        raw = bytes(body)
+        if (opcode, raw) in self._definitions:  # some writers repeat them in every chunk
+            return
+        self._definitions.add((opcode, raw))
+        if opcode == Opcode.SCHEMA:
+            schema = fields.schema_of(body)
+            if self._found.schemas.setdefault(schema.id, schema) != schema:
+                raise ValueError(f"schema {schema.id} is defined twice, and differently")
+        else:
+            channel = fields.channel_of(body)
+            if self._found.channels.setdefault(channel.id, channel) != channel:
+                raise ValueError(f"channel {channel.id} is defined twice, and differently")
+
+    def _check_footer(self, body: memoryview) -> None:
+        footer = fields.footer_of(body)
+        begin = footer.summary_start or self._found.good_bytes
+        end = self._found.good_bytes + HEAD.size + len(body) - _CRC.size
+        if footer.summary_crc not in (0, zlib.crc32(self._whole[begin:end])):
             raise ValueError("the index does not match its checksum")
 
 
-def _take_definitions(found: Scan, chunk: bytes) -> None:
-    position = 0
-    while position < len(chunk):
-        opcode, length = _HEAD.unpack_from(chunk, position)
-        start = position + _HEAD.size
-        if opcode == Opcode.MESSAGE:
-            # Definitions come before the messages that need them, in every chunk that has any.
-            return
-        _take_definition(found, opcode, memoryview(chunk)[start : start + length])
-        position = start + length
-
-
-def _take_definition(found: Scan, opcode: int, body: memoryview) -> None:
-    if opcode == Opcode.SCHEMA:
-        schema = Schema.read(_stream(body))
-        found.schemas[schema.id] = schema
-    elif opcode == Opcode.CHANNEL:
-        channel = Channel.read(_stream(body))
-        found.channels[channel.id] = channel
-
-
-def _uncompressed(chunk: Chunk) -> bytes:
-    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-    return stream.read(length)
-
-
-def _stream(body: memoryview) -> ReadDataStream:
-    return ReadDataStream(BytesIO(body))
-
-
-def first_metadata(stream: IO[bytes], origin: str) -> tuple[str, dict[str, str]]:
-    """Name and content of the first metadata record, read without the rest of the file. Raises TraceError."""
-    try:
-        for record in StreamReader(stream, emit_chunks=True, record_size_limit=_LARGEST_METADATA).records:
-            if isinstance(record, Metadata):
-                return record.name, record.metadata
-            if not isinstance(record, Header):
-                break
-    except _UNREADABLE as error:
-        raise TraceError(f"{origin}: ends or is damaged before its first metadata") from error
-    raise TraceError(f"{origin}: does not begin with a metadata record, so it is not a trace")
+def require(value: int, most: int, line: str, limit: str) -> None:
+    """Raises ValueError, naming the setting, when a value exceeds its limit. `line` has a place for the limit."""
+    if value > most:
+        raise ValueError(f"{line.format(most)} (traces.limits.{limit})")

@@ -10,6 +10,7 @@ from daq.contracts.errors import TraceError
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import Trace
 from daq.traces import disk, layout
+from daq.traces.bounds import check_trace
 from daq.traces.naming import part_path
 from daq.traces.recording import Recording
 from daq.traces.writer import ROWS_A_CHUNK
@@ -18,9 +19,10 @@ from daq.traces.writer import ROWS_A_CHUNK
 def write_trace(trace: Trace, path: Path) -> Path:
     """Write `trace` to a new file at `path`, so that it is there whole or not at all. Returns `path`.
 
-    Raises TraceError when the file exists or cannot be written.
+    Raises TraceError when the file exists or cannot be written, or no reader would take the trace.
     """
     path = Path(path)
+    check_trace(trace, f"trace {trace.record.trace_id}")
     part = part_path(path)
     if path.exists():
         raise TraceError(f"{path}: exists already; a trace is never written over")

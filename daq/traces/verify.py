@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from mcap.exceptions import McapError
-from mcap.reader import make_reader
 from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import TraceError
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
-from daq.traces.reader import trace_of
+from daq.traces.reader import TOO_LARGE, trace_of
 from daq.traces.scan import Scan, scan
 
 Level = Literal["error", "warning", "note"]
@@ -52,24 +51,29 @@ class Verification(BaseModel):
         return all(finding.level != "error" for finding in self.findings)
 
 
-def verify(path: Path) -> Verification:
+def verify(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Verification:
     """Check everything about a trace file that the file itself allows to check; never uses the cache.
 
-    Raises TraceError only when the file cannot be read from the disk.
+    Raises TraceError only when the file cannot be read from the disk, or is larger than is read or fits into memory.
     """
     path = Path(path)
     try:
-        data = path.read_bytes()
+        with disk.open_regular(path) as stream:
+            data = disk.read_at_most(stream, limits.file_bytes, str(path))
+        return Verification(path=path, findings=tuple(_findings(path, data, limits)))
     except OSError as error:
         raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
-    return Verification(path=path, findings=tuple(_findings(path, data)))
+    except MemoryError as error:
+        raise TraceError(f"{path}: {TOO_LARGE}") from error
 
 
-def _findings(path: Path, data: bytes) -> Iterator[Finding]:
+def _findings(path: Path, data: bytes, limits: TraceLimits) -> Iterator[Finding]:
     try:
-        found = scan(data, str(path))
+        found = scan(data, str(path), limits)
         yield from _file(path, data, found)
-        trace = trace_of(found, str(path))
+        if path.name.endswith(layout.PART_SUFFIX):
+            found.metadata.pop(layout.END_METADATA, None)
+        trace = trace_of(found, str(path), limits)
     except TraceError as error:
         yield Finding(level="error", check="trace", message=str(error))
         return
@@ -85,16 +89,10 @@ def _file(path: Path, data: bytes, found: Scan) -> Iterator[Finding]:
         level: Level = "warning" if path.name.endswith(layout.PART_SUFFIX) else "error"
         yield Finding(level=level, check="file", message=message)
         return
-    try:
-        with path.open("rb") as stream:
-            summary = make_reader(stream, validate_crcs=True).get_summary()
-    except (McapError, ValueError) as error:
-        yield Finding(level="error", check="index", message=f"the index cannot be read: {error}")
-        return
-    if summary is None or summary.statistics is None:
+    if found.chunks_indexed is None:
         yield Finding(level="warning", check="index", message="has no index: other tools open it slowly")
-    elif summary.statistics.chunk_count != len(found.chunks):
-        message = f"the index names {summary.statistics.chunk_count} chunks, the file has {len(found.chunks)}"
+    elif found.chunks_indexed != len(found.chunks):
+        message = f"the index names {found.chunks_indexed} chunks, the file has {len(found.chunks)}"
         yield Finding(level="error", check="index", message=message)
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-
-from starlette.requests import HTTPConnection
+from typing import TYPE_CHECKING
 
 from daq.contracts.service.queue import Role
 from server.problems import ProblemError
+
+if TYPE_CHECKING:
+    from starlette.requests import HTTPConnection
 
 
 @dataclass(frozen=True)

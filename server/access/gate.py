@@ -7,11 +7,13 @@ import logging
 import re
 import secrets
 import time
+from collections import Counter
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from urllib.parse import parse_qs
 
+from sqlalchemy.exc import DatabaseError
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -24,13 +26,16 @@ from server.access.limits import LARGEST_BODY, Buckets, counted
 from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_known_name, is_this_computers_user
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
-from server.problems import ProblemError, response
+from server.access.turns import Turns
+from server.problems import ProblemError, of_database, response
 
 STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
 """The one address whose POST no limit of requests holds up."""
 UPLOADS = re.compile(r"/api/v1/robots/[^/]+/(traces|models)")
 """Addresses whose POST takes a file, and counts its bytes itself."""
-NOT_ALLOWED = 1008
+NOT_ALLOWED, TRY_LATER = 1008, 1013
+MOST_SOCKETS = 100
+"""WebSockets of one caller, of the 500 connections that there are for all."""
 LOOK_EVERY = 1.0
 """s between two looks at whether the token of whoever holds a WebSocket has been revoked."""
 log = logging.getLogger("server.access")
@@ -52,6 +57,9 @@ class Gate:
     stop_port: int | None = None
     observed: Callable[[str, int, float], None] = lambda _method, _status, _seconds: None
     buckets: Buckets = field(default_factory=Buckets)
+    sockets: Counter[str] = field(default_factory=Counter)
+    """WebSockets that are open, by the caller's name."""
+    turns: Turns = field(default_factory=Turns)
 
     def middleware(self, app: ASGIApp) -> ASGIApp:
         """`app` behind this gate."""
@@ -91,7 +99,15 @@ class Gate:
             except ProblemError as problem:
                 await response(Request(scope), problem)(scope, receive, secured)
                 return
-            await app(scope, receive if _is_post(scope, UPLOADS) else counted(receive, LARGEST_BODY), secured)
+            except DatabaseError as error:  # of whoever is not known by heart
+                await response(Request(scope), of_database(error))(scope, receive, secured)
+                return
+            state["turn"] = turn = await self.turns.taken(scope, secured)
+            try:
+                body = receive if _is_post(scope, UPLOADS) else counted(receive, LARGEST_BODY)
+                await app(scope, body, turn.send)
+            finally:
+                turn.end()
         finally:
             seconds = time.perf_counter() - begun
             self.observed(scope["method"], status, seconds)
@@ -108,6 +124,21 @@ class Gate:
             await WebSocketClose(NOT_ALLOWED, problem.detail)(scope, receive, send)
             return
         caller = state["caller"]
+        name = caller.name if caller else ""
+        if self.sockets[name] >= MOST_SOCKETS:
+            log.warning("refused a WebSocket: %s has %s open", name, MOST_SOCKETS)
+            await WebSocketClose(TRY_LATER, "too many sockets are open")(scope, receive, send)
+            return
+        self.sockets[name] += 1
+        try:
+            await self._open_socket(app, caller, scope, receive, send)
+        finally:
+            self.sockets[name] -= 1
+            self.sockets += Counter()  # forgets names that have none
+
+    async def _open_socket(
+        self, app: ASGIApp, caller: Caller | None, scope: Scope, receive: Receive, send: Send
+    ) -> None:
         if caller is None or caller.token is None:
             await app(scope, receive, send)
         elif not await self._while_let_in(caller, app(scope, receive, send)):
@@ -154,10 +185,11 @@ class Gate:
         kind, _, token = headers.get("authorization", "").partition(" ")
         if token and kind.lower() == "bearer":
             known, caller = self.tokens.remembered(token.strip())
+            if caller is None and not self.tokens.was_known(token.strip()) and not _is_post(scope, STOP):
+                self._count(None, scope)  # before the database is asked
             if not known:
                 caller = await asyncio.to_thread(self.tokens.look_up, token.strip())
             if caller is None:
-                self._count(None, scope)
                 line = "this token is not known, or was revoked"
                 raise ProblemError(401, "token-unknown", line, "`daq token ls` lists tokens by name", (), _BEARER)
             return caller

@@ -4,19 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 from urllib.parse import urlsplit
 
 from server.access.caller import LOCAL, Caller
 from server.access.origin import is_known_name, is_this_computers_user, name_of
-from server.access.tokens import KnownTokens
 from server.problems import ProblemError
+
+
+class Tokens(Protocol):
+    """Whose a token is."""
+
+    def remembered(self, token: str) -> tuple[bool, Caller | None]:
+        """Whether that is known without asking the database; and whose it is."""
+        ...
+
+    def look_up(self, token: str) -> Caller | None:
+        """Whose it is, from the database; None for one that opens nothing."""
+        ...
 
 
 @dataclass(frozen=True)
 class StopGate:
     """Lets in whoever may see the robot. `service_port`: where the page comes from that may stop it, too."""
 
-    tokens: KnownTokens
+    tokens: Tokens
     open_on_loopback: bool
     names: tuple[str, ...]
     service_port: int

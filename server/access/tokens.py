@@ -6,7 +6,8 @@ They have 256 random bits, so a plain hash is enough: there is nothing to guess,
 from __future__ import annotations
 
 import asyncio
-import hashlib
+import logging
+import math
 import secrets
 import threading
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from daq.contracts.errors import SpecError
 from daq.contracts.service.queue import Role
 from server.access.caller import Caller
+from server.access.digest import digest_of
 from server.clock import Clock
 from server.store.engine import Store
 from server.store.tables import TokenRow
@@ -26,7 +28,10 @@ PREFIX = "daq_"
 """So that a token that was published by mistake is recognised."""
 REMEMBERED_FOR = 2.0
 """s after which a token is looked up again: one that was revoked is refused then."""
-MOST_REMEMBERED = 1000
+UNKNOWN_FOR = 0.2
+"""s after which the database is asked again for a token that it did not have: one made meanwhile opens what it should,
+and whoever tries tokens has the database asked five times a second at most."""
+log = logging.getLogger("server.access")
 
 
 @dataclass(frozen=True)
@@ -37,11 +42,6 @@ class TokenInfo:
     role: Role
     created: datetime
     revoked: datetime | None
-
-
-def digest_of(token: str) -> str:
-    """What is kept of a token."""
-    return hashlib.sha256(token.encode()).hexdigest()
 
 
 class TokenStore:
@@ -74,28 +74,42 @@ class TokenStore:
             rows = session.scalars(select(TokenRow).order_by(TokenRow.created))
             return [TokenInfo(row.name, _role(row.role), row.created, row.revoked) for row in rows]
 
-    def caller(self, digest: str) -> Caller | None:
-        """Whose token this is; None for one that is not known, or revoked."""
+    def callers(self) -> dict[str, Caller]:
+        """Whose each token is that was not revoked, by its digest."""
         with self._store.reading() as session:
-            row = session.scalar(select(TokenRow).filter_by(digest=digest, revoked=None))
-            return None if row is None else Caller(row.name, _role(row.role), digest)
+            rows = session.scalars(select(TokenRow).filter_by(revoked=None))
+            return {row.digest: Caller(row.name, _role(row.role), row.digest) for row in rows}
+
+
+@dataclass(frozen=True)
+class _Known:
+    """Every token that opens something, by digest, as the database had them at a moment (s, monotonic)."""
+
+    callers: dict[str, Caller]
+    at: float
 
 
 class KnownTokens:
-    """Tokens looked up lately, so that not every request asks the database. Safe to use from any thread."""
+    """The tokens there are, read now and then, so that the database is asked seldom, however many tokens are tried.
+    Safe to use from any thread."""
 
     def __init__(self, tokens: TokenStore, clock: Clock) -> None:
         self._tokens = tokens
         self._clock = clock
-        self._lock = threading.Lock()
-        self._known: dict[str, tuple[Caller | None, float]] = {}
+        self._reading = threading.Lock()
+        self._known = _Known({}, -math.inf)
 
     def remembered(self, token: str) -> tuple[bool, Caller | None]:
-        """Whether it was looked up lately, and whose it is."""
+        """Whether it is known lately whose it is, or that it is nobody's; and whose."""
         return self._remembered(digest_of(token))
 
+    def was_known(self, token: str) -> bool:
+        """Whether it opened something when the database was asked last, however long ago."""
+        return digest_of(token) in self._known.callers
+
     def look_up(self, token: str) -> Caller | None:
-        """Whose it is, from the database."""
+        """Whose it is, from the database. Where that cannot be read, from what it said last: nobody can have revoked
+        anything meanwhile, and whoever could stop the robot still can. Raises SQLAlchemyError where it never said."""
         return self._look_up(digest_of(token))
 
     async def still_let_in(self, caller: Caller) -> bool:
@@ -111,19 +125,27 @@ class KnownTokens:
         return found == caller
 
     def _remembered(self, digest: str) -> tuple[bool, Caller | None]:
-        with self._lock:
-            found = self._known.get(digest)
-        if found is None or found[1] <= self._clock.monotonic():
-            return False, None
-        return True, found[0]
+        known, age = self._known, self._age()
+        if age < REMEMBERED_FOR and digest in known.callers:
+            return True, known.callers[digest]
+        return age < UNKNOWN_FOR, None
 
     def _look_up(self, digest: str) -> Caller | None:
-        caller = self._tokens.caller(digest)
-        with self._lock:
-            if len(self._known) >= MOST_REMEMBERED:
-                self._known.clear()
-            self._known[digest] = (caller, self._clock.monotonic() + REMEMBERED_FOR)
-        return caller
+        with self._reading:
+            known, caller = self._remembered(digest)  # somebody else may have asked meanwhile
+            if known:
+                return caller
+            try:
+                self._known = _Known(self._tokens.callers(), self._clock.monotonic())
+            except SQLAlchemyError as error:
+                if self._known.at == -math.inf:
+                    raise
+                log.warning("tokens cannot be read, the last ones that were are taken: %s", error)
+                self._known = _Known(self._known.callers, self._clock.monotonic())
+            return self._known.callers.get(digest)
+
+    def _age(self) -> float:
+        return self._clock.monotonic() - self._known.at
 
 
 def _role(text: str) -> Role:

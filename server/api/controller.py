@@ -47,18 +47,30 @@ def get_process(one: RobotPart, _: Viewer) -> ProcessState:
 
 @router.put("/process/outputs/{output}")
 def set_output(
-    output: OutputNumber, request: OutputRequest, one: RobotPart, _: Operator, lease: LeaseHeader = None
+    output: OutputNumber,
+    request: OutputRequest,
+    one: RobotPart,
+    found: ServicesPart,
+    who: Operator,
+    lease: LeaseHeader = None,
 ) -> ProcessState:
-    """Switches one process output, 0 to 7."""
+    """Switches one process output, 0 to 7. A stopped arm's is not switched, unless `while_stopped`."""
     one.require_motion(lease)
-    return _process(answer_of(one.robot, WriteOutput, output=output, on=request.on))
+    switched = {"output": output, "on": request.on, "while_stopped": request.while_stopped}
+    state = _process(answer_of(one.robot, WriteOutput, **switched))
+    found.tell(one.robot.name, "process", f"output {output} switched {'on' if request.on else 'off'}", actor=who.name)
+    return state
 
 
 @router.put("/gripper")
-def set_gripper(request: GripperRequest, one: RobotPart, _: Operator, lease: LeaseHeader = None) -> ProcessState:
-    """Closes or opens the gripper."""
+def set_gripper(
+    request: GripperRequest, one: RobotPart, found: ServicesPart, who: Operator, lease: LeaseHeader = None
+) -> ProcessState:
+    """Closes or opens the gripper. A stopped arm's is not moved, unless `while_stopped`: a stop lets it hold."""
     one.require_motion(lease)
-    return _process(answer_of(one.robot, MoveGripper, closed=request.closed))
+    state = _process(answer_of(one.robot, MoveGripper, closed=request.closed, while_stopped=request.while_stopped))
+    found.tell(one.robot.name, "process", f"gripper {'closed' if request.closed else 'opened'}", actor=who.name)
+    return state
 
 
 def _process(answer: Answer) -> ProcessState:

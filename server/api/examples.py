@@ -69,6 +69,7 @@ from daq.teaching import Program
 from daq.teaching.program import Absolute, Gripper, Wait
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement
 from model.comparison.difference import ParameterDifference
+from model.machine_model.model import base_model
 from server.jobs.results import ComparisonData, ComparisonJobResult, Overlay
 
 NOON = datetime(2026, 3, 2, 12, 0, tzinfo=UTC)
@@ -191,13 +192,15 @@ def _models() -> list[BaseModel]:
         traces=(TRACE,),
     )  # fmt: skip
     parameter = ModelParameter(name="joint2.coulomb", unit="N·m", value=0.41, low=0.0, high=5.0, deviation=0.2)
-    fit = FitRequest(traces=(TRACE,), effects=(EffectChoice(name="coulomb", joints=(2, 3)),), name="with friction")
+    fit = FitRequest(
+        traces=(TRACE,), effects=(EffectChoice(name="coulomb_friction", joints=(2, 3)),), name="with friction"
+    )
     job = Job(
         id=JOB, robot=ROBOT, request=fit, state="running", submitted=NOON, submitted_by="anna", started=NOON,
         progress=0.35, progress_text="12 evaluations",
     )  # fmt: skip
     effect = KnownEffect(
-        name="coulomb", family="friction", title="Coulomb friction", physics="τ = τ_c sign(q̇)", joints=(),
+        name="coulomb_friction", family="friction", title="Coulomb friction", physics="τ = τ_c sign(q̇)", joints=(),
         whole_machine=False,
     )  # fmt: skip
     return [
@@ -219,7 +222,7 @@ def _models() -> list[BaseModel]:
 def _comparison() -> ComparisonJobResult:
     joint = JointAgreement(joint=1, unit="rad", rmse=0.004, largest=0.011, floor=0.001, count=0.0046, share=0.0008)
     agreement = ModelAgreement(
-        label=f"with friction ({MODEL})", model=MODEL, effects=("coulomb",),
+        label=f"with friction ({MODEL})", model=MODEL, effects=("coulomb_friction",),
         traces=(TraceAgreement(trace=TRACE, held_out=None, samples=158, joints=(joint,)),), in_sample=(joint,),
         held_out=None,
     )  # fmt: skip
@@ -254,9 +257,12 @@ def examples() -> dict[str, Any]:
     return {type(one).__name__: one.model_dump(mode="json") for one in every}
 
 
-UNTYPED: dict[str, Any] = {
-    "get_spec_schema": {"title": "ExperimentSpec", "type": "object", "properties": {}},
-    "upload_model": {"version": 1, "machine": {"name": "ma2000"}, "effects": [], "values": {}},
-    "download_model": {"version": 1, "machine": {"name": "ma2000"}, "effects": [], "values": {}},
-}
-"""Of operations whose bodies have no schema of their own."""
+@cache
+def untyped() -> dict[str, Any]:
+    """Of operations whose bodies have no schema of their own, by their names."""
+    model = base_model(load_machine("ma2000")).model_dump(mode="json")
+    return {
+        "get_spec_schema": {"title": "ExperimentSpec", "type": "object", "properties": {}},
+        "upload_model": model,
+        "download_model": model,
+    }

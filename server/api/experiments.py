@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
@@ -15,21 +14,22 @@ from daq.contracts.service.experiments import (
     ExperimentChange,
     ExperimentRequest,
     ExperimentState,
-    MotionMark,
     MotionPreview,
-    MotionViolation,
 )
-from daq.safety import Violation, check_plan
-from daq.trajectories import Plan, plan, start_angles
-from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
+from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Turn, Viewer
+from server.bounded.messages import WorkOutMotion
+from server.bounded.motion import worked_out
+from server.bounded.workers import ExhaustedError
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
-from server.queue.length import LONGEST, least_length
+from server.queue.length import LONGEST, least_length, points_of
 from server.queue.room import require_room
-from server.services import RobotServices
+from server.services import RobotServices, Services
 
 MOST_SHOWN = 5000
 """Set points of a preview; of a longer motion every second, third, … is shown."""
+SHORT, FEW_POINTS = 60.0, 5000
+"""s, and set points that are given one by one, of a motion that takes a moment to work out."""
 router = APIRouter(prefix="/robots/{robot}/experiments", tags=["experiments"], responses=PROBLEMS)
 StateFilter = Annotated[list[ExperimentState] | None, Query(description="Only those in one of these states.")]
 
@@ -41,6 +41,7 @@ def submit_experiment(
     found: ServicesPart,
     who: Operator,
     response: Response,
+    _turn: Turn,
     idempotency_key: IdempotencyKey = None,
 ) -> Experiment:
     """Puts an experiment into the queue. It is checked now, and again when it is run: 422 names what is wrong.
@@ -49,7 +50,7 @@ def submit_experiment(
     """
     experiment, new = found.experiments.made_before(one.robot.name, request, idempotency_key), False
     if experiment is None:  # what was accepted once stays so, whatever the disk says by now
-        require_possible(one, request.spec)
+        require_possible(found, one, request.spec)
         require_room(one.catalogue.folder)
         experiment, new = one.queue.submit(request, who.name, idempotency_key)
     response.status_code = 201 if new else 200
@@ -73,21 +74,11 @@ async def list_experiments(
 
 
 @router.post("/preview")
-def preview_experiment(request: ExperimentRequest, one: RobotPart, _: Viewer) -> MotionPreview:
+def preview_experiment(
+    request: ExperimentRequest, one: RobotPart, found: ServicesPart, _: Viewer, _turn: Turn
+) -> MotionPreview:
     """The motion of an experiment and everything that speaks against it. Nothing is queued, nothing moves."""
-    motion, machine = _planned(one, request.spec), one.robot.machine
-    violations = check_plan(motion, machine, machine.limits)
-    every = max(1, math.ceil(len(motion) / MOST_SHOWN))
-    return MotionPreview(
-        time=tuple(index * motion.period for index in range(0, len(motion), every)),
-        set_points=tuple(map(tuple, motion.angles[::every].tolist())),
-        moving=motion.moving,
-        duration=motion.duration,
-        violations=tuple(_told(violation) for violation in violations),
-        marks=tuple(
-            MotionMark(time=mark.index * motion.period, kind=mark.kind, message=mark.message) for mark in motion.marks
-        ),
-    )
+    return _worked_out(found, one, request.spec, MOST_SHOWN)
 
 
 @router.get("/{experiment}")
@@ -121,29 +112,29 @@ def cancel_experiment(experiment: Identity, one: RobotPart, who: Operator) -> Ex
     return one.queue.cancel(experiment, who.name)
 
 
-def _planned(one: RobotServices, spec: ExperimentSpec) -> Plan:
-    """Raises SpecError, and a 422 for what is too long to be planned."""
+def _worked_out(found: Services, one: RobotServices, spec: ExperimentSpec, most_shown: int) -> MotionPreview:
+    """A short motion here, a long one by a process that holds up nobody. Raises SpecError, and a 422 for what is too
+    long to be planned."""
     length = least_length(spec)
     if length > LONGEST:
         line = f"spec: takes {length / 3600:.1f} h, allowed are {LONGEST / 3600:g} h"
         raise ProblemError(422, "beyond-limits", line, "make a schedule of shorter ones")
-    return plan(spec, one.robot.machine, start_angles(spec, one.robot.machine))
+    order = WorkOutMotion(spec=spec, machine=one.robot.machine, most_shown=most_shown)
+    if length <= SHORT and spec.repeats == 1 and points_of(spec) <= FEW_POINTS:
+        return worked_out(order)
+    try:
+        answer = found.motions.ask(order)
+    except ExhaustedError as error:
+        raise ProblemError(422, "beyond-limits", f"spec: {error}", "make it shorter") from error
+    if answer.problem:
+        raise ProblemError(422, "beyond-limits" if answer.exhausted else "not-valid", answer.problem, "correct it")
+    return MotionPreview.model_validate(answer.data)
 
 
-def _told(violation: Violation) -> MotionViolation:
-    """JSON knows no infinity."""
-    value, limit = (number if math.isfinite(number) else None for number in (violation.value, violation.limit))
-    return MotionViolation(
-        rule=violation.rule, joint=violation.joint, time=violation.time, value=value, limit=limit,
-        message=violation.message,
-    )  # fmt: skip
-
-
-def require_possible(one: RobotServices, spec: ExperimentSpec) -> None:
+def require_possible(found: Services, one: RobotServices, spec: ExperimentSpec) -> None:
     """Raises SpecError, and a 422 for a motion beyond the limits."""
-    motion, machine = _planned(one, spec), one.robot.machine
-    violations = check_plan(motion, machine, machine.limits)
+    violations = _worked_out(found, one, spec, 1).violations
     if violations:
         more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""
-        line = f"spec.trajectory: {violations[0]}{more}"
+        line = f"spec.trajectory: {violations[0].message}{more}"
         raise ProblemError(422, "beyond-limits", line, "POST …/experiments/preview shows the motion and its violations")

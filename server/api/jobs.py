@@ -24,7 +24,7 @@ from daq.contracts.service.jobs import (
     ModelNumber,
     ModelParameter,
 )
-from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
+from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Turn, Viewer
 from server.jobs.desk import REPORT, RESULT
 from server.jobs.effects import known_effects
 from server.jobs.models import LARGEST_MODEL
@@ -47,6 +47,7 @@ def submit_job(
     one: RobotPart,
     who: Operator,
     response: Response,
+    _turn: Turn,
     idempotency_key: IdempotencyKey = None,
 ) -> Job:
     """Begins a computation as soon as a worker is free. The same Idempotency-Key gives the same job (200)."""
@@ -130,7 +131,11 @@ def list_models(
     openapi_extra={"requestBody": {"required": True, "content": _JSON_FILE}},
 )
 async def upload_model(
-    request: Request, one: RobotPart, found: ServicesPart, who: Operator, name: Annotated[ModelName, Query()]
+    request: Request,
+    one: RobotPart,
+    found: ServicesPart,
+    who: Operator,
+    name: Annotated[ModelName, Query()],
 ) -> ModelEntry:
     """Takes in a model from elsewhere: a file as `daq fit` writes it. Effects of a user's own are refused."""
     text = bytearray()
@@ -138,17 +143,18 @@ async def upload_model(
         text += piece
         if len(text) > LARGEST_MODEL:
             raise ProblemError(413, "too-large", f"a model may have {LARGEST_MODEL >> 20} MB", "send less")
-    return await run_in_threadpool(_taken_in, bytes(text), name, one, found, who.name)
+    async with found.lanes.turn(who.name):
+        return await run_in_threadpool(_taken_in, bytes(text), name, one, found, who.name)
 
 
 @router.get("/models/machine/parameters", tags=["models"])
-def list_machine_parameters(one: RobotPart, _: Viewer) -> tuple[ModelParameter, ...]:
+def list_machine_parameters(one: RobotPart, _: Viewer, _turn: Turn) -> tuple[ModelParameter, ...]:
     """Parameters of the model that the machine file describes: `machine` in requests."""
     return one.models.machine_parameters()
 
 
 @router.get("/lineage", tags=["models"])
-def get_lineage(one: RobotPart, found: ServicesPart, _: Viewer) -> ModelLineage:
+def get_lineage(one: RobotPart, found: ServicesPart, _: Viewer, _turn: Turn) -> ModelLineage:
     """Where the models come from, and the jobs between them; of very many the newest."""
     jobs = found.jobs.page(one.robot.name, (), None, None, MOST_OF_A_LINEAGE).items
     return ModelLineage(
@@ -166,7 +172,7 @@ def list_effects(one: RobotPart, _: Viewer) -> tuple[KnownEffect, ...]:
 
 
 @router.get("/models/{model}", tags=["models"])
-def get_model(model: Identity, one: RobotPart, _: Viewer) -> ModelDetails:
+def get_model(model: Identity, one: RobotPart, _: Viewer, _turn: Turn) -> ModelDetails:
     """One model: its effects, its parameters, the models that it comes from."""
     return one.models.details(model)
 

@@ -6,6 +6,7 @@ to a thread and back, which under load costs more than most answers.
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
 from datetime import UTC, datetime
 from typing import Annotated
 
@@ -52,6 +53,21 @@ async def _operator(connection: HTTPConnection) -> Caller:
     return require_operator(connection)
 
 
+async def _turn(connection: HTTPConnection) -> AsyncIterator[None]:
+    let_others_ask(connection)
+    async with services(connection).lanes.turn(require_viewer(connection).name):
+        yield
+
+
+def let_others_ask(connection: HTTPConnection) -> None:
+    """Ends the turn of a plain question, which this is not: it waits among those of its caller."""
+    turn = getattr(connection.state, "turn", None)
+    if turn is not None:
+        turn.end()
+
+
+Turn = Annotated[None, Depends(_turn, scope="function")]
+"""Of routes that cost much: a caller has a few of them at once. It ends before the answer is sent."""
 Viewer = Annotated[Caller, Depends(_viewer)]
 Operator = Annotated[Caller, Depends(_operator)]
 

@@ -76,6 +76,8 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
     _met("post .*/models$", 422, "not-a-model", "the body is not JSON", "send a file as `daq fit` writes it"),
     _met(".*", 429, "too-many", "too many requests", "ask less often"),
     _met(".*", 503, "database", "the database: database is locked", "try again"),
+    _met("post .*/(traces|experiments|experiments/preview|schedules|gain)$", 503, "ending", "the service ends",
+         "ask again when it is back"),
     _met("get .*/system$|post .*/(experiments|gain)$", 503, "traces-away",
          "the folder of traces, /srv/traces: No such file or directory", "bring its disk back, then ask again"),
     _met(f"{MOVES}|get .*/(gains|process)$|post .*/(connect|reset)$", 503, "not-reached",

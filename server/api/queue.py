@@ -8,7 +8,7 @@ from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Experiment, Schedule, ScheduleChange, ScheduleRequest
 from daq.contracts.service.queue import Control, ControlLease, ControlRequest, QueueResume, QueueStatus
 from server.api.experiments import require_possible
-from server.api.parts import CursorOf, Identity, LeaseHeader, Limit, Operator, RobotPart, ServicesPart, Viewer
+from server.api.parts import CursorOf, Identity, LeaseHeader, Limit, Operator, RobotPart, ServicesPart, Turn, Viewer
 from server.problems import PROBLEMS, ProblemError
 
 router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
@@ -21,7 +21,7 @@ async def get_queue(one: RobotPart, _: Viewer) -> QueueStatus:
 
 
 @router.get("/queue/experiments", tags=["queue"])
-def list_queue(one: RobotPart, found: ServicesPart, _: Viewer) -> tuple[Experiment, ...]:
+def list_queue(one: RobotPart, found: ServicesPart, _: Viewer, _turn: Turn) -> tuple[Experiment, ...]:
     """What waits, in the order in which it will be run."""
     return tuple(found.experiments.in_order(one.robot.name))
 
@@ -52,9 +52,11 @@ def attend_queue(one: RobotPart, _: Operator) -> QueueStatus:
 
 
 @router.post("/schedules", tags=["queue"], status_code=201)
-def create_schedule(request: ScheduleRequest, one: RobotPart, found: ServicesPart, who: Operator) -> Schedule:
+def create_schedule(
+    request: ScheduleRequest, one: RobotPart, found: ServicesPart, who: Operator, _turn: Turn
+) -> Schedule:
     """An experiment to be run every so often. It is checked now, and again before every run."""
-    require_possible(one, request.spec)
+    require_possible(found, one, request.spec)
     made = found.schedules.create(one.robot.name, request, found.clock.utc(), who.name)
     found.tell(one.robot.name, "schedule", f"schedule {made.id}: every {made.every:g} s", actor=who.name)
     one.queue.wake()
@@ -103,7 +105,7 @@ async def get_control(one: RobotPart, _: Viewer) -> Control:
 
 @router.post("/control", tags=["control"], status_code=201)
 def take_control(request: ControlRequest, one: RobotPart, found: ServicesPart, who: Operator) -> ControlLease:
-    """The control of the robot, for one client. It lapses without a heartbeat, and the arm holds then."""
+    """The control of the robot, for one client. It lapses without a heartbeat: the arm holds, the queue is paused."""
     identity = one.robot.identity
     if identity is not None and not identity.simulated and not request.moves_real_arm:
         line = f"{one.robot.place.url} is a real arm: it moves only with the operator's word"
@@ -121,7 +123,10 @@ def renew_control(one: RobotPart, _: Operator, lease: LeaseHeader = None) -> Con
 
 @router.delete("/control", tags=["control"], status_code=204)
 def give_control_back(one: RobotPart, found: ServicesPart, who: Operator, lease: LeaseHeader = None) -> Response:
-    """Gives the control back; what this client was moving holds. A program that still runs is stopped."""
+    """Gives the control back; what this client was moving holds. A program that still runs is stopped.
+
+    Where experiments wait the queue is paused by it: what waits begins when somebody resumes the queue.
+    """
     one.control.give_back(lease or "")
     one.teaching.hold()
     one.teaching.finish()

@@ -21,7 +21,7 @@ from daq.teaching import Program
 from daq.teaching.program import Absolute, Instruction, Relative
 from daq.traces.reader import read_trace
 from server.api.experiments import submit_experiment
-from server.api.parts import IdempotencyKey, Identity, LeaseHeader, Operator, RobotPart, ServicesPart, Viewer
+from server.api.parts import IdempotencyKey, Identity, LeaseHeader, Operator, RobotPart, ServicesPart, Turn, Viewer
 from server.problems import PROBLEMS
 
 router = APIRouter(prefix="/robots/{robot}", tags=["teaching"], responses=PROBLEMS)
@@ -98,6 +98,7 @@ def calibrate_gain(
     found: ServicesPart,
     who: Operator,
     response: Response,
+    _turn: Turn,
     idempotency_key: IdempotencyKey = None,
 ) -> Experiment:
     """Queues the experiment that shows the actual proportional gain; GET …/traces/{trace}/gain tells it afterwards.
@@ -105,13 +106,13 @@ def calibrate_gain(
     It is checked as any other, and the same Idempotency-Key gives the same experiment (200).
     """
     spec = gain_experiment(tuple(sorted(set(request.joints))))
-    return submit_experiment(ExperimentRequest(spec=spec), one, found, who, response, idempotency_key)
+    return submit_experiment(ExperimentRequest(spec=spec), one, found, who, response, None, idempotency_key)
 
 
 @router.get("/traces/{trace}/gain")
-def get_measured_gain(trace: Identity, one: RobotPart, _: Viewer) -> tuple[MeasuredGain, ...]:
+def get_measured_gain(trace: Identity, one: RobotPart, _: Viewer, _turn: Turn) -> tuple[MeasuredGain, ...]:
     """The actual proportional gains that a trace shows."""
-    read = read_trace(one.catalogue.path_of(trace))
+    read = read_trace(one.catalogue.path_of(trace), one.catalogue.limits)
     fields = MeasuredGain.model_fields
     return tuple(
         MeasuredGain.model_validate({name: value for name, value in found.as_data().items() if name in fields})

@@ -22,7 +22,7 @@ from daq.contracts.trace import Outcome
 from daq.traces.csv_table import export_csv
 from daq.traces.reader import read_trace
 from daq.traces.summary import joint_figures
-from server.api.parts import CursorOf, Identity, Limit, Operator, RobotPart, ServicesPart, Viewer
+from server.api.parts import CursorOf, Identity, Limit, Operator, RobotPart, ServicesPart, Turn, Viewer, let_others_ask
 from server.catalogue.thinning import thinned
 from server.catalogue.upload import store_upload
 from server.problems import PROBLEMS, TITLES
@@ -42,9 +42,10 @@ _BINARY = {"schema": {"type": "string", "format": "binary"}}
 
 @router.get("")
 async def list_traces(
+    connection: Request,
     one: RobotPart,
     found: ServicesPart,
-    _: Viewer,
+    who: Viewer,
     q: Text = None,
     tag: Annotated[str | None, Query(max_length=40)] = None,
     source: Source | None = None,
@@ -57,7 +58,11 @@ async def list_traces(
 ) -> Page[CatalogueEntry]:
     """Traces, the newest first."""
     search = TraceSearch(q, tag, source, outcome, kind, since, until)
-    return await found.traces.page.told(one.robot.name, search, cursor, limit)
+    if q is None:
+        return await found.traces.page.told(one.robot.name, search, cursor, limit)
+    let_others_ask(connection)
+    async with found.lanes.turn(who.name):
+        return await found.traces.page.told(one.robot.name, search, cursor, limit)
 
 
 @router.post(
@@ -72,10 +77,10 @@ async def upload_trace(request: Request, one: RobotPart, found: ServicesPart, wh
 
 
 @router.get("/{trace}")
-def get_trace(trace: Identity, one: RobotPart, found: ServicesPart, _: Viewer) -> TraceDetails:
+def get_trace(trace: Identity, one: RobotPart, found: ServicesPart, _: Viewer, _turn: Turn) -> TraceDetails:
     """What one trace says about itself, its figures and events."""
     entry = found.traces.get(one.robot.name, trace)
-    read = read_trace(one.catalogue.path_of(trace))
+    read = read_trace(one.catalogue.path_of(trace), one.catalogue.limits)
     return TraceDetails(
         entry=entry,
         record=read.record,
@@ -109,20 +114,26 @@ def download_trace(trace: Identity, one: RobotPart, _: Viewer) -> FileResponse:
 
 
 @router.get("/{trace}/data.csv", response_class=FileResponse, responses={200: {"content": {CSV: _BINARY}}})
-def download_trace_as_csv(trace: Identity, one: RobotPart, _: Viewer) -> FileResponse:
+def download_trace_as_csv(trace: Identity, one: RobotPart, _: Viewer, _turn: Turn) -> FileResponse:
     """Time and signals as plain CSV, in s, rad and V."""
     path = one.catalogue.path_of(trace)
     folder = tempfile.TemporaryDirectory(prefix="daq-csv-")
-    made = export_csv(read_trace(path), Path(folder.name) / f"{path.stem}.csv")
+    made = export_csv(read_trace(path, one.catalogue.limits), Path(folder.name) / f"{path.stem}.csv")
     return FileResponse(made, media_type=CSV, filename=made.name, background=BackgroundTask(folder.cleanup))
 
 
 @router.get("/{trace}/data.json")
 def get_trace_signals(
-    trace: Identity, one: RobotPart, _: Viewer, points: Points = 2000, start: Seconds = None, end: Seconds = None
+    trace: Identity,
+    one: RobotPart,
+    _: Viewer,
+    _turn: Turn,
+    points: Points = 2000,
+    start: Seconds = None,
+    end: Seconds = None,
 ) -> TraceSignals:
     """Signals for a plot, thinned to about `points` between `start` and `end`; no peak is lost."""
-    read = read_trace(one.catalogue.path_of(trace))
+    read = read_trace(one.catalogue.path_of(trace), one.catalogue.limits)
     few = thinned(read, points, start, end)
     columns = {name: None if s is None else tuple(map(tuple, s.T.tolist())) for name, s in few.signals.items()}
     return TraceSignals(

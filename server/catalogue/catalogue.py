@@ -6,6 +6,7 @@ import logging
 import threading
 from pathlib import Path
 
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
 from daq.traces.catalogue import TraceSummary, summary_of
 from daq.traces.salvage import salvage_folder
@@ -19,18 +20,26 @@ log = logging.getLogger("server.catalogue")
 class Catalogue:
     """One folder and its table. Safe to use from any thread."""
 
-    def __init__(self, folder: Path, robot: str, traces: TraceStore, experiments: ExperimentStore) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        robot: str,
+        traces: TraceStore,
+        experiments: ExperimentStore,
+        limits: TraceLimits = DEFAULT_TRACE_LIMITS,
+    ) -> None:
         self.folder = folder
         self._robot = robot
         self._traces = traces
         self._experiments = experiments
         self._lock = threading.Lock()
+        self.limits = limits
 
     def bring_up_to_date(self) -> int:
         """Finishes what a crash left, and takes in every file that the table does not know. Returns how many."""
         self.folder.mkdir(parents=True, exist_ok=True)
         with self._lock:
-            for salvaged in salvage_folder(self.folder):
+            for salvaged in salvage_folder(self.folder, self.limits):
                 if salvaged.problem:
                     log.warning("salvage: %s", salvaged.problem)
                 else:
@@ -46,9 +55,10 @@ class Catalogue:
         with self._lock:
             return summary.trace_id if (summary := self._summary(path)) and self._insert(path, summary) else None
 
-    def move_in(self, source: Path, target: Path) -> bool:
-        """Takes in a finished file from elsewhere on this disk, as `target` of the folder; False, and nothing is
-        changed, when a trace of this number is there. Raises a 409 when a file of this name is."""
+    def move_in(self, source: Path, target: Path, summary: TraceSummary) -> bool:
+        """Takes in a finished file from elsewhere on this disk, as `target` of the folder, which says `summary` about
+        itself; False, and nothing is changed, when a trace of this number is there. Raises a 409 when a file of this
+        name is."""
         with self._lock:  # whoever else looks into the folder finds both file and row, or neither
             if target.exists():
                 advice = "it is the same trace: nothing needs to be done"
@@ -56,7 +66,7 @@ class Catalogue:
             disk.rename(source, target)
             taken = False
             try:
-                taken = self._take_in(target)
+                taken = self._insert(target, summary)
             finally:
                 if not taken:
                     target.unlink()
@@ -90,7 +100,7 @@ class Catalogue:
 
     def _summary(self, path: Path) -> TraceSummary | None:
         try:
-            summary = summary_of(path)
+            summary = summary_of(path, self.limits)
         except FileNotFoundError:
             return None
         if summary.state != "finished" or summary.trace_id is None:

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from daq.contracts.errors import DaqError
 from daq.contracts.service.live import JogCommand, LiveRequest, RefusedMessage, ThinnedMessage
 from server.access.caller import Caller
+from server.access.limits import Bucket
 from server.live.hub import Client
 from server.live.outbox import Outbox
 from server.problems import ProblemError, field_of
@@ -21,6 +22,9 @@ from server.services import RobotServices
 BASE_RATE = 50
 WAITING_MESSAGES = 64
 """Messages of a client that may wait to be carried out: what holds a key sends ten a second (an assumption)."""
+MESSAGES_A_SECOND, MESSAGES_AT_ONCE = 100.0, 500.0
+"""Messages of a client in the long run, and in one go; one that sends more is sent away."""
+NOT_ALLOWED = 1008
 TOO_SLOW = 1013
 """Close code: try again later."""
 GOING_AWAY = 1001
@@ -83,9 +87,15 @@ async def _send(socket: WebSocket, one: RobotServices, client: Client) -> None:
 async def _receive(socket: WebSocket, one: RobotServices, client: Client, heard: asyncio.Queue[Heard]) -> None:
     """Waits for nothing but the client: the moment of a message is that of its arrival, whatever the one before it
     waits for."""
+    clock = one.robot.clock
+    room = Bucket(MESSAGES_A_SECOND, MESSAGES_AT_ONCE, MESSAGES_AT_ONCE, clock.monotonic())
     while True:
         message = await socket.receive()
         if message["type"] == "websocket.disconnect":
+            return
+        if room.take(clock.monotonic()) > 0:
+            log.warning("live client %s sends too many messages and was sent away", client.name)
+            await socket.close(NOT_ALLOWED, f"more than {MESSAGES_A_SECOND:g} messages a second")
             return
         try:
             heard.put_nowait((message.get("text"), one.robot.clock.monotonic()))

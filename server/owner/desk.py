@@ -71,8 +71,8 @@ class Desk:
         """A line for whoever teaches."""
         self.speaker.say(Told(text=line))
 
-    def tell_arm(self) -> None:
-        """The arm's state, when it has changed, or nobody has been told for a second."""
+    def tell_arm(self, *, anew: bool = False) -> None:
+        """The arm's state, when it has changed, or nobody has been told for a second; or `anew` in any case."""
         arm, ended = self.control.arm, self.ended()
         # Also before the board has confirmed it:
         stopping = ended is not None and arm.connected and arm.state is not State.FAULT
@@ -85,7 +85,7 @@ class Desk:
             link=self.controller.link.state.value,
             counters=counters,
         )
-        if report != self._told or self._due():
+        if anew or report != self._told or self._due():
             self._told, self._told_at = report, time.monotonic()
             self.speaker.say(report)
 

@@ -6,7 +6,7 @@ import time
 
 from daq.acquisition.guardian import EndCause
 from daq.acquisition.messages import Finished
-from daq.contracts.errors import DaqError, SafetyError
+from daq.contracts.errors import DaqError, ReachError, SafetyError
 from daq.contracts.limp import limp_line
 from daq.contracts.sample import SampleRow
 from daq.runner import Arrangement, Consent, Outside, StoppedError, run_experiment
@@ -15,11 +15,29 @@ from daq.teaching.jog import top_speed
 from daq.teaching.performer import FollowingPerformer
 from firmware_protocol.errors import ProtocolError
 from server.owner.desk import Desk
-from server.owner.messages import Answer, JogBegin, JogDrive, LeadBegin, Quick, RunExperiment, RunProgram
+from server.owner.messages import (
+    BEGINS_WITHIN,
+    Answer,
+    JogBegin,
+    JogDrive,
+    LeadBegin,
+    Long,
+    Quick,
+    RunExperiment,
+    RunProgram,
+)
 from server.owner.quick_orders import carry_out
 
 EXIT_WRONG_INPUT = 2
 EXIT_CODES = {"complete": 0, "fault": 5, "interrupted": 5, "stopped": 6}
+
+
+def require_in_time(order: Long) -> None:
+    """Raises ReachError for an order that comes so late that an arm which begins now would surprise."""
+    waited = time.monotonic() - order.asked
+    if waited > BEGINS_WITHIN:
+        line = f"the robot's process came to it after {waited:.1f} s, {BEGINS_WITHIN:g} s are allowed"
+        raise ReachError(f"{order.activity}: {line}; nothing moved")
 
 
 def run(desk: Desk, order: RunExperiment) -> Answer:

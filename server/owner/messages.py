@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, TypeAdapter
 
 from daq.acquisition.messages import EventHappened, Finished, Progress
 from daq.contracts.experiment import ExperimentSpec, Gain
@@ -16,6 +16,10 @@ from daq.teaching import Program
 
 WAITS_AT_MOST = 2.0
 """s after which a quick order is not carried out any more: less than its asker waits for the answer (an assumption)."""
+
+
+BEGINS_WITHIN = 5.0
+"""s after which an order that moves the arm is not begun any more: its process was put aside, say, and goes on now."""
 
 
 class _Message(BaseModel):
@@ -51,17 +55,23 @@ class _QuickRequest(_Request):
     asked: float
 
 
-class RunExperiment(_Request):
+class _LongRequest(_Request):
+    """As a quick one: one that has waited longer than BEGINS_WITHIN moves nothing, since nobody expects it any more."""
+
+    asked: float
+
+
+class RunExperiment(_LongRequest):
     """Runs an experiment; answered when its trace is closed."""
 
     activity: ClassVar[Activity] = "experiment"
     kind: Literal["run"] = "run"
     spec: ExperimentSpec
     trace_id: str
-    moves_real_arm: bool
+    moves_real_arm: StrictBool
 
 
-class JogBegin(_Request):
+class JogBegin(_LongRequest):
     """Jogging until `Finish`; answered at its end."""
 
     activity: ClassVar[Activity] = "jog"
@@ -77,7 +87,7 @@ class JogDrive(_Message):
     said: float
 
 
-class RunProgram(_Request):
+class RunProgram(_LongRequest):
     """Carries out a taught program, or the one instruction of a step; answered at its end."""
 
     kind: Literal["program"] = "program"
@@ -85,7 +95,7 @@ class RunProgram(_Request):
     program: Program
 
 
-class LeadBegin(_Request):
+class LeadBegin(_LongRequest):
     """Joints are led by hand until `Finish`; answered with the recorded path."""
 
     activity: ClassVar[Activity] = "lead"
@@ -125,25 +135,27 @@ class ReadProcess(_QuickRequest):
 
 
 class WriteOutput(_QuickRequest):
-    """One process output, 0 to 7."""
+    """One process output, 0 to 7. Refused while the arm is stopped, unless `while_stopped`."""
 
     kind: Literal["write_output"] = "write_output"
     output: int
-    on: bool
+    on: StrictBool
+    while_stopped: StrictBool = False
 
 
 class MoveGripper(_QuickRequest):
-    """Closes or opens the gripper."""
+    """Closes or opens the gripper. Refused while the arm is stopped, unless `while_stopped`."""
 
     kind: Literal["gripper"] = "gripper"
-    closed: bool
+    closed: StrictBool
+    while_stopped: StrictBool = False
 
 
 class Reset(_QuickRequest):
     """The explicit end of a stop."""
 
     kind: Literal["reset"] = "reset"
-    here: bool
+    here: StrictBool
 
 
 class Close(_Message):

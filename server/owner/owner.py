@@ -76,12 +76,15 @@ def _watch(desk: Desk, last: int | None) -> int:
 def _carry_out(desk: Desk, order: Long | Quick) -> None:
     if isinstance(order, Quick):
         answer = long_orders.answered_quickly(desk, order)
-        desk.tell_arm()  # before the answer: who has heard of a reset may resume the queue at once
+        # Before the answer, since who has heard of a reset may resume the queue at once; and also where it looks as it
+        # did when it was told last: the service may have noted a stop since, which this process never came to tell.
+        desk.tell_arm(anew=True)
         desk.speaker.ended(answer)
         return
     try:
         if _is_away(desk):
             raise ReachError(_being_tried(desk))
+        long_orders.require_in_time(order)
         desk.activity = order.activity
         desk.tell_arm()  # at once: what cannot be done meanwhile is refused by the service
         answer = _moved(desk, order)

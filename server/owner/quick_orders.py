@@ -6,6 +6,7 @@ import time
 
 from daq.contracts.errors import DaqError, ReachError, SafetyError
 from daq.contracts.limp import limp_line, require_no_jump
+from daq.runner import StoppedError
 from daq.safety import Event, State
 from server.owner.desk import Desk
 from server.owner.messages import (
@@ -45,9 +46,11 @@ def carry_out(desk: Desk, order: Quick) -> dict[str, object]:
         case ReadProcess():
             return _process(desk)
         case WriteOutput():
+            _require_not_stopped(desk, order)
             desk.controller.write_outputs(1 << order.output, order.on << order.output)
             return _process(desk)
         case MoveGripper():
+            _require_not_stopped(desk, order)
             desk.controller.set_gripper(closed=order.closed)
             return _process(desk)
         case Reset():
@@ -61,6 +64,13 @@ def _write_gains(desk: Desk, order: WriteGains) -> dict[str, object]:
         desk.machine.joint(joint)
         desk.controller.set_gains(joint, *gain)
     return {"gains": desk.read_gains()}
+
+
+def _require_not_stopped(desk: Desk, order: WriteOutput | MoveGripper) -> None:
+    """Raises StoppedError: after a stop nothing is switched but by somebody who says that they know of it."""
+    cause = desk.ended() or desk.control.halted
+    if cause is not None and not order.while_stopped:
+        raise StoppedError(f"the arm has been stopped ({cause}): nothing was switched; while_stopped switches it still")
 
 
 def _process(desk: Desk) -> dict[str, object]:

@@ -15,6 +15,7 @@ from server.owner.messages import Answer, ArmReport, HaltRun, RunExperiment
 from server.problems import ProblemError, conflict
 from server.queue.due_runs import DueRuns
 from server.queue.endings import Ending, ending_of
+from server.queue.notices import Notices
 from server.queue.order import next_due
 from server.queue.parts import QueueParts
 from server.queue.readiness import Circumstances, what_is_missing, why_held
@@ -60,8 +61,8 @@ class QueueDesk:
         self._attended_until: float | None = None
         self._running: Running | None = None
         self._waiting_for = ""
-        self._noticed = ""
-        """Why the queue is to be held: a stop or a fault that was heard of, and that nobody has answered for yet."""
+        self.notices = Notices()
+        """Why the queue is to be held, which nobody has answered for yet. Call `wake` after adding to them."""
         self._written = True
         """Whether the database knows the state."""
         self._ended: Ended | None = None
@@ -114,10 +115,10 @@ class QueueDesk:
     def resume(self, by: str, *, moves_real_arm: bool) -> None:
         """The operator's word that the queue may move the arm. Raises a 409 while the arm is stopped or at fault."""
         with self._lock:
-            self._noticed = ""  # what came before; a stop that is heard of from now on holds the queue again
+            self.notices.take()  # what came before; what is heard of from now on holds the queue again
             arm = self._parts.robot.arm
             if arm is not None and (held := why_held(arm)):
-                self._noticed = held
+                self.notices.note(held)
                 line = f"the arm is {arm.arm}: {arm.cause}"
                 raise conflict("arm-stopped", line, "look at the arm, reset it, then resume the queue")
             state = QueueState(False, f"resumed by {by}", self._parts.clock.utc())
@@ -130,13 +131,34 @@ class QueueDesk:
 
     def attend(self) -> None:
         """An operator says to be there, for a minute more. No lock: the event loop calls this, and may not wait."""
+        self._notice_absence()  # one who comes back too late does not make up for it
         self._attended_until = self._parts.clock.monotonic() + ATTENDANCE
         self.wake()
 
     def hear(self, arm: ArmReport) -> None:
-        """What the arm's owner says: a stop or a fault holds the queue, whatever waits in it. Must not wait."""
-        if held := why_held(arm):
-            self._noticed = held
+        """What the arm's owner says: a stop, a fault or a lost link holds the queue, whatever waits. Must not wait."""
+        self.notices.arm_reported(arm)
+        self.wake()
+
+    def control_lapsed(self, name: str) -> None:
+        """A client that had the control went silent: the queue is held. Must not wait."""
+        self.notices.control_lapsed(name)
+        self.wake()
+
+    def control_given_back(self, name: str) -> None:
+        """A client gave the control back: what waits does not begin by that. Must not wait."""
+        self.notices.control_given_back(name, self._count_waiting())
+        self.wake()
+
+    def connection_made(self) -> None:
+        """The robot is connected: what waits does not begin by that. Must not wait."""
+        self.notices.connection_made(self._count_waiting())
+        self.wake()
+
+    def connection_ended(self, why: str) -> None:
+        """The robot is not connected any more. The operator's word was for the arm that was there. Must not wait."""
+        if self.notices.connection_ended(why):
+            self._consent = False
         self.wake()
 
     def wake(self) -> None:
@@ -158,7 +180,10 @@ class QueueDesk:
 
     def status(self) -> QueueStatus:
         """Now. Waits for nothing, neither for a disk nor for whoever holds the queue: the event loop asks this."""
-        running, state, waiting_for, until = self._running, self._state, self._waiting_for, self._attended_until
+        running, waiting_for, until = self._running, self._waiting_for, self._attended_until
+        state = self._state
+        if not state.paused and (held := self.notices.reason):  # it is held from this moment on, and written down soon
+            state = QueueState(True, held, self._parts.clock.utc())
         left = None if until is None else until - self._parts.clock.monotonic()
         needs_attendance = left is not None and left > 0 and self._needs_attendance()
         attended = self._parts.clock.utc() + timedelta(seconds=left) if needs_attendance and left is not None else None
@@ -166,17 +191,21 @@ class QueueDesk:
             paused=state.paused,
             reason=state.reason,
             since=state.since,
-            queued=self._parts.experiments.count_waiting(self._parts.robot.name),
+            queued=self._count_waiting(),
             running=None if running is None else running.id,
             waiting_for="" if state.paused or running is not None else waiting_for,
             attended_until=attended,
         )
 
-    def close(self, patience: float) -> None:
-        """Lets nothing begin any more, and waits for what the robot's owner says about what ran."""
+    def take_no_more(self) -> None:
+        """Lets nothing begin any more. What is heard of from now on is the service's own end, and holds nothing."""
         with self._lock:
             self._closing = True
         self._changed.set()
+
+    def close(self, patience: float) -> None:
+        """Lets nothing begin any more, and waits for what the robot's owner says about what ran."""
+        self.take_no_more()
         if self._worker.is_alive():
             self._worker.join(patience)
 
@@ -214,6 +243,9 @@ class QueueDesk:
             self._parts.queues.set(self._parts.robot.name, self._state)
             self._written = True
 
+    def _count_waiting(self) -> int:
+        return self._parts.experiments.count_waiting(self._parts.robot.name)
+
     def _needs_attendance(self) -> bool:
         identity = self._parts.robot.identity
         return identity is not None and not identity.simulated and not self._parts.unattended
@@ -238,10 +270,10 @@ class QueueDesk:
             self._changed.wait(LOOK_EVERY)
 
     def _settle(self) -> None:
-        """A stop that was heard of holds the queue, and what could not be written is written before anything begins."""
+        """What was noticed holds the queue, and what could not be written is written before anything begins."""
+        self._notice_absence()
         with self._lock:
-            if (reason := self._noticed) and not self._closing:
-                self._noticed = ""  # only now: one that is heard of in this moment stays
+            if not self._closing and (reason := self.notices.take()):
                 self.pause(reason)
             self._write_state()
             self._write_end()
@@ -250,7 +282,8 @@ class QueueDesk:
         """The next experiment, with the control of the robot; None when none may begin now."""
         parts = self._parts
         with self._lock:
-            following = next_due(parts.experiments.waiting(parts.robot.name), parts.clock.utc())
+            now = parts.clock.utc()
+            following = next_due(parts.experiments.due(parts.robot.name, now), now)
             if following is None:
                 self._waiting_for = ""
                 return None
@@ -259,6 +292,10 @@ class QueueDesk:
                 return None
             if not parts.control.take_for_queue(following.id):
                 self._waiting_for = "a client has the control of the robot"
+                return None
+            if self.notices.reason:  # a control that has just ended, say: the queue is held first
+                parts.control.give_back_for_queue()
+                self.wake()
                 return None
             self._running = Running(following.id)  # before it leaves those that wait: the queue never looks empty
             try:
@@ -272,11 +309,21 @@ class QueueDesk:
 
     def _what_is_missing(self) -> str:
         robot = self._parts.robot
+        if robot.arm is not None:
+            self.notices.arm_reported(robot.arm)  # what this decision is made from has been noticed before it
         attended = self._attended() or not self._needs_attendance()
         missing = what_is_missing(Circumstances(robot.identity, robot.arm, robot.problem, self._consent, attended))
         if missing is not None and missing.pause:
             self.pause(missing.pause)
         return "" if missing is None else missing.line
+
+    def _notice_absence(self) -> None:
+        """An operator who had said to be there, and says so no more, holds the queue: also while nothing waits."""
+        until = self._attended_until
+        if until is not None and not self._attended():
+            self._attended_until = None
+            if self._needs_attendance():
+                self.notices.operator_left()
 
     def _attended(self) -> bool:
         return self._attended_until is not None and self._parts.clock.monotonic() < self._attended_until
@@ -337,6 +384,7 @@ class QueueDesk:
                 return Ending(Event.STOPPED, "cancelled before it moved")
             answer = running.answer = parts.robot.ask(
                 RunExperiment,
+                asked=parts.clock.monotonic(),
                 spec=experiment.spec,
                 trace_id=parts.experiments.trace_number(experiment.id),
                 moves_real_arm=self._consent,

@@ -27,6 +27,16 @@ def least_length(spec: ExperimentSpec) -> float:
     return spec.repeats * (spec.settle + _of(spec.trajectory) + spec.hold)
 
 
+def points_of(spec: ExperimentSpec) -> int:
+    """Set points, or segments, that the specification itself has."""
+    match spec.trajectory:
+        case Path() as path:
+            return len(path.times)
+        case Sequence() as sequence:
+            return len(sequence.segments)
+    return 0
+
+
 def _of(trajectory: Trajectory) -> float:
     length = 0.0
     match trajectory:

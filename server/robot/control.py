@@ -37,11 +37,22 @@ class Lease:
 
 
 class ControlDesk:
-    """Gives the control of one robot out. `lapsed` is called, on a thread of its own, when a lease ends by silence."""
+    """Gives the control of one robot out.
 
-    def __init__(self, clock: Clock, lapsed: Callable[[str], None]) -> None:
+    lapsed:     called with the holder's name when a lease ends by silence, on a thread of the desk's own or of the next
+                client
+    given_back: called with it when the holder gives the control back
+    The queue gets the control only after these have returned.
+    """
+
+    def __init__(
+        self, clock: Clock, lapsed: Callable[[str], None], given_back: Callable[[str], None] = lambda _name: None
+    ) -> None:
         self._clock = clock
         self._lapsed = lapsed
+        self._given_back = given_back
+        self._endings = 0
+        """Leases that have ended, and whose end is still being told."""
         self._changed = threading.Condition()
         self._lease: Lease | None = None
         self._queue: str | None = None
@@ -61,10 +72,11 @@ class ControlDesk:
                 line = f"{self._lease.name} has the control, for {left:.0f} s more unless it is renewed"
                 raise conflict("control-held", line, "ask for it again when it is given back")
             silent, self._lease = self._lease, Lease(secrets.token_urlsafe(24), name, now + LEASE_TIME, moves_real_arm)
+            self._endings += silent is not None
             self._changed.notify_all()
             told = self._told(self._lease, now)
         if silent is not None:  # it lapsed in this very moment, and nobody has said so yet
-            self._say_lapsed(silent.name)
+            self._tell_end(self._lapsed, silent.name)
         return told
 
     def renew(self, secret: str) -> ControlLease:
@@ -79,9 +91,11 @@ class ControlDesk:
     def give_back(self, secret: str) -> None:
         """Ends the lease. Raises a 409 when it is not this client's."""
         with self._changed:
-            self._require(secret, self._clock.monotonic())
+            name = self._require(secret, self._clock.monotonic()).name
             self._lease = None
+            self._endings += 1
             self._changed.notify_all()
+        self._tell_end(self._given_back, name)
 
     def require(self, secret: str | None) -> Lease:
         """The lease that allows a motion now. Raises a 409 when there is none, or it is another's."""
@@ -99,10 +113,10 @@ class ControlDesk:
                 raise conflict("control-held", f"{self._lease.name} has the control", "wait until it is given back")
 
     def take_for_queue(self, experiment: str) -> bool:
-        """The queue's own control, for one experiment; False while a client has it, or has gone silent in this moment:
+        """The queue's own control, for one experiment; False while a client has it, or its end is still being told:
         what it was moving is told to hold first."""
         with self._changed:
-            if self._lease is not None:
+            if self._lease is not None or self._endings:
                 self._changed.notify_all()
                 return False
             self._queue = experiment
@@ -163,14 +177,18 @@ class ControlDesk:
                     continue
                 assert lease is not None
                 self._lease = None
-            self._say_lapsed(lease.name)
+                self._endings += 1
+            self._tell_end(self._lapsed, lease.name)
 
-    def _say_lapsed(self, name: str) -> None:
-        """Whoever hears of it may fail; the control goes on, and the next lapse is noticed too."""
+    def _tell_end(self, listener: Callable[[str], None], name: str) -> None:
+        """Whoever hears of it may fail; the control goes on, and the next end is told too."""
         try:
-            self._lapsed(name)
+            listener(name)
         except Exception:
-            log.exception("the control of %s has lapsed", name)
+            log.exception("the end of the control of %s", name)
+        finally:
+            with self._changed:
+                self._endings -= 1
 
 
 def _same(one: str, other: str | None) -> bool:

@@ -36,6 +36,7 @@ from server.owner.messages import (
     Told,
 )
 from server.robot.owner_process import OwnerProcess
+from server.stopping.arm import Reach
 
 OPEN_WITHIN = 60.0
 """s for a process to start, and a mock with its physics engine, on a busy computer."""
@@ -77,6 +78,8 @@ class Robot:
         self.clock = clock
         self.listeners: list[Callable[[Report], None]] = []
         self.disconnected: list[Callable[[str], None]] = []
+        self.reached: list[Callable[[Reach], None]] = []
+        """Called whenever it is reached in another way than before; they must not wait."""
         self.experiment: str | None = None
         """The experiment of the queue that runs now."""
         self.room_for_orders = threading.BoundedSemaphore(ORDERS_AT_ONCE)
@@ -161,6 +164,10 @@ class Robot:
             self.disconnect()
             raise ReachError(f"{self.place.url}: no greeting within {OPEN_WITHIN:g} s") from None
 
+    def reach(self) -> Reach:
+        """Where it can be stopped now."""
+        return Reach(self.name, self.place.url, self.owner_pid, self._terminal)
+
     def require_same_place(self) -> None:
         """Raises ReachError where its port has become another program's: nothing may be sent there."""
         port = parse_port_url(self.place.url)
@@ -211,6 +218,7 @@ class Robot:
         )
         try:
             self._owner = OwnerProcess(opening, self._heard, self._gone)
+            _tell_each(self.reached, self.reach())
         except OSError as error:  # no memory, or no file is left for another process
             self._problem = f"the robot's process cannot be started: {error.strerror or error}"
             raise ReachError(self._problem) from error
@@ -240,6 +248,7 @@ class Robot:
             self._terminal = terminal_at(port.device) if isinstance(port, SerialPort) else None
             assert self._opened is not None
             self._opened.set_result(identity)
+        _tell_each(self.reached, self.reach())
 
     def _cannot_open(self, report: CannotOpen) -> None:
         with self._lock:
@@ -256,6 +265,7 @@ class Robot:
                 self._problem = f"the connection has ended ({why})"
             if self._opened is not None and not self._opened.done():
                 self._opened.set_exception(ReachError(self._problem or f"the robot's process ended: {why}"))
+        _tell_each(self.reached, self.reach())
         _tell_each(self.disconnected, why)
 
 

@@ -108,7 +108,7 @@ class TeachingDesk:
             line = f"the arm is busy: {self._under_way[0]}"
             raise conflict("arm-busy", line, "wait for its end, or stop it")
         self._require_not_stopped()
-        asked = self._robot.ask(order, **fields)
+        asked = self._robot.ask(order, asked=self._robot.clock.monotonic(), **fields)
         self._result = self._problem = ""
         self._path = None
         self._under_way = (activity, asked)

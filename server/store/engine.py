@@ -15,10 +15,12 @@ from alembic import command
 from alembic.config import Config
 from sqlalchemy import Engine, create_engine, event, text
 from sqlalchemy.engine import make_url
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import DatabaseError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 
 from daq.contracts.errors import DaqError
+from server.store.damage import require_sound
+from server.store.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
 
 BUSY_TIMEOUT_MS = 5000
 """Another process (`daq token`, a backup) may hold the write lock for a moment."""
@@ -50,6 +52,9 @@ class Store:
         self._readers = sessionmaker(self.engine, expire_on_commit=False)
         self._writers = sessionmaker(self.engine.execution_options(writing=True), expire_on_commit=False)
         self._writing = threading.RLock()
+        self._last = threading.local()
+        """Of this thread: the statement that it sent last."""
+        event.listen(self.engine, "before_cursor_execute", self._note_statement)
         self.changes = 0
         """Transactions written so far: what was read before the last one may be out of date."""
 
@@ -62,23 +67,44 @@ class Store:
                 command.upgrade(config, "head")
                 connection.commit()
         except OperationalError as error:
-            raise StoreError(f"database {self.url}: cannot be opened: {error.orig}") from error
+            line = line_of(error)
+            raise StoreError(f"database {self.url}: cannot be opened: {line}; {advice_of(line)}") from error
+        except DatabaseError as error:
+            raise StoreError(f"database {self.url}: {line_of(error)}; {BRING_BACK}") from error
         except Exception as error:
-            raise StoreError(f"database {self.url}: its tables cannot be brought up to date: {error}") from error
+            line = f"database {self.url}: its tables cannot be brought up to date: {one_line(error)}"
+            raise StoreError(f"{line}; {BRING_BACK}") from error
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
-        """A session that changes nothing."""
-        with self._readers() as session:
+        """A session that changes nothing. Raises DamagedError for rows that nobody can have written."""
+        with self._told_of_damage(), self._readers() as session:
             yield session
 
     @contextmanager
     def writing(self) -> Iterator[Session]:
-        """A session whose changes are on the disk when it is left; all of them or none."""
+        """A session whose changes are on the disk when it is left; all of them or none. Raises DamagedError."""
         with self._writing:
-            with self._writers.begin() as session:
+            with self._told_of_damage(), self._writers.begin() as session:
                 yield session
             self.changes += 1
+
+    @contextmanager
+    def _told_of_damage(self) -> Iterator[None]:
+        """Within, what cannot be made of a row is told with its table: JSON, moments, states, numbers."""
+        self._last.statement = ""
+        try:
+            yield
+        except (ValueError, TypeError) as error:  # pydantic's and JSON's errors are ValueErrors
+            table = table_of(self._last.statement)
+            raise DamagedError(f"table {table}: a row cannot be read: {one_line(error)}; {BRING_BACK}") from error
+
+    def _note_statement(self, *told: Any) -> None:
+        self._last.statement = told[2]
+
+    def require_sound(self) -> None:
+        """Raises DamagedError where tables, columns or states are not those that this program writes."""
+        require_sound(self.engine, self.url)
 
     def require_writable(self) -> None:
         """Raises OperationalError where nothing could be written: the writer's lock is taken, and given back."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 
-from sqlalchemy import func, select
+from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
 
 from daq.contracts.experiment import ExperimentSpec
@@ -98,12 +98,14 @@ class ExperimentStore:
             query = query.where(ExperimentRow.schedule == schedule)
         return newest_first(self._store, query, ExperimentRow.sequence, cursor, limit, as_experiment)
 
-    def waiting(self, robot: str) -> list[Waiting]:
-        """All that are queued, in no order."""
+    def due(self, robot: str, now: datetime) -> list[Waiting]:
+        """The first of those that are queued and due: of 100 000 that wait one is read, and not all."""
         columns = (ExperimentRow.id, ExperimentRow.sequence, ExperimentRow.priority, ExperimentRow.at)
+        query = select(*columns).filter_by(robot=robot, state="queued")
+        query = query.where(or_(ExperimentRow.at.is_(None), ExperimentRow.at <= now))
+        query = query.order_by(ExperimentRow.priority.desc(), ExperimentRow.sequence).limit(1)
         with self._store.reading() as session:
-            found = session.execute(select(*columns).filter_by(robot=robot, state="queued"))
-            return [Waiting(*row) for row in found]
+            return [Waiting(*row) for row in session.execute(query)]
 
     def in_order(self, robot: str) -> list[Experiment]:
         """All that are queued, in the order in which they will be run."""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
+from tests.server.queue_bench import Bench
 from tests.server.service import Service, running_service
 
 
@@ -41,3 +43,11 @@ def service(shared_service: Service) -> Service:
     shared_service.robot.post("/queue/resume", json={})
     shared_service.seen.clear()
     return shared_service
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    """A queue that is not yet begun, and not paused."""
+    made = Bench(tmp_path)
+    yield made
+    made.close()

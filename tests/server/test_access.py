@@ -10,6 +10,9 @@ import httpx
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from sqlalchemy import text
+from sqlalchemy.event import listen
+from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import Message, Receive, Scope, Send
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
@@ -19,7 +22,7 @@ from server.access.gate import NOT_ALLOWED, Gate
 from server.access.limits import Bucket, Buckets
 from server.access.origin import is_from_elsewhere, is_known_name, is_loopback, is_this_computers_user
 from server.access.tickets import GOOD_FOR, Tickets
-from server.access.tokens import REMEMBERED_FOR, KnownTokens, TokenStore, digest_of
+from server.access.tokens import REMEMBERED_FOR, UNKNOWN_FOR, KnownTokens, TokenStore, digest_of
 from server.store.engine import Store
 from server.store.tables import TokenRow
 from tests.daq.cli.invoke import CommandLine
@@ -150,6 +153,38 @@ def test_a_token_is_kept_as_its_hash_and_a_revoked_one_opens_nothing(tmp_path: P
     store.close()
 
 
+def test_whoever_tries_tokens_has_the_database_asked_once(tmp_path: Path) -> None:
+    clock, store, asked = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}"), []
+    store.migrate()
+    tokens = TokenStore(store)
+    known = KnownTokens(tokens, clock)
+    listen(store.engine, "before_cursor_execute", lambda *told: asked.append(told[2]))
+    for number in range(50):
+        found, _ = known.remembered(f"daq_{number}")
+        assert found or known.look_up(f"daq_{number}") is None
+    assert sum("tokens" in statement for statement in asked) == 1
+    token = tokens.add("anna", "operator", clock.utc())
+    clock.turn(UNKNOWN_FOR)
+    assert known.look_up(token) == Caller("anna", "operator")
+    store.close()
+
+
+def test_who_was_known_still_is_while_the_database_cannot_be_read(tmp_path: Path) -> None:
+    clock, store = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
+    store.migrate()
+    tokens = TokenStore(store)
+    token = tokens.add("anna", "operator", clock.utc())
+    known, late = KnownTokens(tokens, clock), KnownTokens(tokens, clock)
+    assert known.look_up(token) == Caller("anna", "operator")
+    with store.writing() as session:
+        session.execute(text("DROP TABLE tokens"))
+    clock.turn(REMEMBERED_FOR)
+    assert known.look_up(token) == Caller("anna", "operator")
+    with pytest.raises(SQLAlchemyError):
+        late.look_up(token)
+    store.close()
+
+
 def test_a_ticket_of_a_revoked_token_and_who_watches_with_one_are_sent_away(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -162,8 +197,7 @@ def test_a_ticket_of_a_revoked_token_and_who_watches_with_one_are_sent_away(
 
     async def watches(_scope: Scope, _receive: Receive, send: Send) -> None:
         await send({"type": "websocket.accept"})
-        caller = await asyncio.to_thread(tokens.caller, digest_of(token))
-        assert caller is not None
+        caller = (await asyncio.to_thread(tokens.callers))[digest_of(token)]
         tickets.give(caller)
         await asyncio.to_thread(tokens.revoke, "anna", clock.utc())
         clock.turn(REMEMBERED_FOR)

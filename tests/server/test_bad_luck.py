@@ -180,6 +180,9 @@ def _disconnected(service: Service) -> None:
     answer = service.robot.get("/gains")
     assert (answer.status_code, answer.json()["type"]) == (503, "docs/service.md#not-reached")
     assert service.until_connected()["connection"] == "connected"
+    queue = service.robot.get("/queue").json()
+    assert (queue["paused"], queue["reason"].partition(" (")[0]) == (True, "the connection to the robot has ended")
+    assert service.robot.post("/queue/resume", json={}).status_code == 200
 
 
 # ---- the disk

@@ -12,6 +12,7 @@ from typing import NoReturn
 import pytest
 
 from daq.contracts.service.traces import TraceChange
+from daq.traces.catalogue import summary_of
 from daq.traces.csv_table import import_csv
 from daq.traces.naming import trace_path
 from daq.traces.store import write_trace
@@ -76,7 +77,7 @@ def test_a_trace_whose_file_is_gone_comes_back_with_a_file(shelf: Shelf, noticed
     if noticed:
         shelf.catalogue.bring_up_to_date()
     target = shelf.path if name is None else shelf.catalogue.folder / name
-    assert shelf.catalogue.move_in(shelf.copy, target)
+    assert shelf.catalogue.move_in(shelf.copy, target, summary_of(shelf.copy))
     found = shelf.traces.get(ROBOT, shelf.number)
     assert (found.file, found.missing, found.tags, found.notes) == (target.name, False, ("rig b",), "loose belt")
     assert shelf.catalogue.path_of(shelf.number) == target
@@ -84,9 +85,9 @@ def test_a_trace_whose_file_is_gone_comes_back_with_a_file(shelf: Shelf, noticed
 
 def test_a_trace_that_is_there_is_not_taken_in_again(shelf: Shelf) -> None:
     with pytest.raises(ProblemError, match="is there already"):
-        shelf.catalogue.move_in(shelf.copy, shelf.path)
+        shelf.catalogue.move_in(shelf.copy, shelf.path, summary_of(shelf.copy))
     other = shelf.catalogue.folder / "other.mcap"
-    assert not shelf.catalogue.move_in(shelf.copy, other)
+    assert not shelf.catalogue.move_in(shelf.copy, other, summary_of(shelf.copy))
     assert not other.exists()
     assert shelf.catalogue.path_of(shelf.number) == shelf.path
 

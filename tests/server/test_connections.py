@@ -11,7 +11,7 @@ import uvicorn
 from starlette.types import Receive, Scope, Send
 from uvicorn.server import ServerState
 
-from server.connections import Connection
+from server.connections import MOST_HEADERS, Connection
 
 MOST = 4
 
@@ -44,3 +44,43 @@ def test_a_crowd_that_asks_for_nothing_keeps_nobody_out_and_does_not_grow(monkey
         status, held = asyncio.run(asked(listener))
     assert status == 200
     assert held <= MOST
+
+
+def _head(headers: int = 0, *, address: int = 1, value: int = 1, end: bytes = b"\r\n") -> bytes:
+    lines = b"".join(b"x-%d: %s\r\n" % (number, b"v" * value) for number in range(headers))
+    return b"GET /%s HTTP/1.1\r\nhost: 127.0.0.1\r\n%s%s" % (b"a" * address, lines, end)
+
+
+@pytest.mark.parametrize(
+    ("sent", "status"),
+    [
+        (_head(50, value=100), 200),
+        (_head(300_000), 431),
+        (_head(40, value=1000), 431),
+        (_head(1, value=10 << 20, end=b""), 431),  # a header that never ends is told of by no parser
+        (_head(address=10_000), 414),
+        (_head(address=5 << 20), 414),
+        (b"GET /" + b"a" * (5 << 20), 414),
+        (b"POST / HTTP/1.1\r\nhost: a\r\ntransfer-encoding: chunked\r\n\r\n0\r\n" + b"x: y\r\n" * 1000, 431),
+        (_head() + _head(101), 431),
+    ],
+)
+def test_a_head_too_large_is_refused_before_anything_is_made_of_it(sent: bytes, status: int) -> None:
+    """The client reads its answer also where it has not been able to send all."""
+
+    async def answered(listener: socket.socket) -> bytes:
+        config, state = uvicorn.Config(_answer, lifespan="off", log_config=None), ServerState()
+        loop, address = asyncio.get_running_loop(), listener.getsockname()
+        server = await loop.create_server(lambda: Connection(config, state, {}), sock=listener)
+        reader, writer = await asyncio.open_connection(*address)
+        writer.write(sent)
+        answer = await asyncio.wait_for(reader.readline(), 60)
+        assert all(len(one.headers) <= MOST_HEADERS + 1 for one in state.connections if isinstance(one, Connection))
+        writer.transport.abort()
+        server.close()
+        while state.connections or state.tasks:
+            await asyncio.sleep(0)
+        return answer
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        assert int(asyncio.run(answered(listener)).split()[1]) == status

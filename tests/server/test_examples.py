@@ -8,16 +8,18 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import httpx
 import jsonschema_rs  # schemathesis's own: an opinion that is independent of pydantic's
 import pytest
 
 from server.api.problem_examples import PROBLEM_EXAMPLES
 from server.app import bare_app
+from tests.server.service import Service
 
 JSON = ("application/json", "application/problem+json")
 GUIDE = Path(__file__).parents[2].joinpath("docs", "service.md").read_text("utf-8")
-NO_ADDRESS = {"ticket-unknown", "no-such-method", "fault"}
-"""Of the WebSocket, of addresses that are none, of what never happens."""
+NO_ADDRESS = {"ticket-unknown", "no-such-method", "fault", "head-too-large"}
+"""Of the WebSocket, of addresses that are none, of what never happens, of requests whose address is not read."""
 
 
 @pytest.fixture(scope="module")
@@ -76,3 +78,45 @@ def test_an_example_of_a_problem_says_what_to_do() -> None:
     for example in PROBLEM_EXAMPLES:
         assert example.details.detail
         assert example.details.advice
+
+
+def test_the_service_takes_every_example_of_a_body(described: dict[str, Any], service: Service) -> None:
+    """What is named in one need not be there; whatever else speaks against it would make it a bad example."""
+    sent = 0
+    effects = {effect["name"] for effect in service.robot.get("/effects").json()}
+    for operation, part, content in _bodies(described):
+        for name, example in content["examples"].items() if part == "request" else ():
+            answer = _sent(service, operation, example["value"])
+            assert answer.status_code in (200, 201, 202, 404), (operation, name, answer.text)
+            if answer.status_code == 404:
+                assert "there is no " in answer.json()["detail"], (operation, name)
+            chosen = example["value"].get("effects") or ()
+            assert {one["name"] for one in chosen} <= effects, (operation, name)
+            sent += 1
+    assert sent >= 23
+
+
+def _sent(service: Service, operation: str, body: Any) -> httpx.Response:
+    """With the control of the arm, which afterwards is at rest."""
+    method, path = operation.split()
+    path = re.sub(r"\{\w+\}", "000000000000", path.replace("{robot}", "ma2000").replace("{output}", "3"))
+    assert service.robot.post("/queue/pause").status_code == 200  # nothing that is submitted runs
+    headers: dict[str, str] = {}
+    if not path.endswith("/control"):
+        headers["Control-Lease"] = service.robot.post("/control", json={}).json()["lease"]
+    query = {"name": "example"} if path.endswith("/models") else {}
+    answer = service.client.request(method, f"{service.url}{path}", json=body, headers=headers, params=query)
+    if answer.status_code == 202:
+        service.robot.post("/stop")
+        service.until_arm("stopped")
+        while service.status()["activity"] != "none":
+            assert service.process.poll() is None
+        assert service.robot.post("/reset", json={}, headers=headers).status_code == 200
+        service.until_arm("idle")
+    if path.endswith(("/experiments", "/gain")):
+        assert service.robot.post(f"/experiments/{answer.json()['id']}/cancel").status_code == 200
+    if path.endswith("/schedules"):
+        assert service.robot.delete(f"/schedules/{answer.json()['id']}").status_code == 204
+    lease = answer.json()["lease"] if path.endswith("/control") else headers["Control-Lease"]
+    assert service.robot.delete("/control", headers={"Control-Lease": lease}).status_code == 204
+    return answer

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from contextlib import ExitStack
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,8 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+from websockets.typing import Origin
 
 from server.access.caller import LOCAL
+from server.access.gate import MOST_SOCKETS
 from server.live.history import History
 from server.live.hub import Hub
 from server.live.outbox import DROP_AFTER, THIN_AFTER, THIN_BEYOND, Outbox
@@ -93,6 +97,39 @@ def test_what_is_not_understood_is_refused_in_one_line_and_the_stream_goes_on(se
         assert next(messages(socket, "refused")).detail.startswith("jog.velocities.9: ")
         socket.send('{"history":1}')
         assert next(messages(socket, "history"))
+
+
+def test_a_flood_of_messages_ends_its_own_stream_alone(service: Service) -> None:
+    with watching(service, subscribe=["robot"]) as other, watching(service, subscribe=["robot"]) as socket:
+        with pytest.raises(ConnectionClosed) as ended:  # noqa: PT012 - whichever of them meets the end
+            for _ in range(20_000):
+                socket.send("{}")
+            while True:
+                socket.recv(60)
+        assert ended.value.rcvd is not None
+        assert (ended.value.rcvd.code, "messages a second" in ended.value.rcvd.reason) == (1008, True)
+        other.send('{"history":1}')
+        assert next(messages(other, "history"))
+
+
+def test_a_crowd_of_sockets_leaves_room_for_everybody_else(service: Service) -> None:
+    url = f"{service.url.replace('http', 'ws', 1)}/api/v1/robots/ma2000/live"
+    with ExitStack() as opened:
+        for _ in range(MOST_SOCKETS):
+            opened.enter_context(connect(url, open_timeout=60, close_timeout=10))
+        with pytest.raises(InvalidStatus) as refused:
+            connect(url, open_timeout=60)
+        assert refused.value.response.status_code == 403
+        assert service.robot.post("/stop").json()["confirmed"]
+    service.robot.post("/reset", json={})
+
+
+@pytest.mark.parametrize("origin", ["http://attacker.example", "null", "http://127.0.0.1:1", "https://127.0.0.1"])
+def test_a_page_of_another_origin_watches_nothing(service: Service, origin: str) -> None:
+    url = f"{service.url.replace('http', 'ws', 1)}/api/v1/robots/ma2000/live"
+    with pytest.raises(InvalidStatus) as refused:
+        connect(url, origin=Origin(origin), open_timeout=60)
+    assert refused.value.response.status_code == 403
 
 
 def test_a_robot_that_is_not_there_is_no_stream(service: Service) -> None:

@@ -95,7 +95,7 @@ def test_process_signals_gains_and_gripper(service: Service) -> None:
         service.robot.delete("/control", headers=mine)
 
 
-def test_an_experiment_waits_while_a_client_has_the_control(service: Service) -> None:
+def test_an_experiment_waits_while_a_client_has_the_control_and_then_for_a_person(service: Service) -> None:
     mine = _lease(service)
     spec = {"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1], "settle": 0, "hold": 0}
     made = service.robot.post("/experiments", json={"spec": spec}).json()
@@ -103,4 +103,8 @@ def test_an_experiment_waits_while_a_client_has_the_control(service: Service) ->
         pass
     assert waiting_for == "a client has the control of the robot"
     service.robot.delete("/control", headers=mine)
+    queue = service.robot.get("/queue").json()
+    line = "local gave the control back while 1 experiment waited: look at the arm, then resume the queue"
+    assert (queue["paused"], queue["reason"]) == (True, line)
+    service.robot.post("/queue/resume", json={})
     assert service.end_of(made["id"])["state"] == "done"

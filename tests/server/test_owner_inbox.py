@@ -43,7 +43,7 @@ def _word_to_the_guardian(inbox: Inbox) -> bytes:
 
 
 def test_what_waited_behind_another_order_is_halted_like_the_first() -> None:
-    with inbox_told(JogBegin(number=1), LeadBegin(number=2, joints=(1,))) as (inbox, tell):
+    with inbox_told(JogBegin(number=1, asked=0.0), LeadBegin(number=2, asked=0.0, joints=(1,))) as (inbox, tell):
         first, second = inbox.take(WITHIN), inbox.take(WITHIN)
         assert first is not None
         assert second is not None
@@ -53,7 +53,7 @@ def test_what_waited_behind_another_order_is_halted_like_the_first() -> None:
 
 
 def test_the_loss_of_the_service_freezes_what_waited_behind_another_order() -> None:
-    with inbox_told(JogBegin(number=1), LeadBegin(number=2, joints=(1,))) as (inbox, _):
+    with inbox_told(JogBegin(number=1, asked=0.0), LeadBegin(number=2, asked=0.0, joints=(1,))) as (inbox, _):
         assert inbox.take(WITHIN) is not None
         assert inbox.take(WITHIN) is not None
         inbox.done()
@@ -62,7 +62,10 @@ def test_the_loss_of_the_service_freezes_what_waited_behind_another_order() -> N
 
 def test_an_order_that_waits_does_not_take_back_the_end_of_the_one_before() -> None:
     drive = JogDrive(velocities={1: 0.1}, said=5.0)
-    with inbox_told(JogBegin(number=1), drive, Finish(), LeadBegin(number=2, joints=(1,))) as (inbox, _):
+    with inbox_told(JogBegin(number=1, asked=0.0), drive, Finish(), LeadBegin(number=2, asked=0.0, joints=(1,))) as (
+        inbox,
+        _,
+    ):
         assert inbox.take(WITHIN) is not None
         assert inbox.take(WITHIN) is not None
         assert inbox.finish.is_set()
@@ -71,7 +74,10 @@ def test_an_order_that_waits_does_not_take_back_the_end_of_the_one_before() -> N
 
 def test_a_jog_command_that_was_overtaken_drives_nothing() -> None:
     hold, late = JogDrive(velocities={}, said=5.0), JogDrive(velocities={1: 0.1}, said=4.9)
-    with inbox_told(JogBegin(number=1), hold, late, LeadBegin(number=2, joints=(1,))) as (inbox, _):
+    with inbox_told(JogBegin(number=1, asked=0.0), hold, late, LeadBegin(number=2, asked=0.0, joints=(1,))) as (
+        inbox,
+        _,
+    ):
         assert inbox.take(WITHIN) is not None
         assert inbox.take(WITHIN) is not None
         assert inbox.drive() == hold

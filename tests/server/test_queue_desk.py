@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import shutil
 import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future
+from collections.abc import Callable
 from datetime import timedelta
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,124 +13,11 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
-from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.service.experiments import Experiment, ExperimentRequest, Schedule, ScheduleRequest
-from daq.contracts.service.robot import RobotIdentity
-from daq.contracts.trace import Outcome
-from server.owner.messages import Answer, ArmReport, Finished
+from daq.contracts.service.experiments import Experiment, ExperimentRequest
+from server.owner.messages import Answer
 from server.problems import ProblemError
-from server.queue.desk import QueueDesk
 from server.queue.due_runs import DueRuns
-from server.queue.parts import QueueParts
-from server.robot.control import ControlDesk
-from server.store.engine import Store
-from server.store.experiments import ExperimentStore
-from server.store.queues import QueueStore
-from server.store.schedules import ScheduleStore
-from tests.server.clocks import HandClock
-
-CALM = ArmReport(arm="idle", cause="", activity="none", limp=(), link="connected", counters={})
-MOCK = RobotIdentity(simulated=True, protocol=2, period=0.02, boots=1)
-REAL = MOCK.model_copy(update={"simulated": False})
-FULL = OperationalError("INSERT", {}, Exception("database or disk is full"))
-SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]})
-
-
-class Bench:
-    """A queue, its stores, an arm, and all events.
-
-    answer:   what the arm answers an experiment with; None while it moves
-    fails_at: the event whose listener fails, once
-    lost:     raised for a trace that is to be taken into the catalogue
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.store = Store(f"sqlite:///{folder / 'service.sqlite'}")
-        self.store.migrate()
-        self.experiments, self.schedules = ExperimentStore(self.store), ScheduleStore(self.store)
-        self.clock = HandClock()
-        self.answer: Answer | None = Answer(number=1, problem="refused", exit_code=2)
-        self.asked: Future[Answer] = Future()
-        self.moves = threading.Event()
-        self.fails_at = ""
-        self.lost: Exception | None = None
-        self.looked_for_traces = 0
-        self.orders: list[object] = []
-        self._heard = threading.Condition()
-        self.events: list[str] = []
-        self.control = ControlDesk(self.clock, lambda _holder: None)
-        self.robot: Any = SimpleNamespace(
-            name="ma2000", identity=MOCK, arm=CALM, problem="", experiment=None,
-            place=SimpleNamespace(folder=folder), ask=self._ask, tell=self.orders.append,
-        )  # fmt: skip
-        self.queues = QueueStore(self.store)
-        self.queue = self.begun_anew()
-
-    def begun_anew(self) -> QueueDesk:
-        """The queue as a service that begins now has it."""
-        parts = QueueParts(
-            robot=self.robot, control=self.control, experiments=self.experiments, schedules=self.schedules,
-            queues=self.queues, clock=self.clock, told=self._hear, recorded=self._record,
-            unfinished=self._look_for_traces, unattended=False,
-        )  # fmt: skip
-        return QueueDesk(parts)
-
-    def _ask(self, _order: object, **_fields: object) -> Future[Answer]:
-        self.asked = Future()
-        if self.answer is not None:
-            self.asked.set_result(self.answer)
-        self.moves.set()
-        return self.asked
-
-    def _record(self, _answer: Answer) -> None:
-        if self.lost is not None:
-            raise self.lost
-
-    def _look_for_traces(self) -> None:
-        self.looked_for_traces += 1
-
-    def _hear(self, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
-        del actor, experiment
-        with self._heard:
-            self.events.append(f"{kind}: {text}")
-            self._heard.notify_all()
-            if text == self.fails_at:
-                self.fails_at = ""
-                raise FULL
-
-    def until(self, said: Callable[[str], bool]) -> str:
-        """Waits for such an event; the test's own time limit ends the wait."""
-        with self._heard:
-            self._heard.wait_for(lambda: any(said(event) for event in self.events))
-            return next(event for event in self.events if said(event))
-
-    def submit(self) -> Experiment:
-        """An experiment that may run at once."""
-        return self.queue.submit(ExperimentRequest(spec=SPEC), "anna", None)[0]
-
-    def schedule(self, every: float = 3600) -> Schedule:
-        """One whose first run is due now, and then every hour."""
-        return self.schedules.create("ma2000", ScheduleRequest(spec=SPEC, every=every), self.clock.utc(), "anna")
-
-    def runs(self, schedule: Schedule) -> list[Experiment]:
-        """What it has submitted."""
-        return list(self.experiments.page("ma2000", (), schedule.id, None, 10).items)
-
-    def counted(self, schedule: Schedule) -> int:
-        """How many runs count as made."""
-        return self.schedules.get("ma2000", schedule.id).submitted_runs
-
-
-@pytest.fixture
-def bench(tmp_path: Path) -> Iterator[Bench]:
-    """Its queue not yet begun, and not paused."""
-    made = Bench(tmp_path)
-    yield made
-    if made.moves.is_set() and not made.asked.done():
-        made.asked.set_result(_done())
-    made.queue.close(10)
-    made.control.close()
-    made.store.close()
+from tests.server.queue_bench import CALM, FULL, REAL, SPEC, Bench, done
 
 
 def test_a_run_that_a_full_disk_refuses_is_not_counted_and_comes_when_there_is_room(
@@ -203,11 +88,6 @@ def test_events_and_the_queue_call_an_end_as_the_experiment_does(bench: Bench, e
     assert bench.queue.status().reason == expected
 
 
-def _done(outcome: Outcome = "complete") -> Answer:
-    finished = Finished(outcome=outcome, trace="x.mcap", samples=1, missing=0, counters={}, reason="")
-    return Answer(number=1, finished=finished)
-
-
 def _fails(times: int, otherwise: Callable[..., Any]) -> Callable[..., Any]:
     """What a full disk makes of `otherwise`, and of those who call it again."""
     left = [FULL] * times
@@ -243,7 +123,7 @@ def test_a_fault_before_the_arm_is_asked_ends_the_experiment_gives_the_control_b
 
 
 def test_a_trace_that_cannot_be_taken_in_holds_the_queue_and_is_looked_for(bench: Bench) -> None:
-    bench.answer, bench.lost = _done(), FULL
+    bench.answer, bench.lost = done(), FULL
     made, following = bench.submit(), bench.submit()
     bench.queue.start()
     bench.until(lambda event: event.startswith("queue: paused"))
@@ -258,7 +138,7 @@ def test_a_trace_that_cannot_be_taken_in_holds_the_queue_and_is_looked_for(bench
 def test_an_end_that_cannot_be_written_holds_the_queue_and_is_written_later(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bench.answer = _done()
+    bench.answer = done()
     monkeypatch.setattr(bench.experiments, "end", _fails(2, bench.experiments.end))
     made, following = bench.submit(), bench.submit()
     bench.queue.start()

@@ -14,6 +14,7 @@ import pytest
 from daq.contracts.errors import ReachError
 from daq.contracts.machine import load_machine
 from daq.contracts.service.robot import Activity
+from daq.runner import StoppedError
 from server.owner import long_orders
 from server.owner.messages import WAITS_AT_MOST, Answer, ArmReport, MoveGripper, Reset
 from server.problems import ProblemError
@@ -94,9 +95,26 @@ def _gripper_of(moved: list[bool]) -> SimpleNamespace:
     )
 
 
+def _desk(moved: list[bool], ended: str | None = None, halted: str | None = None) -> SimpleNamespace:
+    control = SimpleNamespace(halted=halted)
+    return SimpleNamespace(activity="none", controller=_gripper_of(moved), control=control, ended=lambda: ended)
+
+
+@pytest.mark.parametrize(("ended", "halted"), [("daq stop", None), (None, "following error")])
+def test_a_stopped_arms_gripper_is_moved_only_for_who_knows_of_the_stop(ended: str | None, halted: str | None) -> None:
+    moved: list[bool] = []
+    desk = cast(Any, _desk(moved, ended, halted))
+    order = MoveGripper(number=1, asked=time.monotonic(), closed=False)
+    refused = long_orders.answered_quickly(desk, order)
+    assert (refused.exit_code, moved) == (StoppedError.exit_code, [])
+    assert f"the arm has been stopped ({ended or halted}): nothing was switched" in refused.problem
+    assert long_orders.answered_quickly(desk, order.model_copy(update={"while_stopped": True})).problem == ""
+    assert moved == [False]
+
+
 def test_an_order_that_waited_too_long_is_never_carried_out() -> None:
     moved: list[bool] = []
-    desk = cast(Any, SimpleNamespace(activity="none", controller=_gripper_of(moved)))
+    desk = cast(Any, _desk(moved))
     stale = MoveGripper(number=1, asked=time.monotonic() - WAITS_AT_MOST - 0.1, closed=True)
     refused = long_orders.answered_quickly(desk, stale)
     assert (refused.exit_code, moved) == (ReachError.exit_code, [])

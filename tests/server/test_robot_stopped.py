@@ -36,8 +36,8 @@ def robot(monkeypatch: pytest.MonkeyPatch) -> Robot:
 def desk(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> Iterator[StopDesk]:
     """Whose stops are confirmed."""
     answer = StopAnswer(robot="ma2000", port="mock://", delivered=True, confirmed=True, tick=7, text="")
-    monkeypatch.setattr("server.robot.stop.request_stop", lambda *_: [SimpleNamespace(answer=answer)])
-    desk = StopDesk(robot, HandClock())
+    monkeypatch.setattr("server.stopping.arm.request_stop", lambda *_: [SimpleNamespace(answer=answer)])
+    desk = StopDesk(robot)
     yield desk
     desk.close()
 
@@ -69,8 +69,8 @@ def test_a_stop_that_finds_no_file_for_its_socket_says_that_it_was_not_delivered
     def no_socket(*_: object) -> NoReturn:
         raise OSError(24, "Too many open files")
 
-    monkeypatch.setattr("server.robot.stop.request_stop", no_socket)
-    desk = StopDesk(robot, HandClock())
+    monkeypatch.setattr("server.stopping.arm.request_stop", no_socket)
+    desk = StopDesk(robot)
     told = desk.stop_now()
     desk.close()
     assert (told.delivered, told.confirmed) == (False, False)

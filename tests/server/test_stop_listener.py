@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
+from urllib.parse import urlsplit
 
 import httpx
 import pytest
+from sqlalchemy import text
 
+from daq.acquisition.stop_socket import FOLDER_VARIABLE
 from daq.client import Client
 from daq.config.service import ServiceSettings
 from server.access.caller import LOCAL, Caller
@@ -22,7 +26,10 @@ from server.access.stop_gate import StopGate
 from server.access.tokens import KnownTokens, TokenStore
 from server.listening import ListenError, listening
 from server.problems import ProblemError
-from server.stop_listener import StopListener
+from server.stopping.door import StopDoor
+from server.stopping.listener import StopListener
+from server.stopping.messages import Begin
+from server.stopping.tokens import READ_AGAIN_AFTER, UNKNOWN_FOR, StopTokens, TokensCannotBeReadError, reader_of
 from server.store.engine import Store
 from tests.daq.cli.invoke import CommandLine
 from tests.server.clocks import HandClock
@@ -97,8 +104,11 @@ def test_a_stop_reaches_the_arm_while_the_event_loop_is_blocked_and_while_the_wh
         assert service.robot.post("/reset", json={}).status_code == 200
         assert service.robot.post("/queue/resume", json={}).status_code == 200
         experiment = _running(service)
-        _daq_stop_remains(service, daq)
+        _stopped_while_the_service_hangs(service, daq)
         assert service.end_of(experiment)["state"] == "cancelled"
+        events = service.robot.get("/events").json()["items"]
+        assert events[0]["at"] >= events[1]["at"]
+        assert any(event["kind"] == "stop" and event["actor"] == "local" for event in events)
 
 
 def _every_other_door_is_open(service: Service, client: Client, daq: CommandLine) -> None:
@@ -110,19 +120,21 @@ def _every_other_door_is_open(service: Service, client: Client, daq: CommandLine
         assert said.out.startswith("ma2000: stopped, confirmed by the board"), said
 
 
-def _daq_stop_remains(service: Service, daq: CommandLine) -> None:
-    """A client is told to use the emergency stop."""
+def _stopped_while_the_service_hangs(service: Service, daq: CommandLine) -> None:
+    """The listener and the owner of the port are processes of their own."""
+    beside = _beside(service)
     service.process.send_signal(signal.SIGSTOP)
     try:
+        stopped = httpx.post(f"{beside}/stop", timeout=30).json()
         said = daq("stop")
         with Client(service.url) as client:
-            not_stopped = client.robot("ma2000").stop()
+            again = client.robot("ma2000").stop()
     finally:
         service.process.send_signal(signal.SIGCONT)
+    assert stopped["confirmed"], stopped
     assert said.code == 0, said
     assert said.out.startswith("ma2000: stopped, confirmed by the board")
-    assert not not_stopped.delivered
-    assert "emergency stop" in not_stopped.text
+    assert again.confirmed, again
 
 
 # ---- who may
@@ -149,6 +161,22 @@ def test_the_listener_stops_and_does_nothing_else(service: Service) -> None:
         assert answer.headers["Content-Type"] == "application/problem+json"
     answer = httpx.post(f"{base.replace('ma2000', 'other')}/stop", timeout=30)
     assert (answer.status_code, answer.json()["type"]) == (404, "docs/service.md#not-found")
+
+
+@pytest.mark.parametrize(
+    ("head", "status"),
+    [(b"x: y\r\n" * 300_000, 431), (b"x: " + b"y" * 5_000_000, 431), (b"x: y\r\n" * 20, 404)],
+)
+def test_a_head_too_large_is_refused_at_once(service: Service, head: bytes, status: int) -> None:
+    where = urlsplit(_beside(service))
+    with socket.create_connection((where.hostname, where.port), timeout=60) as line:
+        with suppress(ConnectionError):  # it has answered, and takes no more
+            line.sendall(b"POST /nothing HTTP/1.1\r\nHost: 127.0.0.1\r\n" + head + b"\r\n\r\n")
+        answer = b""
+        with suppress(ConnectionError):
+            answer = line.recv(100)
+    assert not answer or int(answer.split()[1]) == status
+    assert httpx.post(f"{_beside(service)}/stop", timeout=60).json()["confirmed"]
 
 
 def test_the_services_own_page_may_ask_the_listener_and_no_other_page(service: Service) -> None:
@@ -191,8 +219,8 @@ def test_whoever_does_not_ask_in_time_keeps_no_place(tmp_path: Path, monkeypatch
         clock.turn(600.0)
         return clock.monotonic()
 
-    monkeypatch.setattr("server.stop_listener.READ_WITHIN", 1000.0)
-    monkeypatch.setattr("server.stop_listener.time", SimpleNamespace(monotonic=later_at_every_look))
+    monkeypatch.setattr("server.stopping.listener.READ_WITHIN", 1000.0)
+    monkeypatch.setattr("server.stopping.listener.time", SimpleNamespace(monotonic=later_at_every_look))
     store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
     gate = StopGate(KnownTokens(TokenStore(store), clock), True, (), 8300)
     with socket.create_server(("127.0.0.1", 0)) as door:
@@ -238,6 +266,56 @@ def test_viewers_may_stop_and_strangers_may_not(tmp_path: Path) -> None:
 )
 def test_what_a_page_may_connect_to_is_a_name_and_a_port(host: str, origin: str | None) -> None:
     assert beside(host, 8301) == origin
+
+
+def test_tokens_are_read_while_a_writer_holds_the_database_and_count_on_when_it_is_gone(tmp_path: Path) -> None:
+    clock, file = HandClock(), tmp_path / "service.sqlite"
+    store = Store(f"sqlite:///{file}")
+    store.migrate()
+    tokens = TokenStore(store)
+    anna, bert = tokens.add("anna", "viewer", clock.utc()), tokens.add("bert", "operator", clock.utc())
+    found = StopTokens(reader_of(store.url, file), clock.monotonic)
+    with store.writing() as writing:  # as a service that was put aside in the middle of it
+        writing.execute(text("UPDATE tokens SET role = 'operator'"))
+        assert found.look_up(anna) == Caller("anna", "viewer")
+    assert found.remembered(bert) == (True, Caller("bert", "operator"))
+    assert found.remembered("daq_wrong") == (True, None)
+    clock.turn(UNKNOWN_FOR)
+    assert found.remembered("daq_wrong") == (False, None)
+    tokens.revoke("bert", clock.utc())
+    clock.turn(READ_AGAIN_AFTER)
+    assert found.remembered(bert)[0] is False
+    assert found.look_up(bert) is None
+    store.close()
+    file.unlink()
+    clock.turn(READ_AGAIN_AFTER)
+    assert found.look_up(anna) == Caller("anna", "operator")
+    with pytest.raises(TokensCannotBeReadError):
+        StopTokens(reader_of(store.url, file)).look_up(anna)
+
+
+def test_a_listener_that_is_killed_is_started_again_and_whoever_asks_meanwhile_waits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "run"))
+    begin = Begin(
+        descriptor=-1,
+        service_port=8300,
+        open_on_loopback=True,
+        names=(),
+        urls={"ma2000": "mock://"},
+        database_url="sqlite://",
+        sqlite=tmp_path / "none.sqlite",
+    )
+    with socket.create_server(("127.0.0.1", 0)) as listener, closing(StopDoor(listener, begin)) as door:
+        stop = f"http://127.0.0.1:{listener.getsockname()[1]}/api/v1/robots/ma2000/stop"
+        assert "no robot is connected" in httpx.post(stop, timeout=60).json()["text"]
+        os.kill(door.pid, signal.SIGKILL)
+        unread = httpx.post(stop, headers={"Authorization": "Bearer daq_x"}, timeout=60)
+        assert (unread.status_code, unread.json()["type"]) == (503, "docs/service.md#database")
+        last = door.pid
+    with pytest.raises(ProcessLookupError):
+        os.kill(last, 0)
 
 
 # ---- where

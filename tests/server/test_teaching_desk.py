@@ -63,7 +63,7 @@ def test_a_command_goes_on_with_the_moment_at_which_it_arrived(robot: Asked, des
     said = robot.clock.monotonic()
     robot.clock.turn(DEAD_MAN / 2)  # type: ignore[attr-defined]
     desk.jog(JOG, said)
-    assert robot.orders == [JogBegin(number=0), JogDrive(velocities=JOG, said=said)]
+    assert robot.orders == [JogBegin(number=0, asked=robot.clock.monotonic()), JogDrive(velocities=JOG, said=said)]
 
 
 def test_a_command_that_was_held_up_begins_nothing(robot: Asked, desk: TeachingDesk) -> None:
@@ -74,7 +74,7 @@ def test_a_command_that_was_held_up_begins_nothing(robot: Asked, desk: TeachingD
 def test_a_step_is_asked_for_as_one(robot: Asked, desk: TeachingDesk) -> None:
     program = Program(name="step", machine="ma2000", instructions=(Relative(angles={1: 0.1}),))
     desk.perform(program, "step")
-    assert robot.orders == [RunProgram(number=0, program=program, activity="step")]
+    assert robot.orders == [RunProgram(number=0, asked=robot.clock.monotonic(), program=program, activity="step")]
 
 
 def test_a_lead_without_a_path_does_not_have_that_of_the_one_before(robot: Asked, desk: TeachingDesk) -> None:

@@ -63,6 +63,25 @@ def test_a_body_that_is_no_request_is_refused(service: Service, body: bytes) -> 
     assert answer.headers["Content-Type"] == "application/problem+json"
 
 
+@pytest.mark.parametrize("nearly", [1, 0, "true", "yes", 1.0, None, [True]])
+@pytest.mark.parametrize(
+    ("method", "path", "field"),
+    [
+        ("POST", "/queue/resume", "moves_real_arm"),
+        ("POST", "/control", "moves_real_arm"),
+        ("POST", "/reset", "here"),
+        ("PUT", "/gripper", "closed"),
+        ("PUT", "/process/outputs/3", "on"),
+        ("PATCH", f"/schedules/{NOBODY}", "active"),
+    ],
+)
+def test_a_word_that_may_move_something_is_true_or_false_and_nothing_like_it(
+    service: Service, method: str, path: str, field: str, nearly: Any
+) -> None:
+    answer = service.robot.request(method, path, json={field: nearly})
+    assert (answer.status_code, [one["field"] for one in answer.json()["fields"]]) == (422, [field]), answer.text
+
+
 def test_an_experiment_of_hours_is_refused_without_being_planned(service: Service) -> None:
     spec = {"trajectory": {"kind": "pause", "duration": 3600}, "repeats": 1000}
     for path in ("/experiments", "/experiments/preview"):

@@ -11,22 +11,35 @@ from daq.cli.remote.robot import connected_status, remote_robot, require_word
 from daq.contracts.limp import limp_line
 
 if TYPE_CHECKING:
+    from daq.cli.process_io import SwitchConsent
     from daq.client import HeldControl, Robot
     from daq.contracts.experiment import Gain
+    from daq.contracts.service.robot import ProcessState
 
 
 @contextmanager
-def controlled(call: Invocation, consent: bool) -> Iterator[tuple[Robot, HeldControl]]:
+def controlled(
+    call: Invocation, consent: bool, what: str = "it will move", refused: str = "it moves"
+) -> Iterator[tuple[Robot, HeldControl]]:
     """The robot and its control. On a real arm the operator is asked. Raises ServiceError, SafetyError."""
     with remote_robot(call) as robot:
-        real = require_word(connected_status(robot), consent)
+        status = connected_status(robot)
+        real = require_word(status, consent, what, refused)
         with robot.control(moves_real_arm=real) as control:
             yield robot, control
+        _tell_if_held(call, robot, status.queue.paused)
+
+
+def _tell_if_held(call: Invocation, robot: Robot, paused_before: bool) -> None:
+    """Experiments that waited do not begin when the control is given back: whoever gave it back lets them."""
+    queue = robot.queue.status()
+    if queue.paused and not paused_before:
+        console().print(f"the queue is paused: {queue.reason}: `daq --server {call.server} queue resume`")
 
 
 def set_gains_at_server(call: Invocation, wanted: Mapping[int, Gain], consent: bool) -> None:
     """As `daq gains set`; the service refuses it for a joint off its set point."""
-    with controlled(call, consent) as (_, control):
+    with controlled(call, consent, "its gains will change", "its gains change") as (_, control):
         found = control.set_gains(wanted).gains
     for joint in wanted:
         p, i, d = found[joint]
@@ -35,13 +48,13 @@ def set_gains_at_server(call: Invocation, wanted: Mapping[int, Gain], consent: b
         console().print(line)
 
 
-def set_output_at_server(call: Invocation, output: int, *, on: bool) -> None:
-    """As `daq io set`. A signal moves no joint: it is not asked about."""
-    with controlled(call, consent=True) as (_, control):
-        control.set_output(output, on=on)
+def set_output_at_server(call: Invocation, output: int, *, on: bool, asked: SwitchConsent) -> ProcessState:
+    """As `daq io set`: what the service reads back."""
+    with controlled(call, asked.consent, asked.what, asked.refused) as (_, control):
+        return control.set_output(output, on=on, while_stopped=asked.while_stopped)
 
 
-def set_gripper_at_server(call: Invocation, *, closed: bool) -> None:
-    """As `daq io gripper`."""
-    with controlled(call, consent=True) as (_, control):
-        control.set_gripper(closed=closed)
+def set_gripper_at_server(call: Invocation, *, closed: bool, asked: SwitchConsent) -> ProcessState:
+    """As `daq io gripper`: what the service reads back."""
+    with controlled(call, asked.consent, asked.what, asked.refused) as (_, control):
+        return control.set_gripper(closed=closed, while_stopped=asked.while_stopped)

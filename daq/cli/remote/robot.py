@@ -7,9 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from daq.cli.consent import agreed
+from daq.cli.consent import require_consent
 from daq.cli.context import Invocation
-from daq.contracts.errors import SafetyError
 
 if TYPE_CHECKING:
     from daq.client import Robot
@@ -34,9 +33,9 @@ def connected_status(robot: Robot) -> RobotStatus:
     return status if status.identity is not None else robot.connect()
 
 
-def require_word(status: RobotStatus, consent: bool) -> bool:
+def require_word(status: RobotStatus, consent: bool, what: str = "it will move", refused: str = "it moves") -> bool:
     """Whether the robot is a real arm; the operator is asked about one. Raises SafetyError without their word."""
     real = status.identity is not None and not status.identity.simulated
-    if real and not consent and not agreed(f"{status.robot} at the server ({status.port})"):
-        raise SafetyError(f"{status.robot} is a real arm: it moves only with the operator's consent (--yes)")
+    where = f"{status.robot} at the server ({status.port})"
+    require_consent(where, simulated=not real, consent=consent, what=what, refused=refused)
     return real

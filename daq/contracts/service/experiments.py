@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AwareDatetime, Field
+from pydantic import AwareDatetime, Field, StrictBool
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Moment, Wire
@@ -85,7 +85,7 @@ class ScheduleRequest(Wire):
 class ScheduleChange(Wire):
     """Switches a schedule on or off."""
 
-    active: bool
+    active: StrictBool
 
 
 class Schedule(Wire):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AwareDatetime, Field, FiniteFloat
+from pydantic import AwareDatetime, Field, FiniteFloat, StrictBool
 
 from daq.contracts.experiment import JointNumber
 from daq.contracts.service.base import Wire
@@ -46,7 +46,7 @@ class FitRequest(Wire):
     """What to find; None for all uncertain."""
     held: tuple[Pattern, ...] = ()
     bounds: dict[Pattern, tuple[Bound, Bound]] = Field(default_factory=dict)
-    use_priors: bool = True
+    use_priors: StrictBool = True
     method: Literal["least_squares", "nelder_mead"] = "least_squares"
     starts: Annotated[int, Field(ge=1, le=20)] = 1
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import AwareDatetime
+from pydantic import AwareDatetime, StrictBool
 
 from daq.contracts.service.base import Wire
 
@@ -33,7 +33,7 @@ class QueueStatus(Wire):
 class QueueResume(Wire):
     """The operator's word that the queue may move the arm. A real arm needs `moves_real_arm`."""
 
-    moves_real_arm: bool = False
+    moves_real_arm: StrictBool = False
 
 
 class Control(Wire):
@@ -50,7 +50,7 @@ class Control(Wire):
 class ControlRequest(Wire):
     """Asks for the control of the robot. A real arm needs the operator's word: `moves_real_arm`."""
 
-    moves_real_arm: bool = False
+    moves_real_arm: StrictBool = False
 
 
 class ControlLease(Wire):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import AwareDatetime, Field
+from pydantic import AwareDatetime, Field, StrictBool
 
 from daq.contracts.experiment import Gain, JointNumber
 from daq.contracts.service.base import Wire
@@ -108,7 +108,7 @@ class StopResult(Wire):
 class ResetRequest(Wire):
     """`here`: first make the posture measured now the set points."""
 
-    here: bool = False
+    here: StrictBool = False
 
 
 class JointGains(Wire):
@@ -126,15 +126,17 @@ class ProcessState(Wire):
 
 
 class OutputRequest(Wire):
-    """One process output."""
+    """One process output. Refused while the arm is stopped, unless `while_stopped`."""
 
-    on: bool
+    on: StrictBool
+    while_stopped: StrictBool = False
 
 
 class GripperRequest(Wire):
-    """The gripper."""
+    """The gripper. Refused while the arm is stopped, unless `while_stopped`: it may hold a load, or somebody's hand."""
 
-    closed: bool
+    closed: StrictBool
+    while_stopped: StrictBool = False
 
 
 class Done(Wire):

@@ -170,7 +170,7 @@ def test_a_queue_that_is_paused_while_the_operator_is_asked_stays_paused(monkeyp
         yield robot
 
     monkeypatch.setattr(run, "remote_robot", reached)
-    monkeypatch.setattr("daq.cli.remote.robot.agreed", lambda _: True)
+    monkeypatch.setattr("daq.cli.consent.agreed", lambda *_: True)
     with pytest.raises(SafetyError, match="a guest is at the arm"):
         run.acquire_remotely(CALL, ExperimentSpec(), Invocation().trace_folder, False)
     assert resumed == []

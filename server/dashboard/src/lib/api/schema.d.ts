@@ -220,7 +220,7 @@ export interface paths {
         get?: never;
         /**
          * Set Output
-         * @description Switches one process output, 0 to 7.
+         * @description Switches one process output, 0 to 7. A stopped arm's is not switched, unless `while_stopped`.
          */
         put: operations["set_output"];
         post?: never;
@@ -240,7 +240,7 @@ export interface paths {
         get?: never;
         /**
          * Set Gripper
-         * @description Closes or opens the gripper.
+         * @description Closes or opens the gripper. A stopped arm's is not moved, unless `while_stopped`: a stop lets it hold.
          */
         put: operations["set_gripper"];
         post?: never;
@@ -713,12 +713,14 @@ export interface paths {
         put: operations["renew_control"];
         /**
          * Take Control
-         * @description The control of the robot, for one client. It lapses without a heartbeat, and the arm holds then.
+         * @description The control of the robot, for one client. It lapses without a heartbeat: the arm holds, the queue is paused.
          */
         post: operations["take_control"];
         /**
          * Give Control Back
          * @description Gives the control back; what this client was moving holds. A program that still runs is stopped.
+         *
+         *     Where experiments wait the queue is paused by it: what waits begins when somebody resumes the queue.
          */
         delete: operations["give_control_back"];
         options?: never;
@@ -2401,11 +2403,16 @@ export interface components {
         };
         /**
          * GripperRequest
-         * @description The gripper.
+         * @description The gripper. Refused while the arm is stopped, unless `while_stopped`: it may hold a load, or somebody's hand.
          */
         GripperRequest: {
             /** Closed */
             closed: boolean;
+            /**
+             * While Stopped
+             * @default false
+             */
+            while_stopped?: boolean;
         };
         /**
          * Health
@@ -3197,11 +3204,16 @@ export interface components {
         };
         /**
          * OutputRequest
-         * @description One process output.
+         * @description One process output. Refused while the arm is stopped, unless `while_stopped`.
          */
         OutputRequest: {
             /** On */
             on: boolean;
+            /**
+             * While Stopped
+             * @default false
+             */
+            while_stopped?: boolean;
         };
         /**
          * Overlay

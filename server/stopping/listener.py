@@ -1,11 +1,10 @@
-"""A second door for the stop alone, on threads of its own: it opens also while the event loop is blocked.
-
-It speaks just enough HTTP for `POST /api/v1/robots/{robot}/stop`, with the same answers as the service, and touches
-nothing that the event loop does. When the whole process hangs or is gone, `daq stop` on the computer itself remains.
+"""A second door for the stop alone: just enough HTTP for `POST /api/v1/robots/{robot}/stop`, every request on a thread
+of its own, with the same names, tokens, origins and answers as at the service itself.
 """
 
 from __future__ import annotations
 
+import io
 import logging
 import re
 import socket
@@ -21,22 +20,27 @@ from daq.contracts.service.robot import StopResult
 from server.access.caller import Caller
 from server.access.stop_gate import StopGate
 from server.problems import MEDIA_TYPE, ProblemError, details_of, not_found
+from server.stopping.tokens import TokensCannotBeReadError
 
 ADDRESS = re.compile(r"/api/v1/robots/([a-z0-9][a-z0-9_-]{0,31})/stop")
 READ_WITHIN = 2.0
 """s in which a client must have asked: nobody keeps a place by sending now and then."""
 MOST_AT_ONCE = 32
 """Connections; one more is closed at once, and the service's own door is still there."""
+LARGEST_REQUEST = 96 << 10
+"""Bytes that are read of a connection; more than 100 headers are a 431, an address of more than 64 kB a 414."""
 LONGEST_BODY = 4096
 """Bytes of a body that are read, so that the answer is not lost with it; nothing in it is looked at."""
+ANSWERED_WITHIN = 2.0
+"""s for what is under way when the listener ends: a stop is answered within 1.1 s."""
 log = logging.getLogger("server.stop")
 
 Stop = Callable[[], StopResult]
-Told = Callable[[str, str, Caller], None]
+Told = Callable[[str, StopResult, Caller], None]
 
 
 class StopListener:
-    """Listens until closed. `stops` by robot; `told` is given robot, result in one line, and who asked."""
+    """Listens until closed. `stops` by robot; `told` is given the robot, what became of its stop, and who asked."""
 
     def __init__(self, listener: socket.socket, gate: StopGate, stops: Mapping[str, Stop], told: Told) -> None:
         self._server = _Server(listener, _handler(gate, stops, told))
@@ -48,6 +52,7 @@ class StopListener:
         self._server.shutdown()
         self._thread.join()
         self._server.server_close()
+        self._server.wait_for_answers(ANSWERED_WITHIN)
 
 
 class _Server(ThreadingHTTPServer):
@@ -86,10 +91,41 @@ class _Server(ThreadingHTTPServer):
                 with suppress(OSError):  # closed by now
                     request.shutdown(socket.SHUT_RD)
 
+    def wait_for_answers(self, within: float) -> None:
+        """Until nobody has a place any more, or `within` s are over."""
+        until = time.monotonic() + within
+        for _ in range(MOST_AT_ONCE):
+            if not self._room.acquire(timeout=max(0.0, until - time.monotonic())):
+                return
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A client that goes away is no fault; anything else is in the log."""
         del request
         log.warning("stop listener: request of %s", client_address, exc_info=True)
+
+
+class _Bounded(io.RawIOBase):
+    """A stream that seems to end after so many bytes."""
+
+    def __init__(self, stream: io.BufferedIOBase, most: int) -> None:
+        self._stream = stream
+        self._left = most
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """As many bytes as have come."""
+        data = self._stream.read1(min(len(buffer), self._left))
+        buffer[: len(data)] = data
+        self._left -= len(data)
+        return len(data)
+
+    def close(self) -> None:
+        """Itself and the stream."""
+        self._stream.close()
+        super().close()
 
 
 def _handler(gate: StopGate, stops: Mapping[str, Stop], told: Told) -> type[BaseHTTPRequestHandler]:
@@ -99,17 +135,26 @@ def _handler(gate: StopGate, stops: Mapping[str, Stop], told: Told) -> type[Base
         sys_version = ""
         timeout = READ_WITHIN
 
+        def setup(self) -> None:
+            """As the base's; no more is read than a request may have."""
+            super().setup()
+            self.rfile = io.BufferedReader(_Bounded(self.rfile, LARGEST_REQUEST))  # type: ignore[assignment]
+
         def do_POST(self) -> None:
             """The stop."""
             self._read_body()
             try:
                 robot, caller = self._admitted()
+            except TokensCannotBeReadError as error:
+                problem = ProblemError(503, "database", f"the tokens cannot be read: {error}", "try again")
+                self._answer(problem.status, details_of(problem), MEDIA_TYPE)
+                return
             except ProblemError as problem:
                 self._answer(problem.status, details_of(problem), MEDIA_TYPE, problem.headers)
                 return
             result = stops[robot]()
             self._answer(200, result, "application/json")
-            told(robot, result.text, caller)
+            told(robot, result, caller)
 
         def do_OPTIONS(self) -> None:
             """Whether the service's page may ask, which is at another port and so of another origin."""

@@ -1,0 +1,142 @@
+"""How long a stop takes at both doors while 200 clients ask as fast as they can and three programs compute.
+
+    python -m benchmarks stop_under_load [--stops 10]
+
+The mock stands behind a pseudo-terminal in lock-step and holds its posture; nobody measures the arm here, but how long
+a client waits for the word that the board has confirmed. The clients are one process, each on a connection of its own,
+and ask anew as soon as they are answered; the programs that compute have the priority that every program has.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import http.client
+import json
+import multiprocessing
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from benchmarks.figures import Figure, at_most, quantile, show
+from benchmarks.service_process import ROBOT, RunningService, dice, started_service
+from daq.contracts.service.system import stop_port_after
+
+CLIENTS = 200
+PROGRAMS = 3
+API = f"/api/v1/robots/{ROBOT}"
+PATHS = (API, f"{API}/queue", f"{API}/experiments?limit=20", f"{API}/traces?limit=20")
+PORT = "mock://?pty=1&lock_step=1&seed=3"
+WARM_UP = 3.0
+"""s until all clients ask."""
+PATIENCE = 30.0
+"""s for one stop; it counts as not answered then."""
+OWN_TARGET, LISTENER_TARGET = 3.0, 1.0
+"""s: what `daq.client` waits for one door; and that an operator at the page does not press again."""
+
+
+def compute() -> None:
+    """Until it is ended."""
+    while True:
+        sum(range(100_000))
+
+
+def ask_on_and_on(host: str, port: int, answered: multiprocessing.sharedctypes.Synchronized[int]) -> None:
+    """All clients, until they are ended."""
+    asyncio.run(_clients(host, port, answered))
+
+
+async def _clients(host: str, port: int, answered: multiprocessing.sharedctypes.Synchronized[int]) -> None:
+    async def client(number: int) -> None:
+        reader, writer = await asyncio.open_connection(host, port)
+        while True:
+            path = PATHS[number % len(PATHS)]
+            number += 1
+            writer.write(f"GET {path} HTTP/1.1\r\nHost: {host}:{port}\r\n\r\n".encode())
+            head = (await reader.readuntil(b"\r\n\r\n")).decode("latin-1").lower()
+            length = head.partition("content-length:")[2].partition("\r\n")[0]
+            await reader.readexactly(int(length or 0))
+            answered.value += 1
+
+    await asyncio.gather(*(client(number) for number in range(CLIENTS)), return_exceptions=True)
+
+
+@contextlib.contextmanager
+def load(url: str) -> Iterator[multiprocessing.sharedctypes.Synchronized[int]]:
+    """Clients and programs within. Yields how many questions have been answered."""
+    where, context = urlsplit(url), multiprocessing.get_context("spawn")
+    answered = context.Value("q", 0)
+    processes = [context.Process(target=ask_on_and_on, args=(where.hostname, where.port, answered), daemon=True)]
+    processes += [context.Process(target=compute, daemon=True) for _ in range(PROGRAMS)]
+    for process in processes:
+        process.start()
+    try:
+        while answered.value < CLIENTS:
+            time.sleep(0.1)
+        time.sleep(WARM_UP)
+        yield answered
+    finally:
+        for process in processes:
+            process.kill()
+            process.join()
+
+
+def stop(host: str, port: int) -> float | None:
+    """s until a confirmed answer, on a new connection; None for none."""
+    begun = time.monotonic()
+    line = http.client.HTTPConnection(host, port, timeout=PATIENCE)
+    try:
+        line.request("POST", f"{API}/stop")
+        if json.loads(line.getresponse().read())["confirmed"]:
+            return time.monotonic() - begun
+    except (OSError, http.client.HTTPException):
+        return None
+    finally:
+        line.close()
+    return None
+
+
+def measure(service: RunningService, stops: int) -> tuple[dict[str, list[float | None]], float]:
+    """Times at each door (s), and how many questions were answered a second meanwhile."""
+    where, random = urlsplit(service.url), dice(1991)
+    assert where.hostname is not None
+    assert where.port is not None
+    doors = {"the service's own door": where.port, "the stop listener": stop_port_after(where.port)}
+    found: dict[str, list[float | None]] = {name: [] for name in doors}
+    with load(service.url) as answered:
+        before, begun = answered.value, time.monotonic()
+        for _ in range(stops):
+            for name, port in doors.items():
+                time.sleep(random.uniform(0.0, 0.5))
+                found[name].append(stop(where.hostname, port))
+        rate = (answered.value - before) / (time.monotonic() - begun)
+    return found, rate
+
+
+def main() -> int:
+    """The exit code: 1 when a target was missed."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks stop_under_load", description=__doc__)
+    parser.add_argument("--stops", type=int, default=10, help="at each door")
+    parser.add_argument("--quick", action="store_true", help="five stops")
+    given = parser.parse_args()
+    stops = 5 if given.quick else given.stops
+    with tempfile.TemporaryDirectory() as folder, started_service(Path(folder), PORT) as service:
+        service.ask("POST", "/connect")
+        found, rate = measure(service, stops)
+        service.ask("POST", "/disconnect")
+    figures = []
+    for (name, times), target in zip(found.items(), (OWN_TARGET, LISTENER_TARGET), strict=True):
+        known = [PATIENCE if one is None else one for one in times]
+        beside = f"p50 {quantile(known, 0.5):.3f} s, {sum(one is None for one in times)} of {len(times)} not answered"
+        figures.append(at_most(f"stop to its confirmed answer at {name}, slowest", max(known), target, "s", beside))
+    figures.append(Figure("questions answered meanwhile", f"{rate:.0f} a second"))
+    title = f"Stops while {CLIENTS} clients ask and {PROGRAMS} programs compute"
+    return show(title, f"python -m benchmarks stop_under_load --stops {stops}", figures)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,38 @@
+"""How large a trace file may be, so that reading one that somebody else made cannot fill memory or take for ever."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+MIB = 1 << 20
+
+
+class TraceLimits(BaseModel):
+    """What a reader of traces accepts at most; section `[traces.limits]` of the configuration.
+
+    The defaults hold ten hours of three joints at 50 Hz, and a chunk twenty times as large as the largest that a
+    recording writes.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    file_bytes: Annotated[int, Field(ge=1)] = 2048 * MIB
+    """Size of a file, MCAP or CSV: it is read as a whole."""
+    chunk_bytes: Annotated[int, Field(ge=1, le=1024 * MIB)] = 64 * MIB
+    """Size of one chunk once it is uncompressed."""
+    total_bytes: Annotated[int, Field(ge=1)] = 2048 * MIB
+    """Size of all chunks of a file once they are uncompressed."""
+    records: Annotated[int, Field(ge=1)] = 20_000_000
+    """Records of a file, its messages among them. One sample takes a message a joint and one more."""
+    attachments: Annotated[int, Field(ge=0)] = 100
+    attachment_bytes: Annotated[int, Field(ge=0)] = 64 * MIB
+    """Size of all attachments of a file."""
+    metadata_bytes: Annotated[int, Field(ge=1)] = 8 * MIB
+    """Size of one metadata record; that at the start holds experiment, machine and memory map."""
+    joints: Annotated[int, Field(ge=1, le=100)] = 6
+
+
+DEFAULT_TRACE_LIMITS = TraceLimits()
+"""The limits where nothing is configured."""

@@ -1,0 +1,12 @@
+"""The operator's word that a real arm may move: True and nothing like it."""
+
+from __future__ import annotations
+
+from daq.contracts.errors import SpecError
+
+
+def require_word(moves_real_arm: object) -> bool:
+    """The word, or False where it is not given. Raises SpecError for anything that only counts as true or false."""
+    if not isinstance(moves_real_arm, bool):
+        raise SpecError(f"moves_real_arm = {moves_real_arm!r:.40}: True is the operator's word, and False is none")
+    return moves_real_arm

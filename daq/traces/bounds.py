@@ -1,0 +1,89 @@
+"""The largest values that signals may have: far beyond any rig, and small enough to compute with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import TraceError
+from daq.contracts.trace import Trace, TraceEvent, TraceRecord
+
+LARGEST_POSITION = 1e9
+"""rad or m. A shaft at 10 000 rpm takes eleven days to turn as far, and a float64 resolves 1e-7 rad there."""
+LARGEST_VELOCITY = 1e6
+"""rad/s or m/s. The fastest rotors, of dental drills and turbochargers, turn at 5e4 rad/s."""
+LARGEST_DRIVE = 1e9
+"""V, N·m or N. The largest testing machines press with 1e9 N."""
+LARGEST_TIME = 4e9
+"""s, of either sign: time counts from the start of a record or, in the files of some loggers, from 1970."""
+SMALLEST_STEP = 1e-9
+"""s. MCAP's time stamps count ns."""
+LARGEST_TICK = 2**53
+"""Control periods, of either sign: the whole numbers that a float64 holds exactly; 285 years of 1 µs."""
+SHORTEST_PERIOD, LONGEST_PERIOD = 1e-6, 86400.0
+"""s of a control period: a loop at 1 MHz, one sample a day."""
+
+LARGEST = {
+    "time": (LARGEST_TIME, "s"),
+    "host_time": (LARGEST_TIME, "s"),
+    "tick": (LARGEST_TICK, "control periods"),
+    "position": (LARGEST_POSITION, "rad or m"),
+    "set_point": (LARGEST_POSITION, "rad or m"),
+    "error": (2 * LARGEST_POSITION, "rad or m"),
+    "velocity": (LARGEST_VELOCITY, "rad/s or m/s"),
+    "drive": (LARGEST_DRIVE, "V, N·m or N"),
+}
+"""The largest magnitude of each signal, and its unit."""
+
+
+def first_outside(name: str, values: NDArray[np.float64] | NDArray[np.int64]) -> tuple[int, ...] | None:
+    """Index of the first value that is not finite or beyond its bound; None when all are within."""
+    largest = LARGEST[name][0]
+    wrong = ~((values >= -largest) & (values <= largest))
+    return tuple(int(index) for index in np.argwhere(wrong)[0]) if wrong.any() else None
+
+
+def allowed(name: str) -> str:
+    """The bound of a signal, for an error."""
+    largest, unit = LARGEST[name]
+    return f"allowed is ±{largest:.3g} {unit}"
+
+
+def first_short_step(time: NDArray[np.float64]) -> int | None:
+    """Row of the first time that does not come at least SMALLEST_STEP after the one before; None when all do."""
+    wrong = ~(np.diff(time) >= SMALLEST_STEP)
+    return int(np.argmax(wrong)) + 1 if wrong.any() else None
+
+
+def check_trace(trace: Trace, origin: str) -> None:
+    """Raises TraceError for the first value of a trace that no rig can have measured."""
+    check_signals({name: getattr(trace, name) for name in LARGEST}, origin)
+    check_record(trace.record, trace.events, origin)
+
+
+def check_signals(signals: Mapping[str, NDArray[Any] | None], origin: str) -> None:
+    """The same for columns, by their names; those that are None, or have no bound, are passed over."""
+    for name in LARGEST:
+        values = signals.get(name)
+        outside = None if values is None else first_outside(name, values)
+        if values is not None and outside is not None:
+            where = f"sample {outside[0]}" + (f", column {outside[1]}" if len(outside) > 1 else "")
+            raise TraceError(f"{origin}: {where}: {name} = {values[outside]:g}, {allowed(name)}")
+    time = signals.get("time")
+    row = None if time is None else first_short_step(time)
+    if time is not None and row is not None:
+        step = f"{float(time[row])!r} s after {float(time[row - 1])!r} s"
+        raise TraceError(f"{origin}: sample {row}: time = {step}, it has to increase by {SMALLEST_STEP:g} s at least")
+
+
+def check_record(record: TraceRecord, events: tuple[TraceEvent, ...], origin: str) -> None:
+    """Raises TraceError for a control period or the time of an event that no rig can have."""
+    if record.period is not None and not SHORTEST_PERIOD <= record.period <= LONGEST_PERIOD:
+        line = f"period = {record.period:g} s, allowed is {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s"
+        raise TraceError(f"{origin}: {line}")
+    for event in events:
+        if not abs(event.time) <= LARGEST_TIME:
+            raise TraceError(f"{origin}: event {event.kind!r}: time = {event.time:g} s, {allowed('time')}")

@@ -1,0 +1,114 @@
+"""Samples and events out of the chunks of a trace, chunk by chunk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import TraceError
+from daq.contracts.trace import TraceEvent
+from daq.contracts.trace_limits import TraceLimits
+from daq.traces import layout
+from daq.traces.scan import UNREADABLE, Scan, payloads
+
+Samples = NDArray[Any]
+"""Of one joint, (n,) of `layout.JOINT_SAMPLE_DTYPE`."""
+
+
+@dataclass(frozen=True)
+class Decoded:
+    """The samples of each joint, in the order of `joints`, with the same ticks; and the events."""
+
+    samples: tuple[Samples, ...]
+    events: tuple[TraceEvent, ...]
+
+
+def decode(found: Scan, joints: tuple[int, ...], limits: TraceLimits) -> Decoded:
+    """Everything in the chunks of a scan. Raises ValueError or struct.error when they are not those of a trace."""
+    decoder = _Decoder(found, joints, limits)
+    parts = [decoder.chunk(chunk) for chunk in found.chunks]
+    empty = np.empty(0, layout.JOINT_SAMPLE_DTYPE)
+    samples = tuple(np.concatenate([empty, *(part.samples[column] for part in parts)]) for column in range(len(joints)))
+    _require_same_ticks(samples)
+    return Decoded(samples, tuple(event for part in parts for event in part.events))
+
+
+def cut_to_what_decodes(found: Scan, joints: tuple[int, ...], limits: TraceLimits, origin: str) -> None:
+    """Shorten a scan to the chunks before the first that does not follow the ones before it.
+
+    A recording ends no chunk inside a row, and time increases from row to row.
+    Raises TraceError when the channels are not those of a trace.
+    """
+    try:
+        decoder = _Decoder(found, joints, limits)
+    except ValueError as error:
+        raise TraceError(f"{origin}: is not laid out as a trace: {error}") from error
+    last = -np.inf
+    for number, chunk in enumerate(found.chunks):
+        try:
+            samples = decoder.chunk(chunk).samples
+            _require_same_ticks(samples)
+            time = samples[0]["time"]
+            if not (np.diff(time, prepend=last) > 0).all():
+                raise ValueError("its time does not increase")
+        except UNREADABLE as error:
+            found.cut_before_chunk(number, f"a chunk is not that of a trace ({error})")
+            return
+        last = time[-1] if len(time) else last
+
+
+class _Decoder:
+    """Raises ValueError when the channels are not those of a trace."""
+
+    def __init__(self, found: Scan, joints: tuple[int, ...], limits: TraceLimits) -> None:
+        self._known = frozenset(found.channels)
+        self._records_left = limits.records - found.records
+        channels = _channels(found)
+        self._joints = [channels.get(f"{layout.JOINT_TOPIC}{joint}") for joint in joints]
+        self._events = channels.get(layout.EVENTS_TOPIC)
+
+    def chunk(self, chunk: bytes) -> Decoded:
+        """Raises ValueError, struct.error."""
+        parts: dict[int, list[bytes]] = {
+            channel: [] for channel in (*self._joints, self._events) if channel is not None
+        }
+        count, seen = payloads(chunk, parts, self._records_left)
+        self._records_left -= count
+        if not seen <= self._known:
+            raise ValueError(f"channel {min(seen - self._known)} is not defined")
+        samples = tuple(_samples(parts[channel] if channel is not None else []) for channel in self._joints)
+        events = parts[self._events] if self._events is not None else []
+        return Decoded(samples, tuple(layout.event_of(message) for message in events))
+
+
+def _require_same_ticks(samples: tuple[Samples, ...]) -> None:
+    if any(not np.array_equal(other["tick"], samples[0]["tick"]) for other in samples[1:]):
+        raise ValueError("the joints do not have the same ticks")
+
+
+def _channels(found: Scan) -> dict[str, int]:
+    """Channel of each topic. Raises ValueError where a joint's schema is not ours, or a topic has two channels."""
+    channels: dict[str, int] = {}
+    for channel in found.channels.values():
+        schema = found.schemas.get(channel.schema_id)
+        name = schema.name if schema else ""
+        if channel.topic.startswith(layout.JOINT_TOPIC) and (name, channel.message_encoding) != (
+            layout.JOINT_SCHEMA,
+            "cdr",
+        ):
+            raise ValueError(f"topic {channel.topic} has schema {name!r}, expected {layout.JOINT_SCHEMA!r} in CDR")
+        if channels.setdefault(channel.topic, channel.id) != channel.id:
+            raise ValueError(f"topic {channel.topic} has two channels")
+    return channels
+
+
+def _samples(parts: list[bytes]) -> Samples:
+    data = b"".join(parts)
+    if len(data) != len(parts) * layout.JOINT_SAMPLE_BYTES or any(
+        len(part) != layout.JOINT_SAMPLE_BYTES for part in parts
+    ):
+        raise ValueError(f"a sample does not have {layout.JOINT_SAMPLE_BYTES} bytes")
+    return np.frombuffer(data, layout.JOINT_SAMPLE_DTYPE)

@@ -1,0 +1,54 @@
+"""Uncompressing a chunk into as many bytes as it has declared, and never into more."""
+
+from __future__ import annotations
+
+import zlib
+
+import lz4.frame
+import zstandard
+
+from daq.traces.fields import CompressedChunk
+
+INFLATE_ERRORS = (zstandard.ZstdError, RuntimeError)
+"""What the libraries raise on damaged bytes, RuntimeError being lz4's."""
+
+_LEAST_WINDOW = 8 << 20
+"""Bytes of its output that a zstd stream may refer back to, which every decoder has to allow (RFC 8878, 3.1.1.1.2)."""
+_SIZE_UNKNOWN = -1
+"""zstandard's answer where the head of a frame does not tell its size."""
+
+
+def inflate(chunk: CompressedChunk) -> bytes:
+    """The records of a chunk, with their checksum compared. No more than `chunk.size` bytes are ever made.
+
+    Raises ValueError or one of INFLATE_ERRORS when the chunk is not what it declares.
+    """
+    if chunk.compression == "zstd":
+        data = _zstd(chunk)
+    elif chunk.compression == "lz4":
+        data = _lz4(chunk)
+    elif chunk.compression == "":
+        data = bytes(chunk.data) if len(chunk.data) == chunk.size else b""
+    else:
+        raise ValueError(f"a chunk is compressed by {chunk.compression[:20]!r}; zstd, lz4 and none are read")
+    if len(data) != chunk.size:
+        raise ValueError(f"a chunk does not have the {chunk.size} bytes that it declares")
+    if chunk.crc not in (0, zlib.crc32(data)):
+        raise ValueError("a chunk does not match its checksum")
+    return data
+
+
+def _zstd(chunk: CompressedChunk) -> bytes:
+    if chunk.size == 0:
+        return b""  # no other size of a frame is taken, so there is nothing to uncompress
+    # zstandard takes the size in the frame's head before the one it is given, so the two have to agree first.
+    if zstandard.frame_content_size(chunk.data) not in (_SIZE_UNKNOWN, chunk.size):
+        raise ValueError(f"a chunk does not have the {chunk.size} bytes that it declares")
+    decompressor = zstandard.ZstdDecompressor(max_window_size=max(_LEAST_WINDOW, chunk.size))
+    return decompressor.decompress(chunk.data, max_output_size=chunk.size)
+
+
+def _lz4(chunk: CompressedChunk) -> bytes:
+    decompressor = lz4.frame.LZ4FrameDecompressor()
+    data = bytes(decompressor.decompress(bytes(chunk.data), max_length=chunk.size + 1))
+    return data if decompressor.eof else b""

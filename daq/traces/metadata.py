@@ -1,0 +1,88 @@
+"""What a trace says about itself, from its metadata: text that somebody else may have written."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+
+from pydantic import ValidationError
+
+from daq.contracts.errors import TraceError
+from daq.contracts.trace import TRACE_FORMAT, TraceRecord
+from daq.contracts.trace_limits import TraceLimits
+from daq.traces import layout
+
+_JOINT = re.compile(r"[1-9][0-9]?")
+_NUMBER = re.compile(r"[A-Za-z0-9_-]{1,64}")
+"""Of a trace: it becomes part of file names and addresses."""
+_SHOWN = 40
+"""Characters of a wrong text that an error shows."""
+
+
+class NewerTraceError(TraceError):
+    """A trace of a newer version of this software, which that version may read."""
+
+
+def record_of(start: dict[str, str], end: dict[str, str] | None, origin: str) -> TraceRecord:
+    """What a trace says about itself, from the metadata at its start and (if it has one) at its end.
+
+    Raises TraceError, naming the version where it is newer than this one.
+    """
+    try:
+        fields = layout.json_object(start["record"])
+        version = fields.get("format", 0)
+        if isinstance(version, int) and version > TRACE_FORMAT:
+            raise NewerTraceError(
+                f"{origin}: has format {str(version)[:_SHOWN]} of a newer version; this one reads up to {TRACE_FORMAT}"
+            )
+        if end is not None:
+            fields |= {"outcome": end["outcome"] or None, "counters": layout.json_object(end["counters"])}
+        record = TraceRecord.model_validate_json(json.dumps(fields, allow_nan=False))
+    except KeyError as error:
+        raise TraceError(f"{origin}: its metadata is not that of a trace: {error} is missing") from error
+    except (ValueError, RecursionError) as error:
+        raise TraceError(f"{origin}: its metadata is not that of a trace: {one_line(error)}") from error
+    if not _NUMBER.fullmatch(record.trace_id):
+        raise TraceError(f"{origin}: its number {record.trace_id[:_SHOWN]!r} is not letters, digits, - and _")
+    return record
+
+
+def joints_of(start: dict[str, str], limits: TraceLimits, origin: str) -> tuple[int, ...]:
+    """The joints that a trace has, in the order of its columns. Raises TraceError."""
+    text = start.get("joints", "")
+    # The text is looked at before it is split: it may be a list of millions.
+    words = text.split() if len(text) <= 3 * limits.joints else [text[:_SHOWN]]
+    joints = tuple(int(word) for word in words if _JOINT.fullmatch(word))
+    if not 1 <= len(joints) <= limits.joints or len(joints) != len(words) or len(set(joints)) != len(joints):
+        raise TraceError(
+            f"{origin}: joints = {text[:_SHOWN]!r} are not 1 to {limits.joints} different numbers of joints"
+            " (traces.limits.joints)"
+        )
+    return joints
+
+
+def signals_of(start: dict[str, str], origin: str) -> frozenset[str]:
+    """Names of the signals that a trace has. Raises TraceError."""
+    if "signals" not in start:
+        raise TraceError(f"{origin}: its metadata is not that of a trace: 'signals' is missing")
+    return frozenset(start["signals"].split())
+
+
+def extent_of(end: dict[str, str], origin: str) -> tuple[int, float]:
+    """Number of samples, and s between the first and the last, as its end tells. Raises TraceError."""
+    try:
+        samples, duration = int(end["samples"][:_SHOWN]), float(end["duration"][:_SHOWN])
+    except (KeyError, ValueError) as error:
+        raise TraceError(f"{origin}: its metadata is not that of a trace: samples or duration are no number") from error
+    if samples < 0 or not 0 <= duration < math.inf:
+        raise TraceError(f"{origin}: its metadata is not that of a trace: {samples} samples in {duration} s")
+    return samples, duration
+
+
+def one_line(error: Exception) -> str:
+    """What is wrong, and for pydantic's errors where."""
+    if isinstance(error, ValidationError):
+        first = error.errors()[0]
+        return f"{'.'.join(str(part)[:_SHOWN] for part in first['loc'])}: {first['msg']}"
+    return " ".join(str(error).split())

@@ -1,0 +1,61 @@
+"""Turns at what costs the service much: reading a trace, working out a motion, searching. On the event loop alone.
+
+Each caller has a few turns at once and the rest of their requests wait, without a thread of their own: whoever asks for
+very much waits for themselves, and for nobody else.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+
+from server.problems import ProblemError
+
+AT_ONCE = 2
+"""Turns of one caller, of the 40 threads that there are for all. Every user of this computer is the same caller."""
+MOST_WAITING = 50
+"""Requests of one caller that wait for a turn; one more is a 429."""
+WAIT_AT_MOST = 30.0
+"""s; most programs have given up by then."""
+
+
+@dataclass
+class _Lane:
+    turns: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(AT_ONCE))
+    users: int = 0
+
+
+class Lanes:
+    """One a caller, for as long as it is used."""
+
+    def __init__(self) -> None:
+        self._lanes: dict[str, _Lane] = {}
+
+    @asynccontextmanager
+    async def turn(self, caller: str) -> AsyncIterator[None]:
+        """Within, it is this caller's turn. Raises a 429 when too many requests wait, or for too long."""
+        lane = self._lanes.setdefault(caller, _Lane())
+        if lane.users >= AT_ONCE + MOST_WAITING:
+            raise _too_many(f"{MOST_WAITING} requests of {caller} wait for their turn")
+        lane.users += 1
+        try:
+            try:
+                async with asyncio.timeout(WAIT_AT_MOST):
+                    await lane.turns.acquire()
+            except TimeoutError:
+                raise _too_many(f"requests of {caller} have waited for their turn for {WAIT_AT_MOST:g} s") from None
+            try:
+                yield
+            finally:
+                lane.turns.release()
+        finally:
+            lane.users -= 1
+            if lane.users == 0:
+                self._lanes.pop(caller, None)
+
+
+def _too_many(line: str) -> ProblemError:
+    advice = f"ask for fewer motions, traces and searches at once: {AT_ONCE} are carried out at a time"
+    return ProblemError(429, "too-many", line, advice, (), {"Retry-After": "2"})

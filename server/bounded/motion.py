@@ -1,0 +1,41 @@
+"""The motion of an experiment, worked out and held against the machine's limits."""
+
+from __future__ import annotations
+
+import math
+
+from daq.contracts.service.experiments import MotionMark, MotionPreview, MotionViolation
+from daq.safety import Violation, check_plan
+from daq.trajectories import plan, start_angles
+from server.bounded.messages import WorkOutMotion
+
+
+def worked_out(order: WorkOutMotion) -> MotionPreview:
+    """Of a longer motion than is shown every second, third, … set point. Raises SpecError."""
+    machine = order.machine
+    motion = plan(order.spec, machine, start_angles(order.spec, machine))
+    violations = check_plan(motion, machine, machine.limits)
+    every = max(1, math.ceil(len(motion) / order.most_shown))
+    return MotionPreview(
+        time=tuple(index * motion.period for index in range(0, len(motion), every)),
+        set_points=tuple(map(tuple, motion.angles[::every].tolist())),
+        moving=motion.moving,
+        duration=motion.duration,
+        violations=tuple(_told(violation) for violation in violations),
+        marks=tuple(
+            MotionMark(time=mark.index * motion.period, kind=mark.kind, message=mark.message) for mark in motion.marks
+        ),
+    )
+
+
+def _told(violation: Violation) -> MotionViolation:
+    """JSON knows no infinity."""
+    value, limit = (number if math.isfinite(number) else None for number in (violation.value, violation.limit))
+    return MotionViolation(
+        rule=violation.rule,
+        joint=violation.joint,
+        time=violation.time,
+        value=value,
+        limit=limit,
+        message=violation.message,
+    )

@@ -1,0 +1,189 @@
+"""The service's side: starts processes with limits, gives them orders, and ends those that take too much."""
+
+from __future__ import annotations
+
+import logging
+import os
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+
+from server.bounded.messages import Answer, Limits, ReadUpload, WorkOutMotion
+from server.problems import ProblemError
+
+LARGEST_ANSWER = 64 << 20
+"""Bytes of one line."""
+PIECE = 1 << 16
+START_WITHIN = 30.0
+"""s for a process to begin, on a computer that is busy: not counted as the order's own."""
+ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+log = logging.getLogger("server.bounded")
+
+
+class ExhaustedError(Exception):
+    """An order that took more than it may, or the process with it. Its text is one line."""
+
+
+class Workers:
+    """Up to `most` processes, started when they are needed and kept while they stay small. Safe to use from any thread;
+    `ask` waits, and belongs into a thread."""
+
+    def __init__(self, limits: Limits, most: int) -> None:
+        self._limits = limits
+        self._room = threading.BoundedSemaphore(most)
+        self._lock = threading.Lock()
+        self._idle: list[_Worker] = []
+        self._busy: set[_Worker] = set()
+        self._closed = False
+
+    def ask(self, order: ReadUpload | WorkOutMotion) -> Answer:
+        """Its answer. Raises ExhaustedError where there is none, and a 503 once the service ends."""
+        with self._room:
+            worker = self._taken()
+            try:
+                answer = worker.ask(order)
+            except BaseException:
+                worker.kill()
+                if self._closed:
+                    raise ending() from None
+                raise
+            finally:
+                with self._lock:
+                    self._busy.discard(worker)
+            self._put_back(worker, keep=not answer.spent)
+        if answer.fault:
+            log.warning("%s: %s", answer.problem, answer.fault)
+        return answer
+
+    def close(self) -> None:
+        """Ends all of them, whatever they do."""
+        with self._lock:
+            self._closed = True
+            idle, busy = self._idle, set(self._busy)
+            self._idle = []
+        for worker in busy:
+            worker.end()  # whoever asked it tidies up
+        for worker in idle:
+            worker.kill()
+
+    def idle_processes(self) -> tuple[int, ...]:
+        """Numbers of those that wait for an order."""
+        with self._lock:
+            return tuple(worker.number for worker in self._idle)
+
+    def busy_processes(self) -> tuple[int, ...]:
+        """Numbers of those that carry one out."""
+        with self._lock:
+            return tuple(worker.number for worker in self._busy)
+
+    def _taken(self) -> _Worker:
+        with self._lock:
+            if self._closed:
+                raise ending()
+            while self._idle:
+                worker = self._idle.pop()
+                if worker.lives:
+                    break
+                worker.kill()
+            else:
+                worker = _Worker(self._limits)
+            self._busy.add(worker)
+            return worker
+
+    def _put_back(self, worker: _Worker, *, keep: bool) -> None:
+        with self._lock:
+            if keep and not self._closed:
+                self._idle.append(worker)
+                return
+        worker.kill()
+
+
+class _Worker:
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "server.bounded"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+            env=os.environ | ONE_THREAD,
+        )
+        self._allowance = START_WITHIN
+        self._write(limits.model_dump_json())
+
+    @property
+    def number(self) -> int:
+        """Of the process."""
+        return self._process.pid
+
+    @property
+    def lives(self) -> bool:
+        """Whether it has not ended."""
+        return self._process.poll() is None
+
+    def ask(self, order: ReadUpload | WorkOutMotion) -> Answer:
+        """Raises ExhaustedError."""
+        until = time.monotonic() + self._limits.seconds + self._allowance
+        self._allowance = 0.0
+        self._write(order.model_dump_json())
+        line = self._line(until)
+        try:
+            return Answer.model_validate_json(line)
+        except ValueError:
+            raise ExhaustedError("its reader answered nothing that can be understood") from None
+
+    def end(self) -> None:
+        """At once. From any thread."""
+        with suppress(ProcessLookupError):
+            self._process.kill()
+
+    def kill(self) -> None:
+        """The same, and tidies up. It may be called again."""
+        self.end()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(1.0)
+        for stream in (self._process.stdin, self._process.stdout):
+            assert stream is not None
+            with suppress(OSError):
+                stream.close()
+
+    def _write(self, line: str) -> None:
+        assert self._process.stdin is not None
+        with suppress(OSError):  # it has ended, which its answer tells
+            self._process.stdin.write(line.encode() + b"\n")
+            self._process.stdin.flush()
+
+    def _line(self, until: float) -> bytes:
+        assert self._process.stdout is not None
+        number, pieces, poll = self._process.stdout.fileno(), bytearray(), select.poll()
+        poll.register(number, select.POLLIN)
+        while not pieces.endswith(b"\n"):
+            if not poll.poll(max(0.0, 1e3 * (until - time.monotonic()))):
+                raise ExhaustedError(f"takes more than the {self._limits.seconds:g} s that there are for it")
+            piece = os.read(number, PIECE)
+            if not piece:
+                raise ExhaustedError(self._why_ended())
+            pieces += piece
+            if len(pieces) > LARGEST_ANSWER:
+                raise ExhaustedError("its reader answered too much")
+        return bytes(pieces)
+
+    def _why_ended(self) -> str:
+        with suppress(subprocess.TimeoutExpired):
+            code = self._process.wait(1.0)
+            if code == -signal.SIGXCPU:
+                return f"takes more than the {self._limits.seconds:g} s that there are for it"
+            if code < 0:
+                name = signal.Signals(-code).name
+                return f"its reader was ended by {name}: it is damaged, or needs too much memory"
+        return f"its reader ended: it is damaged, or needs more than {self._limits.memory >> 20} MB of memory"
+
+
+def ending() -> ProblemError:
+    """A 503: the service ends."""
+    return ProblemError(503, "ending", "the service ends", "ask again when it is back", (), {"Retry-After": "10"})

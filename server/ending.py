@@ -1,0 +1,46 @@
+"""The end of the service comes in time, whatever still computes, waits or blocks.
+
+What can be ended in order has been by then: the robot's owner freezes the arm and closes its trace by itself, and what
+the database was told is on the disk. What is left are threads and processes that nobody can interrupt.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import threading
+from collections.abc import Callable
+
+END_WITHIN = 4.2
+"""s from the signal to the end of this process."""
+LAST_RESORT = 4.7
+"""s after which the kernel ends it, even where its interpreter does not answer any more."""
+log = logging.getLogger("server")
+
+
+class EndInTime:
+    """Begins to count when it is armed, once. `children` is called before the end comes by force: nobody else can end
+    processes of this service then."""
+
+    def __init__(self, children: Callable[[], None]) -> None:
+        self._children = children
+        self._armed = threading.Lock()
+
+    def arm(self) -> None:
+        """The service has been told to end. Called in the main thread, from a signal's handler."""
+        if not self._armed.acquire(blocking=False):
+            return
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, LAST_RESORT)
+        timer = threading.Timer(END_WITHIN, self._end)
+        timer.daemon = True
+        timer.start()
+
+    def _end(self) -> None:
+        running = [thread.name for thread in threading.enumerate() if not thread.daemon]
+        log.warning("the service did not end in order within %g s and ends now: %s", END_WITHIN, ", ".join(running))
+        try:
+            self._children()
+        finally:
+            os._exit(0)

@@ -1,0 +1,66 @@
+"""A stop carried out: through the process that owns the robot's port, or through the port where no process does."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from daq.acquisition.port_stop import stop_at_port
+from daq.acquisition.stop_socket import StopAnswer, request_stop
+from daq.contracts.service.robot import StopResult
+from daq.transport import SerialPort, Terminal, TransportError, parse_port_url, require_same
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Where a robot is. `owner`: the process that owns its port, None where there is none; `terminal`: the
+    pseudo-terminal that it was reached at, where it is a mock's."""
+
+    robot: str
+    url: str
+    owner: int | None = None
+    terminal: Terminal | None = None
+
+
+def stop_arm(reach: Reach) -> StopResult:
+    """Freezes the arm. Never raises: the result says what is known."""
+    begun = time.monotonic()
+    answer = _ask(reach)
+    if answer.confirmed:
+        text = f"stopped, confirmed by the board: set points frozen at tick {answer.tick}. {answer.text}".strip()
+    elif answer.delivered:
+        text = f"stop sent, NOT CONFIRMED by the board: {answer.text}. Use the emergency stop."
+    else:
+        text = f"stop NOT DELIVERED: {answer.text}. Use the emergency stop."
+    return StopResult(
+        delivered=answer.delivered,
+        confirmed=answer.confirmed,
+        tick=answer.tick,
+        seconds=time.monotonic() - begun,
+        note=answer.text,
+        text=text,
+    )
+
+
+def _ask(reach: Reach) -> StopAnswer:
+    try:
+        attempts = request_stop(reach.robot, reach.owner)
+    except OSError as error:  # no file is left for a socket, say
+        return _undelivered(reach, f"the process that owns the port cannot be asked: {error.strerror or error}")
+    if attempts:
+        silent = _undelivered(reach, "the process that owns the port did not answer")
+        answers = [attempt.answer or silent for attempt in attempts]
+        return next((answer for answer in answers if not answer.confirmed), answers[0])
+    port = parse_port_url(reach.url)
+    if reach.url.startswith("mock://"):
+        return _undelivered(reach, "no robot is connected")
+    if isinstance(port, SerialPort):
+        try:
+            require_same(port.device, reach.terminal)
+        except TransportError as error:
+            return _undelivered(reach, str(error))
+    return stop_at_port(reach.robot, reach.url)
+
+
+def _undelivered(reach: Reach, why: str) -> StopAnswer:
+    return StopAnswer(robot=reach.robot, port=reach.url, delivered=False, confirmed=False, text=why)

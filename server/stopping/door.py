@@ -1,0 +1,132 @@
+"""The service's side of the stop listener: starts its process, tells it who owns each port, hears of stops."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+
+from daq.contracts.errors import DaqError
+from daq.transport import Terminal
+from server.stopping.messages import NEWS, Begin, Owned, Ready, Stopped
+
+READY_WITHIN = 30.0
+"""s for the process to start, on a busy computer."""
+BEGIN_AGAIN_AFTER = 0.5
+"""s before a process that has ended by itself is started again."""
+END_WITHIN = 3.0
+"""s for requests under way when the service ends."""
+log = logging.getLogger("server.stop")
+
+
+class StopDoorError(DaqError):
+    """The stop listener cannot be had: a service that only seems to have one does not start."""
+
+    exit_code = 3
+
+
+class StopDoor:
+    """The listener's process, started again when it ends.
+
+    listener: bound, and kept open here: whoever connects while the process is started again waits for it
+    stopped:  called with every stop, on a thread of its own
+    """
+
+    def __init__(self, listener: socket.socket, begin: Begin) -> None:
+        self.stopped: Callable[[Stopped], None] = lambda _news: None
+        self._listener = listener
+        self._begin = begin
+        self._lock = threading.Lock()
+        self._owned: dict[str, Owned] = {}
+        self._ready = threading.Event()
+        self._closing = threading.Event()
+        self._process = self._start()
+        self._thread = threading.Thread(target=self._listen, name="stop-door", daemon=True)
+        self._thread.start()
+
+    @property
+    def pid(self) -> int:
+        """Of the process."""
+        return self._process.pid
+
+    def wait_ready(self) -> None:
+        """Until it listens. Raises StopDoorError."""
+        if not self._ready.wait(READY_WITHIN):
+            raise StopDoorError(f"stop listener: its process did not listen within {READY_WITHIN:g} s")
+
+    def owned(self, robot: str, process: int | None, terminal: Terminal | None) -> None:
+        """Which process owns the robot's port from now on."""
+        known = None if terminal is None else (terminal.number, terminal.made, terminal.holder)
+        told = Owned(robot=robot, process=process, terminal=known)
+        with self._lock:
+            self._owned[robot] = told
+            self._send(told)
+
+    def close(self) -> None:
+        """No more requests; those under way are answered."""
+        self._closing.set()
+        with self._lock:
+            self._end_input()
+        try:
+            self._process.wait(END_WITHIN)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+        self._thread.join()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        descriptor = self._listener.fileno()
+        process = subprocess.Popen(
+            [sys.executable, "-m", "server.stopping"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            pass_fds=[descriptor],
+            start_new_session=True,  # Ctrl-C in the terminal is the service's to handle
+        )
+        self._process = process
+        self._send(self._begin.model_copy(update={"descriptor": descriptor}))
+        for told in self._owned.values():
+            self._send(told)
+        return process
+
+    def _send(self, message: Begin | Owned) -> None:
+        """One that finds nobody is told again to the process that comes after."""
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError, ValueError):
+            self._process.stdin.write(message.model_dump_json().encode() + b"\n")
+            self._process.stdin.flush()
+
+    def _end_input(self) -> None:
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
+
+    def _listen(self) -> None:
+        while True:
+            self._hear_all()
+            code = self._process.wait()
+            with self._lock:
+                self._end_input()
+            if self._closing.wait(BEGIN_AGAIN_AFTER):
+                return
+            log.error("the stop listener's process has ended (exit code %s): it is started again", code)
+            with self._lock:
+                if self._closing.is_set():
+                    return
+                self._start()
+
+    def _hear_all(self) -> None:
+        assert self._process.stdout is not None
+        with self._process.stdout as lines:
+            for line in lines:
+                try:
+                    news = NEWS.validate_json(line)
+                    if isinstance(news, Ready):
+                        self._ready.set()
+                    else:
+                        self.stopped(news)
+                except Exception:  # half a line of a process that was killed, or a listener's fault
+                    log.exception("stop listener: %.200r", line)

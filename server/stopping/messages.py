@@ -1,0 +1,62 @@
+"""What the stop listener is told, and what it tells: one JSON object a line, on its standard input and output."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+
+
+class _Message(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+# ---- what it is told
+
+
+class Begin(_Message):
+    """The first line. `descriptor`: the listening socket, which it inherits. `urls`: each robot's port."""
+
+    kind: Literal["begin"] = "begin"
+    descriptor: int
+    service_port: int
+    open_on_loopback: bool
+    names: tuple[str, ...]
+    urls: dict[str, str]
+    database_url: str
+    sqlite: Path | None
+    """The database's file, where it is one of SQLite's."""
+
+
+class Owned(_Message):
+    """Which process owns a robot's port now; None when none does. `terminal`: the pseudo-terminal that the robot was
+    reached at, by number, time of creation and holder, as `daq.transport` knows it."""
+
+    kind: Literal["owned"] = "owned"
+    robot: str
+    process: int | None
+    terminal: tuple[int, int, tuple[int, int] | None] | None = None
+
+
+# ---- what it tells
+
+
+class Ready(_Message):
+    """It listens."""
+
+    kind: Literal["ready"] = "ready"
+
+
+class Stopped(_Message):
+    """A stop that was asked for there, what became of it in one line, and who asked."""
+
+    kind: Literal["stopped"] = "stopped"
+    robot: str
+    text: str
+    confirmed: bool
+    actor: str
+
+
+ORDER: TypeAdapter[Begin | Owned] = TypeAdapter(Annotated[Begin | Owned, Field(discriminator="kind")])
+NEWS: TypeAdapter[Ready | Stopped] = TypeAdapter(Annotated[Ready | Stopped, Field(discriminator="kind")])

@@ -1,0 +1,77 @@
+"""The stop listener's process from its first line of input to the end of it."""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+
+from daq.contracts.service.robot import StopResult
+from daq.transport import Terminal
+from server import logs
+from server.access.caller import Caller
+from server.access.stop_gate import StopGate
+from server.steady import keep_steady
+from server.stopping.arm import Reach, stop_arm
+from server.stopping.listener import StopListener
+from server.stopping.messages import ORDER, Begin, Owned, Ready, Stopped
+from server.stopping.tokens import StopTokens, reader_of
+
+
+class Robots:
+    """Where each robot is, as far as the service has told."""
+
+    def __init__(self, urls: dict[str, str]) -> None:
+        self._reach = {name: Reach(name, url) for name, url in urls.items()}
+
+    def owned(self, told: Owned) -> None:
+        """Another process has the port now, or none."""
+        terminal = None if told.terminal is None else Terminal(*told.terminal)
+        self._reach[told.robot] = replace(self._reach[told.robot], owner=told.process, terminal=terminal)
+
+    def names(self) -> tuple[str, ...]:
+        """Of all of them."""
+        return tuple(self._reach)
+
+    def stop(self, name: str) -> StopResult:
+        """At once, from any thread."""
+        return stop_arm(self._reach[name])
+
+
+def main() -> int:
+    """Listens until the input ends: the service is leaving, or gone. Returns the exit code."""
+    logs.begin()
+    lines = sys.stdin.buffer
+    first = lines.readline()
+    if not first:
+        return 0  # the service has ended before it began
+    begin = ORDER.validate_json(first)
+    assert isinstance(begin, Begin)
+    robots = Robots(begin.urls)
+    tokens = StopTokens(reader_of(begin.database_url, begin.sqlite))
+    gate = StopGate(tokens, begin.open_on_loopback, begin.names, begin.service_port)
+    os.set_blocking(sys.stdout.fileno(), False)
+
+    def told(robot: str, result: StopResult, caller: Caller) -> None:
+        _tell(Stopped(robot=robot, text=result.text, confirmed=result.confirmed, actor=caller.name))
+
+    stops = {name: partial(robots.stop, name) for name in robots.names()}
+    listener = StopListener(socket.socket(fileno=begin.descriptor), gate, stops, told)
+    keep_steady()
+    _tell(Ready())
+    for line in lines:
+        order = ORDER.validate_json(line)
+        if isinstance(order, Owned):
+            robots.owned(order)
+    listener.close()
+    return 0
+
+
+def _tell(news: Ready | Stopped) -> None:
+    """A line that fits into a pipe is written whole or not at all: a service that does not read delays no stop, and
+    finds what the pipe holds when it reads again."""
+    with suppress(OSError):
+        os.write(sys.stdout.fileno(), news.model_dump_json().encode() + b"\n")

@@ -1,0 +1,51 @@
+"""A database that is not as this program left it: told in one line that names the table, at the start and later on."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+from sqlalchemy import Connection, Engine, inspect, select, text
+from sqlalchemy.exc import DatabaseError
+
+from daq.contracts.service.experiments import ExperimentState
+from server.store.database_errors import BRING_BACK, DamagedError, line_of, one_line
+from server.store.tables import ExperimentRow, JobRow, Table
+
+
+def require_sound(engine: Engine, url: str) -> None:
+    """Raises DamagedError for a file that is damaged, a table or column that is gone, a state that nobody knows."""
+    try:
+        with engine.connect() as connection:
+            if engine.dialect.name == "sqlite":
+                _require_whole(connection, url)
+            _require_columns(connection, url)
+            for rows in (ExperimentRow, JobRow):
+                _require_known_states(connection, rows, url)
+    except DatabaseError as error:
+        raise DamagedError(f"database {url}: {line_of(error)}; {BRING_BACK}") from error
+
+
+def _require_whole(connection: Connection, url: str) -> None:
+    told = connection.execute(text("PRAGMA quick_check(1)")).scalar()
+    if told != "ok":
+        raise DamagedError(f"database {url}: is damaged: {one_line(told)}; {BRING_BACK}")
+
+
+def _require_columns(connection: Connection, url: str) -> None:
+    there = inspect(connection)
+    tables = set(there.get_table_names())
+    for name, table in Table.metadata.tables.items():
+        if name not in tables:
+            raise DamagedError(f"database {url}: table {name} is missing; {BRING_BACK}")
+        missing = {column.name for column in table.columns} - {str(one["name"]) for one in there.get_columns(name)}
+        if missing:
+            line = f"database {url}: table {name} has no column {', '.join(sorted(missing))}"
+            raise DamagedError(f"{line}; {BRING_BACK}")
+
+
+def _require_known_states(connection: Connection, rows: type[ExperimentRow | JobRow], url: str) -> None:
+    known = get_args(ExperimentState)  # those of jobs are the same
+    unknown = connection.execute(select(rows.id, rows.state).where(rows.state.not_in(known)).limit(1)).first()
+    if unknown is not None:
+        line = f"database {url}: table {rows.__tablename__}: {unknown[0]} has the state {unknown[1]!r:.40}"
+        raise DamagedError(f"{line}, which is none of {', '.join(known)}; {BRING_BACK}")

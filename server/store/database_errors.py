@@ -1,0 +1,46 @@
+"""What a database says, in one line that names the table. Needs no library of a database."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from daq.contracts.errors import DaqError
+
+if TYPE_CHECKING:
+    from sqlalchemy.exc import DatabaseError
+
+BRING_BACK = "`daq restore FILE --overwrite` brings a backup back"
+_TABLE = re.compile(r'\b(?:FROM|INTO|UPDATE)\s+"?(\w+)', re.IGNORECASE)
+_LONGEST = 200
+
+
+class DamagedError(DaqError):
+    """What the database holds cannot be what was written there."""
+
+    exit_code = 2
+
+
+def table_of(statement: str | None) -> str:
+    """The table that a statement is about; empty where it names none."""
+    found = _TABLE.search(statement or "")
+    return found[1] if found else ""
+
+
+def line_of(error: DatabaseError) -> str:
+    """What the database says, and about which table."""
+    table = table_of(error.statement)
+    return f"{f'table {table}: ' if table else ''}{one_line(error.orig or error)}"
+
+
+def advice_of(line: str) -> str:
+    """What helps against it: a backup against damage, room or patience against the rest."""
+    if "full" in line:
+        return "make room on its disk"
+    passes = ("locked", "busy", "readonly", "unable to open")
+    return "try again" if any(word in line for word in passes) else BRING_BACK
+
+
+def one_line(error: object) -> str:
+    """The beginning of what something says."""
+    return " ".join(str(error).split())[:_LONGEST]

@@ -1,0 +1,60 @@
+"""`daq io`: outputs and gripper of a real arm need the operator's word, stay as they are after a stop, and are told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from daq.driver.controller import Identity
+from daq.transport.mock_process import MockProcess
+from tests.daq.cli.board import ask
+from tests.daq.cli.invoke import CommandLine
+
+SWITCHES = [(("set", "3", "on"), "output 3 on, read back\n"), (("gripper", "close"), "gripper closed, read back\n")]
+UNTOUCHED = "outputs 00000000\ngripper open\n"
+
+
+@pytest.fixture(autouse=True)
+def _untouched(daq: CommandLine, port: str) -> Iterator[None]:
+    """The mock is every test's: not stopped, nothing switched, before and after."""
+    yield
+    daq("--port", port, "reset")
+    for words in (("set", "3", "off"), ("gripper", "open")):
+        daq("--port", port, "io", *words, "--yes")
+
+
+@pytest.mark.parametrize(("words", "told"), SWITCHES)
+def test_what_was_switched_is_read_back_and_told(
+    daq: CommandLine, port: str, words: tuple[str, ...], told: str
+) -> None:
+    assert daq("--port", port, "io", *words).out == told
+
+
+@pytest.mark.parametrize(("words", "told"), SWITCHES)
+def test_a_real_arm_is_switched_only_with_the_operators_word(
+    daq: CommandLine, port: str, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], told: str
+) -> None:
+    monkeypatch.setattr(Identity, "simulated", property(lambda _: False))
+    daq("--port", port, "io", *words).complains(4, "is a real arm", "--yes")
+    assert daq("--port", port, "io", "show").out.endswith(UNTOUCHED)
+    assert daq("--port", port, "io", *words, "--yes").out == told
+
+
+@pytest.mark.parametrize(("words", "told"), SWITCHES)
+def test_a_stopped_arm_is_switched_only_by_who_says_so(
+    daq: CommandLine, mock: MockProcess, port: str, words: tuple[str, ...], told: str
+) -> None:
+    assert daq("--port", port, "stop").code == 0
+    daq("--port", port, "io", *words, "--yes").complains(4, "the arm has been stopped", "--while-stopped")
+    assert daq("--port", port, "io", "show").out.endswith(UNTOUCHED)
+    assert daq("--port", port, "io", *words, "--while-stopped").out == told
+    assert ask(mock, "state")["frozen"]
+
+
+def test_a_stop_leaves_the_gripper_and_the_outputs_as_they_are(daq: CommandLine, port: str) -> None:
+    for words, _ in SWITCHES:
+        assert daq("--port", port, "io", *words).code == 0
+    assert daq("--port", port, "stop").code == 0
+    assert daq("--port", port, "reset").code == 0
+    assert daq("--port", port, "io", "show").out.endswith("outputs 00001000\ngripper closed\n")

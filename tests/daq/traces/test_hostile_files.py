@@ -1,0 +1,272 @@
+"""Files made to do harm, or damaged beyond what disks do: one line each, at once, within the memory that is allowed."""
+
+import os
+import re
+import struct
+import time
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import zstandard
+from mcap.opcode import Opcode
+
+from benchmarks.damaged_traces import Original, originals, recompressed, records
+from benchmarks.trace_damage import campaign, figures
+from benchmarks.trace_damage import record as sound_record
+from daq.contracts.errors import TraceError
+from daq.contracts.trace_limits import TraceLimits
+from daq.traces import layout
+from daq.traces.catalogue import list_traces
+from daq.traces.reader import read_trace
+from daq.traces.salvage import salvage_folder
+from daq.traces.verify import verify
+from tests.daq.traces.samples import write
+from tests.daq.traces.test_files_that_are_no_trace import foreign, ours
+
+HEAD = 9
+SIZE_IN_CHUNK = HEAD + 16
+"""Where a chunk declares how large it is once it is uncompressed."""
+LENGTH_IN_CHUNK = SIZE_IN_CHUNK + 8 + 4 + 4 + len("zstd")
+"""Where it tells the length of its records."""
+A_MEGABYTE = 1 << 20
+
+
+@pytest.fixture(scope="module")
+def sound() -> dict[str, Original]:
+    return {one.kind: one for one in originals(sound_record())}
+
+
+def first_of(data: bytes, opcode: int) -> int:
+    return next(begin for found, begin, _ in records(data) if found == opcode)
+
+
+def with_number(data: bytes, position: int, value: int) -> bytes:
+    return data[:position] + struct.pack("<Q", value) + data[position + 8 :]
+
+
+def bomb(declared: int, size: int, compress: str = "zstd") -> bytes:
+    """A trace whose first chunk holds `size` bytes of zeros, and declares `declared`."""
+    data = recompressed(originals(sound_record())[0].data, compress, lambda _: bytes(size))
+    return with_number(data, first_of(data, Opcode.CHUNK) + SIZE_IN_CHUNK, declared)
+
+
+def refused(path: Path, data: bytes, limits: TraceLimits | None = None) -> str:
+    """The one line that a file gets from every reader."""
+    path.write_bytes(data)
+    limits = limits or TraceLimits()
+    with pytest.raises(TraceError, match=r"^[^\n]{1,400}$") as caught:
+        read_trace(path, limits)
+    assert not verify(path, limits).trustworthy
+    assert str(path) in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+@pytest.mark.parametrize(
+    ("declared", "complaint"),
+    [
+        (1000, "a chunk does not have the 1000 bytes that it declares|did not decompress full frame"),
+        (A_MEGABYTE + 1, "a chunk does not have the 1048577 bytes"),
+        (2**62, r"a chunk declares more than 67108864 bytes \(traces.limits.chunk_bytes\)"),
+        (2**64 - 1, r"a chunk declares more than 67108864 bytes \(traces.limits.chunk_bytes\)"),
+    ],
+)
+def test_a_chunk_is_never_inflated_past_what_it_declares(
+    tmp_path: Path, compression: str, declared: int, complaint: str
+) -> None:
+    data = bomb(declared, A_MEGABYTE, compression)
+    tracemalloc.start()
+    line = refused(tmp_path / "a.mcap", data)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert re.search(complaint, line), line
+    assert peak < 8 * A_MEGABYTE
+
+
+def test_a_bomb_of_two_gibibytes_is_refused_at_once(tmp_path: Path) -> None:
+    """Fifty kB of chunks of 64 MiB, each as large as it declares: what they are together is limited."""
+    plain = struct.pack("<BQHIQQ", Opcode.MESSAGE, 64 * A_MEGABYTE - HEAD, 1, 0, 0, 0).ljust(64 * A_MEGABYTE, b"\0")
+    packed = zstandard.compress(plain)
+    chunk = struct.pack("<QQQII4sQ", 0, 0, len(plain), 0, 4, b"zstd", len(packed)) + packed
+    whole = foreign(ours())
+    begin = first_of(whole, Opcode.METADATA)
+    data = whole[:begin] + (struct.pack("<BQ", Opcode.CHUNK, len(chunk)) + chunk) * 32 + whole[begin:]
+    line = refused(tmp_path / "a.mcap", data, TraceLimits(total_bytes=100 * A_MEGABYTE))
+    assert "its chunks have more than 104857600 bytes (traces.limits.total_bytes)" in line
+
+
+@pytest.mark.parametrize(
+    ("metadata", "complaint"),
+    [
+        ({"joints": ""}, "joints = '' are not 1 to 6 different numbers of joints"),
+        ({"joints": "1 " * 10**6}, "joints = '1 1 1 1"),
+        ({"joints": "1 1"}, "joints = '1 1' are not"),
+        ({"joints": "1_0"}, "joints = '1_0' are not"),
+        ({"joints": "1 2 3 4 5 6 7"}, "are not 1 to 6 different"),
+        ({"record": "[" * 10**5}, "its metadata is not that of a trace"),
+        ({"record": '{"a":' * 10**5}, "its metadata is not that of a trace"),
+        ({"record": "9" * 10**5}, "its metadata is not that of a trace"),
+        ({"record": '"\\ud800"'}, "its metadata is not that of a trace"),
+        (ours(memory_map={"a": 1e308 * 10}), "its metadata is not that of a trace"),
+        (ours(created="9999-12-31T23:59:59-14:00"), "a moment of the years 1970 to 2261 is expected"),
+        (ours(created="0001-01-01T00:00:00+14:00"), "a moment of the years 1970 to 2261 is expected"),
+        (ours(trace_id="../../x"), "its number '../../x' is not letters, digits, - and _"),
+        (ours(format="x"), "its metadata is not that of a trace: format"),
+        (ours(format=10**400), "of a newer version"),
+    ],
+)
+def test_metadata_made_to_do_harm_get_one_line_at_once(
+    tmp_path: Path, metadata: dict[str, str], complaint: str
+) -> None:
+    path = tmp_path / "a.mcap"
+    begun = time.process_time()
+    line = refused(path, foreign(ours() | metadata))
+    assert complaint in line
+    (listed,) = list_traces(tmp_path)
+    assert listed.problem is not None
+    assert complaint in listed.problem
+    assert time.process_time() - begun < 1.0
+
+
+@pytest.mark.parametrize("message", [b"[]", b"{}", b"[" * 10**5, b'{"name":"note","time":NaN,"message":""}', b"\xff"])
+def test_events_made_to_do_harm_get_one_line(tmp_path: Path, sound: dict[str, Original], message: bytes) -> None:
+    def changed(chunk: bytes) -> bytes:
+        begin = next(b - 8 for op, b, _ in records(bytes(8) + chunk) if op == Opcode.MESSAGE)
+        length = struct.unpack_from("<Q", chunk, begin + 1)[0]
+        body = chunk[begin + HEAD : begin + HEAD + 22] + message
+        rest = chunk[begin + HEAD + length :]
+        return chunk[:begin] + struct.pack("<BQ", Opcode.MESSAGE, len(body)) + body + rest
+
+    assert "is not laid out as a trace" in refused(
+        tmp_path / "a.mcap", recompressed(sound["finished"].data, "zstd", changed)
+    )
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "complaint"),
+    [
+        ("position", 1e308, "position = 1e+308, allowed is ±1e+09 rad or m"),
+        ("set_point", -1e300, "set_point = -1e+300, allowed is ±1e+09 rad or m"),
+        ("drive", float("inf"), "drive = inf, allowed is ±1e+09 V, N·m or N"),
+        ("position", float("nan"), "position = nan, allowed is"),
+        ("host_time", 1e300, "host_time = 1e+300, allowed is ±4e+09 s"),
+        ("tick", 2**63 - 1, "tick = 9.22337e+18, allowed is ±9.01e+15 control periods"),
+        ("tick", -(2**63), "tick = -9.22337e+18, allowed is"),
+        ("time", 1e308, "time = 1e+308, allowed is ±4e+09 s"),
+        ("time", -1e-320, "it has to increase by 1e-09 s at least"),
+    ],
+)
+def test_a_value_that_no_rig_can_have_measured_is_refused(
+    tmp_path: Path, sound: dict[str, Original], field: str, value: float, complaint: str
+) -> None:
+    place = layout.JOINT_SAMPLE_DTYPE.fields[field][1]  # type: ignore[index]
+    sample = struct.pack("<q" if field == "tick" else "<d", value)
+
+    def changed(chunk: bytes) -> bytes:
+        data = bytearray(chunk)
+        for opcode, begin, end in records(bytes(8) + chunk):
+            if opcode == Opcode.MESSAGE and end - begin == HEAD + 22 + layout.JOINT_SAMPLE_BYTES:
+                at = begin - 8 + HEAD + 22 + place
+                data[at : at + 8] = sample
+        return bytes(data)
+
+    line = refused(tmp_path / "a.mcap", recompressed(sound["finished"].data, "zstd", changed))
+    assert complaint in line
+
+
+def test_every_limit_is_named_by_the_setting_that_moves_it(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mcap", 200)
+    assert len(read_trace(path)) == 200
+    for name, value in {"file_bytes": 1000, "chunk_bytes": 1000, "total_bytes": 10_000, "records": 300, "joints": 2,
+                        "metadata_bytes": 1000}.items():  # fmt: skip
+        with pytest.raises(TraceError, match=rf"\(traces\.limits\.{name}\)"):
+            read_trace(path, TraceLimits(**{name: value}))
+
+
+def test_attachments_are_limited(tmp_path: Path, sound: dict[str, Original]) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(sound["finished"].data)
+    for limits in (TraceLimits(attachments=0), TraceLimits(attachment_bytes=10)):
+        with pytest.raises(TraceError, match=r"traces\.limits\.attachment"):
+            read_trace(path, limits)
+
+
+def test_a_trace_with_messages_outside_of_chunks_is_not_read_as_an_empty_one(tmp_path: Path) -> None:
+    data = foreign(ours())
+    begin = first_of(data, Opcode.METADATA)
+    message = struct.pack("<BQHIQQ", Opcode.MESSAGE, 22, 1, 0, 0, 0)
+    assert "messages outside of chunks" in refused(tmp_path / "a.mcap", data[:begin] + message + data[begin:])
+
+
+def test_a_trace_with_less_samples_than_its_end_tells_is_refused(tmp_path: Path, sound: dict[str, Original]) -> None:
+    data = sound["finished"].data
+    spans = [(begin, end) for opcode, begin, end in records(data) if opcode == Opcode.CHUNK]
+    (begin, end) = spans[-1]
+    line = refused(tmp_path / "a.mcap", recompressed(data[:begin] + data[end:], "zstd"))
+    assert "has 45 samples, and says at its end that they are 60" in line
+
+
+# ---- part files
+
+
+@pytest.mark.parametrize(
+    ("damage", "kept"),
+    [
+        (lambda data, chunk: with_number(data, chunk + SIZE_IN_CHUNK, 2**64 - 1), "damaged"),
+        (lambda data, chunk: with_number(data, chunk + LENGTH_IN_CHUNK, 2**63), "damaged"),
+        (lambda data, chunk: with_number(data, chunk + LENGTH_IN_CHUNK, 2**64 - 1), "damaged"),
+        (lambda data, chunk: data[: chunk + HEAD] + bytes(512) + data[chunk + HEAD + 512 :], "damaged"),
+        (lambda data, _: data.replace(b'{"format', b'["format'), "unreadable"),
+        (lambda _, __: b"", "unreadable"),
+    ],
+)
+def test_a_damaged_part_file_keeps_no_other_from_being_salvaged(
+    tmp_path: Path, sound: dict[str, Original], damage: Callable[[bytes, int], bytes], kept: str
+) -> None:
+    data = sound["unfinished"].data
+    hurt = damage(data, first_of(data, Opcode.CHUNK))
+    (tmp_path / "a.mcap.part").write_bytes(hurt)
+    (tmp_path / "b.mcap.part").write_bytes(data)
+    first, second = salvage_folder(tmp_path)
+    assert first.kept == tmp_path / f"a.mcap.part.{kept}"
+    assert first.kept.read_bytes() == hurt
+    assert second.samples == 60
+    assert len(read_trace(tmp_path / "b.mcap")) == 60
+    assert salvage_folder(tmp_path) == ()
+
+
+def test_what_was_put_aside_is_never_written_over(tmp_path: Path) -> None:
+    for content in (b"first", b"second", b"third"):
+        (tmp_path / "a.mcap.part").write_bytes(content)
+        salvage_folder(tmp_path)
+    names = ("a.mcap.part.unreadable", "a.mcap.part.unreadable.2", "a.mcap.part.unreadable.3")
+    assert [(tmp_path / name).read_bytes() for name in names] == [b"first", b"second", b"third"]
+
+
+def test_a_pipe_of_the_name_of_a_part_file_is_told_and_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.mcap.part")
+    os.mkfifo(tmp_path / "b.mcap")
+    (found,) = salvage_folder(tmp_path)
+    assert found.problem == f"{tmp_path}/a.mcap.part: cannot be read: it is no file"
+    assert [one.state for one in list_traces(tmp_path)] == ["unreadable", "unreadable"]
+    with pytest.raises(TraceError, match="it is no file"):
+        read_trace(tmp_path / "b.mcap")
+
+
+def test_a_part_file_is_never_complete_even_when_only_its_name_was_missing(
+    tmp_path: Path, sound: dict[str, Original]
+) -> None:
+    path = tmp_path / "a.mcap.part"
+    path.write_bytes(sound["finished"].data)
+    assert read_trace(path).record.outcome is None
+
+
+def test_an_excerpt_of_the_campaign(tmp_path: Path) -> None:
+    """Some hundred damaged files of `python -m benchmarks trace_damage`, always the same."""
+    tally = campaign(90, 11, tmp_path, share=0.005)
+    assert tally.examples == []
+    assert all(figure.met for figure in figures(tally)[1:])
+    assert tally.ends["salvaged"] > 10
+    assert tally.ends["put aside"] > 5

@@ -1,0 +1,118 @@
+"""A database that is not as it was left: one line at the start, a 503 that names the table afterwards."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from daq.contracts.errors import DaqError
+from server.clock import SystemClock
+from server.store.engine import Store
+from tests.daq.cli.invoke import CommandLine
+from tests.server.inside import service_inside
+
+FILE = "service.sqlite"
+Damage = Callable[[Path], None]
+
+
+def _says(*statements: str) -> Damage:
+    def damage(path: Path) -> None:
+        with sqlite3.connect(path) as connection:
+            for statement in statements:
+                connection.execute(statement)
+        connection.close()
+
+    return damage
+
+
+def _garble(path: Path) -> None:
+    path.write_bytes(b"SQLite format 3\0" + b"?" * 8000)
+
+
+def _garble_inside(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    for at in range(4096, len(data), 4096):
+        data[at : at + 512] = b"?" * 512
+    path.write_bytes(data)
+
+
+def _cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:5000])
+
+
+ONE_EXPERIMENT = (
+    "INSERT INTO experiments (id, robot, state, submitted, submitted_by, reason, spec, priority, trace) "
+    "VALUES ('a', 'ma2000', '{state}', '2026-01-01 00:00:00', 'anna', '', '{spec}', 0, 't')"
+)
+AT_THE_START = {
+    "no database": _garble,
+    "pages that are none": _garble_inside,
+    "a half": _cut,
+    "a lost table": _says("DROP TABLE queues"),
+    "a lost column": _says("DROP INDEX experiments_by_state", "ALTER TABLE experiments DROP COLUMN priority"),
+    "an unknown state": _says(ONE_EXPERIMENT.format(state="paused", spec="{}")),
+    "no version": _says("DROP TABLE alembic_version"),
+    "a newer version": _says("UPDATE alembic_version SET version_num = '9999'"),
+}
+
+
+def _opened(store: Store) -> None:
+    store.migrate()
+    store.require_sound()
+
+
+@pytest.mark.parametrize("damage", AT_THE_START.values(), ids=AT_THE_START)
+def test_a_damaged_database_is_one_line_at_the_start_that_offers_the_backup(tmp_path: Path, damage: Damage) -> None:
+    path = tmp_path / FILE
+    whole = Store(f"sqlite:///{path}")
+    whole.migrate()
+    whole.close()
+    for beside in tmp_path.glob(f"{FILE}-*"):
+        beside.unlink()
+    damage(path)
+    store = Store(f"sqlite:///{path}")
+    with pytest.raises(DaqError) as refused:
+        _opened(store)
+    store.close()
+    line = str(refused.value)
+    assert "\n" not in line
+    assert str(path) in line
+    assert "daq restore" in line
+    assert len(line) < 600
+
+
+def test_serve_says_so_and_ends(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    folder = tmp_path / "service"
+    folder.mkdir()
+    _garble(folder / FILE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    CommandLine(capsys, monkeypatch)("serve", "--port", "0").complains(2, FILE, "daq restore")
+
+
+WHILE_IT_RUNS = {
+    "traces": (_says("DROP TABLE traces"), "/traces"),
+    "experiments": (_says(ONE_EXPERIMENT.format(state="queued", spec="[")), "/experiments"),
+    "jobs": (_says("DROP INDEX jobs_by_state", "ALTER TABLE jobs RENAME COLUMN headline TO other"), "/jobs"),
+    "events": (_says("INSERT INTO events (robot, at, kind, text) VALUES ('ma2000', 'noon', 'x', 'y')"), "/events"),
+}
+
+
+def test_a_table_that_breaks_while_it_runs_is_named_and_everything_else_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with service_inside(tmp_path, SystemClock(), monkeypatch) as api:
+        for table, (damage, address) in WHILE_IT_RUNS.items():
+            damage(tmp_path / "service" / FILE)
+            answer = api.get(address, params={"limit": 7})  # a part that nobody remembers
+            assert (answer.status_code, answer.json()["type"]) == (503, "docs/service.md#database"), answer.text
+            assert f"table {table}" in answer.json()["detail"]
+            assert "daq restore" in answer.json()["advice"]
+            assert "\n" not in answer.json()["detail"]
+        assert api.get("/queue").status_code == 200
+        assert api.post("/stop").status_code == 200
