@@ -2,11 +2,11 @@
 
     python -m benchmarks run_kills [--moments 100] [--seed 1991]
 
-Each of four ways to end a run meets that many runs, half of them while they are recorded, each on a mock of its own in lock-step: the same run gives the same
-samples to the last bit, whatever the computer does. Afterwards nothing may be left running, the port must be free, the
-arm must be frozen or hold (frozen where the record had begun, unless the acquisition process itself was killed), and
-every trace, salvaged where need be, must be the undisturbed run's up to the stop; what was recorded after that is held
-against the mock's own record.
+Each of four ways to end a run meets that many runs, half of them while they are recorded, each on a mock of its own in
+lock-step: the same run gives the same samples to the last bit, whatever the computer does. Afterwards nothing may be
+left running, the port must be free, the arm must be frozen or hold (frozen where the record had begun, unless the
+acquisition process itself was killed), and every trace, salvaged where need be, must be the undisturbed run's up to the
+stop; what was recorded after that is held against the mock's own record.
 """
 
 from __future__ import annotations
