@@ -33,7 +33,7 @@ def folder(tmp_path: Path) -> Path:
 
 def get(folder: Path, path: str, **headers: str) -> httpx.Response:
     """The answer of a server of the page in `folder`."""
-    app = FastAPI()
+    app = FastAPI(docs_url=None)  # the page has its own
     app.include_router(page_router(folder))
 
     async def asked() -> httpx.Response:

@@ -854,6 +854,8 @@ export interface paths {
         /**
          * Submit Job
          * @description Begins a computation as soon as a worker is free. The same Idempotency-Key gives the same job (200).
+         *
+         *     Comparisons and validations of few traces have a worker of their own: they wait behind no fit and no diagnosis.
          */
         post: operations["submit_job"];
         delete?: never;
@@ -2519,6 +2521,7 @@ export interface components {
              * @default false
              */
             has_report?: boolean;
+            waits_behind?: components["schemas"]["WaitsBehind"] | null;
         };
         /**
          * JobMessage
@@ -4332,6 +4335,8 @@ export interface components {
             live_dropped: number;
             /** Jobs At Once */
             jobs_at_once: number;
+            /** Short Jobs At Once */
+            short_jobs_at_once: number;
             /** Unattended */
             unattended: boolean;
             /** Stop Port */
@@ -4753,6 +4758,20 @@ export interface components {
             kind: "wait";
             /** Duration */
             duration: number;
+        };
+        /**
+         * WaitsBehind
+         * @description What a queued job waits for: the first of the jobs of its lane that come before it.
+         */
+        WaitsBehind: {
+            /** Job */
+            job: string;
+            /** Request */
+            request: components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"];
+            /** Started */
+            started: string | null;
+            /** Others */
+            others: number;
         };
         /**
          * Where

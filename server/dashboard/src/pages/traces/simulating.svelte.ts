@@ -5,6 +5,7 @@
 
 import { asProblem, type Problem } from '../../lib/api/problem';
 import type { Job } from '../../lib/api/types';
+import { waitingWords } from '../../lib/jobs/waiting';
 import { rmsDifference } from '../../lib/traces/columns';
 
 /** Columns of the joints that the model describes; rad, or m on a prismatic joint. */
@@ -27,8 +28,8 @@ interface Compared {
 }
 
 export interface SimulatingRequests {
-  /** The number of a new job. */
-  begin(trace: string, model: string): Promise<string>;
+  /** A new job. */
+  begin(trace: string, model: string): Promise<Job>;
   /** The job once it has ended, or after a while. */
   news(job: string): Promise<Job>;
   result(job: string): Promise<unknown>;
@@ -56,11 +57,12 @@ export class Simulating {
     try {
       const job = await this.requests.begin(this.trace, model);
       try {
-        const found = await this.ended(job, turn);
+        this.progress = this.words(job);
+        const found = await this.ended(job.id, turn);
         if (turn === this.turn) this.shown = simulationOf(found, model);
       } finally {
         // What was only looked at is not kept, nor what failed: a job would keep the trace from being deleted.
-        await this.requests.remove(job).catch(() => {});
+        await this.requests.remove(job.id).catch(() => {});
       }
     } catch (error) {
       if (turn === this.turn) this.problem = asProblem(error);
@@ -76,10 +78,17 @@ export class Simulating {
     this.problem = null;
   }
 
+  /** `now`: this computer's clock. The trace that is computed before it is named by its number. */
+  private words(job: Job): string {
+    return job.state === 'queued'
+      ? waitingWords(job, Date.now(), (trace) => `trace ${trace}`)
+      : job.progress_text;
+  }
+
   private async ended(id: string, turn: number): Promise<Compared> {
     for (;;) {
       const job = await this.requests.news(id);
-      if (turn === this.turn) this.progress = job.progress_text;
+      if (turn === this.turn) this.progress = this.words(job);
       if (job.state === 'done') break;
       if (job.state !== 'queued' && job.state !== 'running') throw new Error(job.reason);
     }

@@ -12,7 +12,7 @@ let simulating: Simulating;
 
 beforeEach(() => {
   requests = {
-    begin: vi.fn(() => Promise.resolve('a')),
+    begin: vi.fn(() => Promise.resolve(job('queued'))),
     news: vi.fn(() => Promise.resolve(job('done'))),
     result: vi.fn(() => Promise.resolve(COMPARED)),
     remove: vi.fn(() => Promise.resolve()),
@@ -27,6 +27,16 @@ describe('a simulation', () => {
     expect(requests.begin).toHaveBeenCalledWith('trace', 'machine');
     expect([simulating.shown?.rms, simulating.problem, simulating.busy]).toEqual([[3], null, false]);
     expect(requests.remove).toHaveBeenCalledExactlyOnceWith('a');
+  });
+
+  it('that has to wait says behind what', async () => {
+    const request = { kind: 'compare', traces: ['t'] };
+    const waits_behind = { job: 'b', request, started: null, others: 0 } as unknown as Job['waits_behind'];
+    requests.begin.mockResolvedValueOnce({ ...job('queued'), waits_behind });
+    const waited = new Promise<Job>(() => {});
+    requests.news.mockReturnValueOnce(waited);
+    void simulating.with('machine');
+    await vi.waitFor(() => expect(simulating.progress).toBe('waits behind: simulation of trace t'));
   });
 
   it('that failed says why, and its job does not keep the trace from being deleted', async () => {
