@@ -241,8 +241,8 @@ def _system() -> list[BaseModel]:
         Health(status="ok", version="0.1.0", checks={"database": "", "traces": "", f"robot {ROBOT}": ""}),
         Me(name="anna", role="operator"),
         SystemStatus(
-            version="0.1.0", uptime=86400.0, storage=storage, live_clients=3, live_dropped=0, jobs_at_once=1, short_jobs_at_once=1,
-            unattended=False, stop_port=8301,
+            version="0.1.0", uptime=86400.0, storage=storage, live_clients=3, live_dropped=0, jobs_at_once=1,
+            short_jobs_at_once=1, unattended=False, stop_port=8301,
         ),
     ]  # fmt: skip
 

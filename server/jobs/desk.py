@@ -44,8 +44,8 @@ def worker_processes(count: int) -> Executor:
 
 @dataclass(frozen=True)
 class JobParts:
-    """What the desk works with. `changed` is told of every job that has changed; it must not wait. `at_once`: workers of
-    the long lane."""
+    """What the desk works with. `changed` is told of every job that has changed; it must not wait. `at_once`: workers
+    of the long lane."""
 
     robot: str
     machine: Machine
@@ -241,7 +241,7 @@ class JobDesk:
         return _failed(BrokenExecutor())
 
     def _collect(self) -> bool:
-        """Ends what has been computed. One whose end cannot be written holds up no other. Whether anything has ended."""
+        """Ends what has been computed. One whose end cannot be written holds up no other. Whether any has ended."""
         has_ended = False
         for identity, (job, future) in list(self._running.items()):
             if not future.done():

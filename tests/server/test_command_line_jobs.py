@@ -25,7 +25,7 @@ Daq = Callable[..., Said]
 
 @pytest.fixture(scope="module", autouse=True)
 def worker(sound_service: Service) -> None:
-    """The worker processes of both lanes are there before the tests, which may leave none behind: each has had a job."""
+    """The workers of both lanes are there before the tests, which may leave none behind: each has had a job."""
     spec = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.2}, "settle": 0.1, "hold": 0.1}
     ended = sound_service.end_of(sound_service.robot.post("/experiments", json={"spec": spec}).json()["id"])
     compare = {"kind": "compare", "traces": [ended["trace"]], "models": ["machine"]}
