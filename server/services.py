@@ -41,6 +41,7 @@ from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
 from server.store.models import ModelStore
+from server.store.programs import ProgramStore
 from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
@@ -87,6 +88,7 @@ class Services:
         self.traces = TraceStore(self.store)
         self.jobs = JobStore(self.store)
         self.models = ModelStore(self.store)
+        self.programs = ProgramStore(self.store)
         self.folder = settings.server.folder.absolute()
         self.events = EventStore(self.store)
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
