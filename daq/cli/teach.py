@@ -154,7 +154,9 @@ def step(
 @app.command("program")
 def run_file(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(help="A taught program (.json or .toml), or the name of one that a service keeps.")],
+    file: Annotated[
+        Path, typer.Argument(help="A taught program (.json or .toml), or the name of one that a service keeps.")
+    ],
     yes: YesOption = False,
 ) -> None:
     """Carry out a taught program: steps, paths, waits, process signals."""

@@ -1,4 +1,4 @@
-"""Lanes of jobs: one whose work is bounded from the outset does not wait behind one that computes until it converges."""
+"""Lanes of jobs: one that is bounded from the outset does not wait behind one that computes until it converges."""
 
 from __future__ import annotations
 

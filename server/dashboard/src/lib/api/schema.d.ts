@@ -412,6 +412,77 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/robots/{robot}/programs": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Programs
+         * @description Programs that are kept, the one changed last first.
+         */
+        get: operations["list_programs"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/programs/{program}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Program
+         * @description One program, with the revision that a change of it names.
+         */
+        get: operations["get_program"];
+        /**
+         * Put Program
+         * @description Keeps a program, or a change of it: `revision` is the one that was changed. Moves nothing, and needs no control.
+         *
+         *     A body with another name than the address renames it. What somebody else has changed meanwhile is not overwritten:
+         *     409.
+         */
+        put: operations["put_program"];
+        post?: never;
+        /**
+         * Delete Program
+         * @description Deletes a program for good.
+         */
+        delete: operations["delete_program"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/programs/{program}/run": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Run Stored Program
+         * @description Carries out a kept program, as POST …/teaching/program does with one that is sent.
+         */
+        post: operations["run_stored_program"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/robots/{robot}/experiments": {
         parameters: {
             query?: never;
@@ -3517,6 +3588,27 @@ export interface components {
             instructions: (components["schemas"]["Absolute"] | components["schemas"]["Relative"] | components["schemas"]["PlayPath"] | components["schemas"]["Wait"] | components["schemas"]["SetOutput"] | components["schemas"]["AwaitInput"] | components["schemas"]["Gripper"])[];
         };
         /**
+         * ProgramEntry
+         * @description A taught program that the service keeps. `revision` grows with every change; `instructions` is their number.
+         */
+        ProgramEntry: {
+            /** Name */
+            name: string;
+            /** Robot */
+            robot: string;
+            /** Revision */
+            revision: number;
+            /** Instructions */
+            instructions: number;
+            /**
+             * Changed
+             * Format: date-time
+             */
+            changed: string;
+            /** Changed By */
+            changed_by: string;
+        };
+        /**
          * ProgressMessage
          * @description How far the experiment is that runs.
          */
@@ -4318,6 +4410,14 @@ export interface components {
             database: string;
             /** Database Size */
             database_size: number | null;
+        };
+        /**
+         * StoredProgram
+         * @description A program with what is known about it.
+         */
+        StoredProgram: {
+            entry: components["schemas"]["ProgramEntry"];
+            program: components["schemas"]["Program"];
         };
         /**
          * SystemStatus
@@ -5365,6 +5465,137 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MeasuredGain"][];
+                };
+            };
+        };
+    };
+    list_programs: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProgramEntry"][];
+                };
+            };
+        };
+    };
+    get_program: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the program. */
+                program: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StoredProgram"];
+                };
+            };
+        };
+    };
+    put_program: {
+        parameters: {
+            query?: {
+                /** @description That which was changed; none for a new program. */
+                revision?: number | null;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the program. */
+                program: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Program"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProgramEntry"];
+                };
+            };
+        };
+    };
+    delete_program: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the program. */
+                program: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+        };
+    };
+    run_stored_program: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description The lease that POST …/control gave. */
+                "Control-Lease"?: string | null;
+            };
+            path: {
+                /** @description Name of the program. */
+                program: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TeachingStatus"];
                 };
             };
         };
