@@ -43,6 +43,7 @@ class Gate:
     open_on_loopback: whether this computer's users are operators without a token: the service listens at loopback alone
     stop_port:        of the stop listener, which the page may ask for a stop, too
     observed:         called with method, status and seconds of every request
+    refused:          called with the kind of problem of every request and WebSocket that is let in no further
     """
 
     tokens: KnownTokens
@@ -51,6 +52,7 @@ class Gate:
     names: tuple[str, ...] = ()
     stop_port: int | None = None
     observed: Callable[[str, int, float], None] = lambda _method, _status, _seconds: None
+    refused: Callable[[str], None] = lambda _reason: None
     buckets: Buckets = field(default_factory=Buckets)
 
     def middleware(self, app: ASGIApp) -> ASGIApp:
@@ -89,6 +91,7 @@ class Gate:
             try:
                 state["caller"] = await self._admit(scope)
             except ProblemError as problem:
+                self.refused(problem.kind)
                 await response(Request(scope), problem)(scope, receive, secured)
                 return
             await app(scope, receive if _is_post(scope, UPLOADS) else counted(receive, LARGEST_BODY), secured)
@@ -104,6 +107,7 @@ class Gate:
         try:
             state["caller"] = await self._admit(scope)
         except ProblemError as problem:
+            self.refused(problem.kind)
             log.warning("refused a WebSocket: %s", problem.detail)
             await WebSocketClose(NOT_ALLOWED, problem.detail)(scope, receive, send)
             return
