@@ -5,7 +5,6 @@
 
 import { asProblem, type Problem } from '../../lib/api/problem';
 import type { Job } from '../../lib/api/types';
-import { waitingWords } from '../../lib/jobs/waiting';
 import { rmsDifference } from '../../lib/traces/columns';
 
 /** Columns of the joints that the model describes; rad, or m on a prismatic joint. */
@@ -39,7 +38,8 @@ export interface SimulatingRequests {
 export class Simulating {
   shown = $state.raw<Simulation | null>(null);
   busy = $state(false);
-  progress = $state('');
+  /** Its job, as far as it was told of; null before it is known. */
+  job = $state.raw<Job | null>(null);
   problem = $state.raw<Problem | null>(null);
   private turn = 0;
 
@@ -53,11 +53,11 @@ export class Simulating {
     const turn = ++this.turn;
     this.busy = true;
     this.problem = null;
-    this.progress = 'waits for a worker';
+    this.job = null;
     try {
       const job = await this.requests.begin(this.trace, model);
       try {
-        this.progress = this.words(job);
+        this.told(job, turn);
         const found = await this.ended(job.id, turn);
         if (turn === this.turn) this.shown = simulationOf(found, model);
       } finally {
@@ -78,17 +78,14 @@ export class Simulating {
     this.problem = null;
   }
 
-  /** `now`: this computer's clock. The trace that is computed before it is named by its number. */
-  private words(job: Job): string {
-    return job.state === 'queued'
-      ? waitingWords(job, Date.now(), (trace) => `trace ${trace}`)
-      : job.progress_text;
+  private told(job: Job, turn: number): void {
+    if (turn === this.turn) this.job = job;
   }
 
   private async ended(id: string, turn: number): Promise<Compared> {
     for (;;) {
       const job = await this.requests.news(id);
-      if (turn === this.turn) this.progress = this.words(job);
+      this.told(job, turn);
       if (job.state === 'done') break;
       if (job.state !== 'queued' && job.state !== 'running') throw new Error(job.reason);
     }

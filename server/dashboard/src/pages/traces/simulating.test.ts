@@ -29,14 +29,12 @@ describe('a simulation', () => {
     expect(requests.remove).toHaveBeenCalledExactlyOnceWith('a');
   });
 
-  it('that has to wait says behind what', async () => {
-    const request = { kind: 'compare', traces: ['t'] };
-    const waits_behind = { job: 'b', request, started: null, others: 0 } as unknown as Job['waits_behind'];
-    requests.begin.mockResolvedValueOnce({ ...job('queued'), waits_behind });
-    const waited = new Promise<Job>(() => {});
-    requests.news.mockReturnValueOnce(waited);
+  it('that has to wait tells of its job at once', async () => {
+    const waiting = job('queued');
+    requests.begin.mockResolvedValueOnce(waiting);
+    requests.news.mockReturnValueOnce(new Promise<Job>(() => {}));
     void simulating.with('machine');
-    await vi.waitFor(() => expect(simulating.progress).toBe('waits behind: simulation of trace t'));
+    await vi.waitFor(() => expect(simulating.job).toBe(waiting));
   });
 
   it('that failed says why, and its job does not keep the trace from being deleted', async () => {
