@@ -10,7 +10,7 @@ from daq.contracts.service.jobs import CompareRequest, Job, JobRequest, Validate
 Lane = Literal["short", "long"]
 LANES: tuple[Lane, ...] = get_args(Lane)
 SHORT_LANE_WORKERS = 1
-"""Worker processes of the short lane. One suffices, since a job there takes seconds; each costs about 200 MB."""
+"""Worker processes of the short lane. One suffices, since a job there takes seconds; each costs about 250 MB."""
 MOST_PASSES = 20
 """Passes over a trace that a short job may consist of; one takes a second or so. A comparison of more is as long as a
 fit."""

@@ -60,7 +60,7 @@ def test_a_program_is_there_after_another_page_and_another_control(dashboard: Da
 def test_gains_are_changed_and_read_back(dashboard: Dashboard, controlled: Page) -> None:
     robot = dashboard.service.robot
     before = robot.get("/gains").json()["gains"]["2"]
-    field = controlled.get_by_label("P of joint 2")
+    field = controlled.get_by_label("P of joint 2", exact=True)
     expect(field).to_have_value(str(before[0]))
     write = controlled.get_by_role("button", name="Write changes")
     expect(write).to_be_disabled()
