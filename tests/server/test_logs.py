@@ -50,9 +50,10 @@ def test_every_line_is_json_whoever_writes_it() -> None:
 
 
 def test_what_is_wrong_with_the_configuration_is_a_line_of_json() -> None:
-    (line,) = _told("import sys; sys.argv = ['daq', '--port', 'nonsense', 'serve']; from daq.cli import main; main()")
+    daq = "import sys; sys.argv = ['daq', '--config', 'nothing.toml', 'serve']; from daq.cli import main; main()"
+    (line,) = _told(daq)
     assert line["text"].startswith("daq: ")
-    assert "nonsense" in line["text"]
+    assert "nothing.toml" in line["text"]
 
 
 def test_a_log_that_cannot_be_written_does_not_end_the_program() -> None:
