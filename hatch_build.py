@@ -107,7 +107,7 @@ def _sources() -> list[Path]:
     """What the page is built from."""
     folders = [path for name in ("src", "public") for path in (DASHBOARD / name).rglob("*") if path.is_file()]
     tests = [path for path in folders if path.name.endswith(".test.ts")]
-    settings = ("index.html", "vite.config.ts", "svelte.config.js", COMPRESS.name, *LOCK_FILES)
+    settings = ("index.html", "reference.html", "vite.config.ts", "svelte.config.js", COMPRESS.name, *LOCK_FILES)
     files = [DASHBOARD / name for name in settings]
     return [path for path in [*folders, *files] if path.is_file() and path not in tests]
 

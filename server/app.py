@@ -12,7 +12,7 @@ from fastapi.routing import APIRoute
 
 from server import description, problems
 from server.access.gate import Gate
-from server.api import controller, experiments, jobs, live, presets, queue, robots, system, teaching, traces
+from server.api import controller, experiments, jobs, live, presets, programs, queue, robots, system, teaching, traces
 from server.page import page_router
 from server.services import Services
 
@@ -58,7 +58,7 @@ def bare_app(services: Services | None) -> FastAPI:
     )
     problems.install(app)
     api = APIRouter(prefix=API)
-    for part in (robots, controller, teaching, experiments, presets, queue, traces, jobs, live, system):
+    for part in (robots, controller, teaching, programs, experiments, presets, queue, traces, jobs, live, system):
         api.include_router(part.router)
     app.include_router(api)
     app.include_router(system.plain)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import json
 import logging
 import sys
+import threading
 from contextvars import ContextVar
 from datetime import UTC, datetime
+from types import TracebackType
 from typing import TextIO
 
 request_id: ContextVar[str | None] = ContextVar("request_id", default=None)
+_printed = logging.getLogger("stderr")
 _OF_EVERY_RECORD = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName", "color_message"}
 
 
@@ -42,9 +46,72 @@ class PlainLines(logging.Formatter):
         return f"{text}\n{self.formatException(record.exc_info)}" if record.exc_info else text
 
 
-def begin(stream: TextIO = sys.stderr, level: int = logging.INFO) -> None:
-    """All logs of this process, from now on, to `stream`."""
+class StandardError(io.TextIOBase):
+    """Stands for `sys.stderr` where logs are JSON: what anything prints there becomes a record, line by line."""
+
+    encoding = "utf-8"
+
+    def __init__(self, real: TextIO) -> None:
+        self.real = real
+        self._begun = ""
+        self._writing = threading.local()
+
+    def write(self, text: str) -> int:
+        """Lines that are whole are logged; the rest waits for its end. What fails to be logged is lost: logging tells
+        of its own failures here, and would be called again for each."""
+        if getattr(self._writing, "active", False):
+            return len(text)
+        self._writing.active = True
+        try:
+            *lines, self._begun = (self._begun + text).split("\n")
+            for line in lines:
+                if line.strip():
+                    _printed.warning("%s", line.rstrip())
+        finally:
+            self._writing.active = False
+        return len(text)
+
+    def fileno(self) -> int:
+        """Of the stream behind."""
+        return self.real.fileno()
+
+    def isatty(self) -> bool:
+        """Never."""
+        return False
+
+    def writable(self) -> bool:
+        """Always."""
+        return True
+
+
+def begin(stream: TextIO | None = None, level: int = logging.INFO) -> None:
+    """All logs of this process, from now on, to `stream`: standard error. Where that is no terminal they are JSON, and
+    so is whatever else is written there by this process: warnings, what ends a thread, what a library prints."""
+    if stream is None:
+        stream = sys.stderr.real if isinstance(sys.stderr, StandardError) else sys.stderr
     handler = logging.StreamHandler(stream)
     handler.setFormatter(PlainLines() if stream.isatty() else JsonLines())
     logging.basicConfig(level=logging.WARNING, handlers=[handler], force=True)
     logging.getLogger("server").setLevel(level)
+    logging.captureWarnings(True)
+    if not stream.isatty():
+        sys.stderr = StandardError(stream)
+        sys.excepthook = _ended_process
+        threading.excepthook = _ended_thread
+        sys.unraisablehook = _not_raised
+
+
+def _ended_process(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    _printed.critical("this process ends: %s", error, exc_info=(kind, error, trace))
+
+
+def _ended_thread(args: threading.ExceptHookArgs) -> None:
+    name = args.thread.name if args.thread else "unknown"
+    error = args.exc_value or args.exc_type()
+    _printed.error("thread %s ended: %s", name, error, exc_info=(args.exc_type, error, args.exc_traceback))
+
+
+def _not_raised(args: sys.UnraisableHookArgs) -> None:
+    error = args.exc_value or args.exc_type()
+    text = args.err_msg or "an error that could not be raised"
+    _printed.error("%s: %s", text, error, exc_info=(args.exc_type, error, args.exc_traceback))

@@ -11,6 +11,8 @@ from fastapi.responses import PlainTextResponse
 
 FOLDER = Path(__file__).parent / "dashboard" / "dist"
 INDEX = "index.html"
+REFERENCE = "reference.html"
+"""The reference of the API, served at `/docs`."""
 NOT_BUILT = "the dashboard's page is not built: run `make page` in the source tree (it needs no Node of your own)"
 TYPES = {
     ".html": "text/html; charset=utf-8",
@@ -67,7 +69,8 @@ def is_built(folder: Path = FOLDER) -> bool:
 
 
 def page_router(folder: Path = FOLDER) -> APIRouter:
-    """Routes of every file of the page; `/` is its index. Without a built page, `/` says how to build it."""
+    """Routes of every file of the page; `/` is its index, `/docs` the reference of the API. Without a built page, both
+    say how to build it."""
     router = APIRouter(include_in_schema=False)
     files = _files(folder) if is_built(folder) else {}
 
@@ -76,6 +79,12 @@ def page_router(folder: Path = FOLDER) -> APIRouter:
         if INDEX not in files:
             return PlainTextResponse(NOT_BUILT + "\n", 503)
         return files[INDEX].response(request)
+
+    @router.get("/docs")
+    async def reference(request: Request) -> Response:
+        if REFERENCE not in files:
+            return PlainTextResponse(NOT_BUILT + "\n", 503)
+        return files[REFERENCE].response(request)
 
     def add(name: str, file: PageFile) -> None:
         async def get(request: Request) -> Response:

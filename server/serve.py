@@ -13,7 +13,6 @@ import uvicorn
 from daq.config import Settings
 from daq.config.service import ServiceSettings
 from daq.contracts.errors import SpecError
-from server import logs
 from server.access.gate import Gate
 from server.access.origin import is_loopback
 from server.access.tokens import KnownTokens
@@ -37,7 +36,6 @@ GRACE = 1
 def serve(settings: Settings, ready: Callable[[str], None]) -> None:
     """Serves until a signal ends it. `ready` is called with the address. Raises ListenError, InUseError, StoreError,
     SpecError, StopDoorError."""
-    logs.begin()
     section = settings.server
     with (
         sole_use(section.database_url),
@@ -95,7 +93,8 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
         raise SpecError(f"{why}, and there is no token: {make}, or {instead}")
     known = KnownTokens(services.tokens, services.clock)
     names = tuple(name.lower() for name in section.names)
-    return Gate(known, services.tickets, local, names, stop_port, services.metrics.request)
+    metrics = services.metrics
+    return Gate(known, services.tickets, local, names, stop_port, metrics.request, metrics.refused)
 
 
 def _is_open_here(section: ServiceSettings) -> bool:

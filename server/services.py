@@ -18,6 +18,7 @@ from daq.config import Settings
 from daq.config.robot_files import load_memory_map
 from daq.contracts.errors import DaqError
 from daq.contracts.service.events import ServiceEvent
+from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import EventMessage, JobMessage
 from daq.trajectories import control_period
 from server.access.lanes import Lanes
@@ -47,6 +48,7 @@ from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
 from server.store.models import ModelStore
+from server.store.programs import ProgramStore
 from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
@@ -94,6 +96,7 @@ class Services:
         self.traces = TraceStore(self.store)
         self.jobs = JobStore(self.store)
         self.models = ModelStore(self.store)
+        self.programs = ProgramStore(self.store)
         self.folder = settings.server.folder.absolute()
         self.events = EventStore(self.store)
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
@@ -218,7 +221,7 @@ class Services:
                 catalogue=catalogue,
                 models=models,
                 clock=self.clock,
-                changed=lambda job: hub.publish("jobs", JobMessage(job=job)),
+                changed=lambda job: self._job_changed(hub, job),
                 at_once=settings.server.jobs_at_once,
             )
         )
@@ -232,6 +235,7 @@ class Services:
         Raises nothing where the database fails: what has happened has happened, and whoever asked for it is told so.
         """
         log.info("%s: %s: %s", robot, kind, text, extra={"actor": actor, "experiment": experiment})
+        self.metrics.told(robot, kind)
         event: ServiceEvent | None = None
         try:
             event = self.events.add(robot, kind, text, self.clock.utc(), actor, experiment)
@@ -242,6 +246,10 @@ class Services:
             if event is not None:
                 one.hub.publish("events", EventMessage(event=event))
             one.hub.look()
+
+    def _job_changed(self, hub: Hub, job: Job) -> None:
+        self.metrics.job(job)
+        hub.publish("jobs", JobMessage(job=job))
 
     def tell_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:
         """The same, for whoever must not wait for a disk."""

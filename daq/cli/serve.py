@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Annotated
 
 import typer
 
-from daq.cli.context import console, invocation
+from daq.cli.context import invocation
 
 app = typer.Typer(add_completion=False)
 
@@ -18,8 +19,10 @@ def serve(
     port: Annotated[int | None, typer.Option(min=0, max=65535, help="Port to listen at; 0 for any free one.")] = None,
 ) -> None:
     """Serve experiments, traces and the dashboard to people and programs."""
+    from server import logs
     from server.serve import serve as run
 
+    logs.begin()  # first: what is wrong with the configuration is a line of the log, too
     call = invocation(context)
     settings = call.settings
     section = settings.server.model_copy(
@@ -32,7 +35,8 @@ def serve(
 def _tell(address: str) -> None:
     from server.page import NOT_BUILT, is_built
 
-    console().print(f"serving {address} (Ctrl-C ends it)")
+    log = logging.getLogger("server")
+    log.info("serving %s (Ctrl-C ends it)", address)
     if not is_built():
-        console().print(NOT_BUILT)
+        log.warning(NOT_BUILT)
     print(address, flush=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
+from daq.cli import teach_programs
 from daq.cli.consent import agreed
 from daq.cli.context import Invocation, JsonOption, YesOption, console, invocation
 from daq.cli.quantities import parse_angle, parse_per_joint_angles
@@ -31,6 +32,7 @@ app = typer.Typer(
     help="Jog, lead by the nose, steps, and playing back. Needs a configured robot, or --port.",
     no_args_is_help=True,
 )
+app.add_typer(teach_programs.app, name="programs")
 
 
 @contextmanager
@@ -152,13 +154,21 @@ def step(
 @app.command("program")
 def run_file(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(help="A taught program (.json or .toml).")],
+    file: Annotated[
+        Path, typer.Argument(help="A taught program (.json or .toml), or the name of one that a service keeps.")
+    ],
     yes: YesOption = False,
 ) -> None:
     """Carry out a taught program: steps, paths, waits, process signals."""
     from daq.teaching.program import load_program
 
-    _perform(invocation(context), load_program(file), yes)
+    call = invocation(context)
+    if call.server is not None and not file.exists():
+        from daq.cli.remote.programs import fetched_program
+
+        _perform(call, fetched_program(call, str(file)), yes)
+        return
+    _perform(call, load_program(file), yes)
 
 
 def _perform(call: Invocation, program: Program, consent: bool) -> None:

@@ -10,6 +10,7 @@ from daq.client.control import HeldControl
 from daq.client.experiments import Experiments, Queue, Schedules, new_key
 from daq.client.jobs import Jobs, Models
 from daq.client.live import LiveStream, open_stream
+from daq.client.programs import Programs
 from daq.client.traces import Traces
 from daq.contracts.machine import Machine
 from daq.contracts.service.events import ServiceEvent
@@ -37,6 +38,7 @@ class Robot:
         self.traces = Traces(connection, self._path)
         self.jobs = Jobs(connection, self._path)
         self.models = Models(connection, self._path)
+        self.programs = Programs(connection, self._path)
 
     def stop(self) -> StopResult:
         """Freezes the arm, at once. Read `confirmed`: anything else means that the emergency stop is needed.

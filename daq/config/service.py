@@ -44,7 +44,7 @@ class ServiceSettings(BaseModel):
     unattended: Consent = False
     """Whether the queue may move a real arm while no operator says to be there."""
     jobs_at_once: Annotated[int, Field(ge=1, le=64)] = 1
-    """Worker processes for fits, validations and comparisons."""
+    """Worker processes for fits and diagnoses; short jobs have one of their own."""
     history: Annotated[float, Field(ge=10, le=3600)] = 300.0
     """s of live samples that a client finds when it joins."""
     upload_size: Annotated[int, Field(ge=1, le=65536)] = 512

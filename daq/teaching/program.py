@@ -129,9 +129,14 @@ def save_program(program: Program, path: Path) -> None:
     write_whole(path, program_text(program))
 
 
+def is_program_name(text: str) -> bool:
+    """Whether a program may be called so."""
+    return re.fullmatch(NAME, text) is not None
+
+
 def require_program_file(path: Path) -> None:
     """Raises SpecError where a program could not be saved as `path`, whose stem is its name: before there is one."""
-    if re.fullmatch(NAME, path.stem) is None:
+    if not is_program_name(path.stem):
         rule = "a name has 1 to 64 letters, digits, _ . or -, and begins with a letter or digit"
         raise SpecError(f"program {path.stem!r}: {rule}")
     if not path.absolute().parent.is_dir():

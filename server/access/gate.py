@@ -48,6 +48,7 @@ class Gate:
     open_on_loopback: whether this computer's users are operators without a token: the service listens at loopback alone
     stop_port:        of the stop listener, which the page may ask for a stop, too
     observed:         called with method, status and seconds of every request
+    refused:          called with the kind of problem of every request and WebSocket that is let in no further
     """
 
     tokens: KnownTokens
@@ -56,6 +57,7 @@ class Gate:
     names: tuple[str, ...] = ()
     stop_port: int | None = None
     observed: Callable[[str, int, float], None] = lambda _method, _status, _seconds: None
+    refused: Callable[[str], None] = lambda _reason: None
     buckets: Buckets = field(default_factory=Buckets)
     sockets: Counter[str] = field(default_factory=Counter)
     """WebSockets that are open, by the caller's name."""
@@ -97,6 +99,7 @@ class Gate:
             try:
                 state["caller"] = await self._admit(scope)
             except ProblemError as problem:
+                self.refused(problem.kind)
                 await response(Request(scope), problem)(scope, receive, secured)
                 return
             except DatabaseError as error:  # of whoever is not known by heart
@@ -120,6 +123,7 @@ class Gate:
         try:
             state["caller"] = await self._admit(scope)
         except ProblemError as problem:
+            self.refused(problem.kind)
             log.warning("refused a WebSocket: %s", problem.detail)
             await WebSocketClose(NOT_ALLOWED, problem.detail)(scope, receive, send)
             return

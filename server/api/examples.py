@@ -60,6 +60,7 @@ from daq.contracts.service.teaching import (
     JogRequest,
     LeadRequest,
     MeasuredGain,
+    ProgramEntry,
     StepRequest,
     TeachingStatus,
 )
@@ -71,10 +72,13 @@ from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgre
 from model.comparison.difference import ParameterDifference
 from model.machine_model.model import base_model
 from server.jobs.results import ComparisonData, ComparisonJobResult, Overlay
+from server.store.programs import StoredProgram
 
 NOON = datetime(2026, 3, 2, 12, 0, tzinfo=UTC)
 ROBOT, TRACE, EXPERIMENT, JOB, MODEL = "ma2000", "3fa1c5d20b77", "c40d1a2b93ee", "77be01d3aa42", "9d2f4b6c8e10"
 SPEC = ExperimentSpec(trajectory=Ramp(amplitude=0.377, duration=0.65), joints=(1, 2, 3), name="morning-ramp")
+PICK = Program(name="pick", instructions=(Absolute(angles={1: 3.14, 2: 1.4}), Gripper(closed=True), Wait(duration=1)))
+PROGRAM = ProgramEntry(name="pick", robot=ROBOT, revision=3, instructions=3, changed=NOON, changed_by="anna")
 QUEUE = QueueStatus(paused=False, reason="resumed by anna", since=NOON, queued=2, running=EXPERIMENT)
 NOBODY = Control(holder="nobody")
 IDENTITY = RobotIdentity(simulated=False, protocol=2, period=0.02, boots=3)
@@ -152,8 +156,10 @@ def _teaching() -> list[BaseModel]:
         JogRequest(velocities={2: 0.1}),
         StepRequest(by={2: -0.09}, speed=0.2),
         LeadRequest(joints=(1, 2, 3)),
-        Program(name="pick", instructions=(Absolute(angles={1: 3.14, 2: 1.4}), Gripper(closed=True), Wait(duration=1))),
+        PICK,
         TeachingStatus(activity="none", result="done: 3 instructions"),
+        PROGRAM,
+        StoredProgram(entry=PROGRAM, program=PICK),
         CalibrationRequest(joints=(1, 2)),
         MeasuredGain(
             joint=1, gain=2.04, standard_error=0.01, lowest=2.0, highest=2.1, volts_per_rad=42.0, reason=""
@@ -245,7 +251,7 @@ def _system() -> list[BaseModel]:
         Me(name="anna", role="operator"),
         SystemStatus(
             version="0.1.0", uptime=86400.0, storage=storage, live_clients=3, live_dropped=0, jobs_at_once=1,
-            unattended=False, stop_port=8301,
+            short_jobs_at_once=1, unattended=False, stop_port=8301,
         ),
     ]  # fmt: skip
 

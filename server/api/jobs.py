@@ -50,7 +50,10 @@ def submit_job(
     _turn: Turn,
     idempotency_key: IdempotencyKey = None,
 ) -> Job:
-    """Begins a computation as soon as a worker is free. The same Idempotency-Key gives the same job (200)."""
+    """Begins a computation as soon as a worker is free. The same Idempotency-Key gives the same job (200).
+
+    Comparisons and validations of few traces have a worker of their own: they wait behind no fit and no diagnosis.
+    """
     job, new = one.jobs.submit(request, who.name, idempotency_key)
     response.status_code = 201 if new else 200
     response.headers["Location"] = f"/api/v1/robots/{one.robot.name}/jobs/{job.id}"
@@ -70,7 +73,7 @@ def list_jobs(
 ) -> Page[Job]:
     """Jobs, the newest first; with `model` those that were given that model, and the one that made it."""
     page = found.jobs.page(one.robot.name, state or (), kind, cursor, limit, model)
-    return page.model_copy(update={"items": tuple(one.jobs.as_told(job) for job in page.items)})
+    return page.model_copy(update={"items": one.jobs.all_as_told(page.items)})
 
 
 @router.get("/jobs/{job}", tags=["jobs"])
@@ -160,7 +163,7 @@ def get_lineage(one: RobotPart, found: ServicesPart, _: Viewer, _turn: Turn) -> 
     return ModelLineage(
         machine=one.models.machine_identity(),
         models=found.models.newest(one.robot.name, MOST_OF_A_LINEAGE)[::-1],
-        jobs=tuple(one.jobs.as_told(job) for job in reversed(jobs)),
+        jobs=one.jobs.all_as_told(reversed(jobs)),
     )
 
 

@@ -9,7 +9,7 @@ from daq.contracts.service.problems import FieldProblem, ProblemDetails
 from server.problems import ProblemError, details_of
 
 CHANGES = "(post|put|patch|delete) "
-MOVES = f"{CHANGES}.*/(teaching/.*|gains|process/.*|gripper)"
+MOVES = f"{CHANGES}.*/(teaching/.*|programs/.*/run|gains|process/.*|gripper)"
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,10 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
          "delete that one first"),
     _met("delete .*/models/", 409, "model-in-use", "model 9d2f4b6c8e10 was made from 0a1b2c3d4e5f",
          "delete that one first"),
+    _met("put .*/programs/", 409, "program-changed", "program 'pick' was changed by bert meanwhile (revision 4)",
+         "load it again, or keep yours under another name"),
+    _met("put .*/programs/", 409, "program-exists", "there is a program 'pick' already",
+         "choose another name, or delete that one"),
     _met(MOVES, 409, "control-needed", "this moves the robot and needs its control", "take it with POST …/control"),
     _met(f"{MOVES}|put .*/control|post .*/(control|reset|disconnect)$", 409, "control-held",
          "bert has the control, for 8 s more unless it is renewed", "ask for it again when it is given back"),
@@ -60,8 +64,8 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
          "is its workspace clear? then ask again with moves_real_arm"),
     _met(f"{MOVES}|get .*/(gains|process)$|post .*/reset$", 409, "arm-busy", "the arm is busy: lead",
          "wait for its end, or stop it"),
-    _met("post .*/(teaching/.*|queue/resume)$", 409, "arm-stopped", "the arm is stopped: stopped by a person",
-         "reset the robot when it is safe"),
+    _met("post .*/(teaching/.*|programs/.*/run|queue/resume)$", 409, "arm-stopped",
+         "the arm is stopped: stopped by a person", "reset the robot when it is safe"),
     _met(MOVES, 409, "stopped", "the arm has been stopped: stopped by a person", "reset the robot when it is safe"),
     _met("post .*/connect$", 409, "port-in-use", "/dev/ttyUSB0: in use by another program",
          "end the other program, then connect again"),

@@ -17,6 +17,7 @@ from daq.contracts.service.system import Health, Me, StorageStatus, SystemStatus
 from daq.traces.room import RESERVE
 from server.access.caller import caller_of
 from server.api.parts import ServicesPart, Viewer
+from server.jobs.lanes import SHORT_LANE_WORKERS
 from server.problems import PROBLEMS
 from server.queue.room import free_room
 from server.services import Services
@@ -82,6 +83,7 @@ def get_system(found: ServicesPart, _: Viewer) -> SystemStatus:
         live_clients=sum(one.hub.clients for one in found.robots()),
         live_dropped=sum(one.hub.dropped for one in found.robots()),
         jobs_at_once=found.settings.server.jobs_at_once,
+        short_jobs_at_once=SHORT_LANE_WORKERS,
         unattended=found.settings.server.unattended,
         stop_port=found.stop_port,
     )

@@ -11,7 +11,8 @@ function preloaded(program: string): Plugin {
     name: 'preloaded-program',
     transformIndexHtml: {
       order: 'post',
-      handler(html, { bundle, chunk: entry }) {
+      handler(html, { bundle, chunk: entry, filename }) {
+        if (!filename.endsWith('/index.html')) return [];
         const chunks = Object.values(bundle ?? {}).filter((one) => one.type === 'chunk');
         const main = chunks.find((one) => one.facadeModuleId?.endsWith(program));
         if (main === undefined) throw new Error(`no part of the page is made from ${program}`);
@@ -37,6 +38,9 @@ export default defineConfig({
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
     reportCompressedSize: false,
+    // The reference of the API comes as one large program, which only its own page loads.
+    chunkSizeWarningLimit: 2000,
+    rolldownOptions: { input: ['index.html', 'reference.html'] },
   },
   test: { environment: 'node', include: ['src/**/*.test.ts'], isolate: false },
 });

@@ -1,4 +1,4 @@
-"""The jobs of one robot: queued, computed in worker processes one after the other, followed, cancelled, kept."""
+"""The jobs of one robot: queued, computed in the worker processes of their lanes, followed, cancelled, kept."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import os
 import shutil
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +20,7 @@ from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import MACHINE, DiagnoseRequest, FitRequest, Job, JobRequest
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock
+from server.jobs.lanes import LANES, SHORT_LANE_WORKERS, Lane, lane_of, with_what_it_waits_for
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
 from server.jobs.models import Models
 from server.jobs.work import Ended, Task, carry_out
@@ -30,6 +31,8 @@ from server.store.jobs import JobStore, models_of, traces_of
 
 LOOK_EVERY = 0.5
 """s between two looks at how far the jobs are."""
+MOST_TOLD = 50
+"""Waiting jobs that are told anew when one before them has begun or ended."""
 log = logging.getLogger("server.jobs")
 
 
@@ -41,7 +44,8 @@ def worker_processes(count: int) -> Executor:
 
 @dataclass(frozen=True)
 class JobParts:
-    """What the desk works with. `changed` is told of every job that has changed; it must not wait."""
+    """What the desk works with. `changed` is told of every job that has changed; it must not wait. `at_once`: workers
+    of the long lane."""
 
     robot: str
     machine: Machine
@@ -62,8 +66,8 @@ class JobDesk:
         self._parts = parts
         self._wake = threading.Event()
         self._closing = False
-        self._executor: Executor | None = None
-        self._running: dict[str, Future[Ended]] = {}
+        self._executors: dict[Lane, Executor] = {}
+        self._running: dict[str, tuple[Job, Future[Ended]]] = {}
         self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
         parts.jobs.settle_after_restart(parts.robot, parts.clock.utc())
 
@@ -131,7 +135,20 @@ class JobDesk:
         return path
 
     def as_told(self, job: Job) -> Job:
-        """With its progress while it runs."""
+        """With its progress while it runs, and with what it waits behind while it waits."""
+        return self.all_as_told((job,))[0]
+
+    def all_as_told(self, jobs: Iterable[Job]) -> tuple[Job, ...]:
+        """The same for several, with one look at what waits."""
+        jobs = tuple(jobs)
+        waiting = self._parts.jobs.waiting(self._parts.robot) if any(job.state == "queued" for job in jobs) else []
+        running = [job for job, _future in list(self._running.values())]
+        return tuple(
+            with_what_it_waits_for(job, running, waiting) if job.state == "queued" else self._with_progress(job)
+            for job in jobs
+        )
+
+    def _with_progress(self, job: Job) -> Job:
         if job.state != "running":
             return job
         reported = self._reported(job.id)
@@ -145,14 +162,14 @@ class JobDesk:
         self._wake.set()
         if self._thread.is_alive():
             self._thread.join(patience)
-        for identity in self._running:
+        for identity in list(self._running):
             reported = self._reported(identity)
             if reported is not None:
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(reported.process, signal.SIGTERM)
-        if self._executor is not None:
-            self._executor.shutdown(wait=False, cancel_futures=True)
-            self._executor = None
+        for executor in self._executors.values():
+            executor.shutdown(wait=False, cancel_futures=True)
+        self._executors.clear()
 
     def _folder(self, identity: str) -> Path:
         return self._parts.folder / identity
@@ -172,8 +189,8 @@ class JobDesk:
             self._wake.clear()
             failed = False
             try:
-                self._collect()
-                self._begin()
+                if self._collect() | self._begin():
+                    self._tell_waiting()
                 self._tell_progress(told)
             except Exception:
                 # A disk that is full, a database that is locked: the next look may go better.
@@ -181,40 +198,56 @@ class JobDesk:
                 failed = True
             self._wake.wait(LOOK_EVERY if self._running or failed else None)
 
-    def _begin(self) -> None:
+    def _begin(self) -> bool:
+        """Gives what waits to the free workers of its lane. Whether anything has begun."""
         parts = self._parts
+        places = {"short": SHORT_LANE_WORKERS, "long": parts.at_once}
+        free = {lane: places[lane] - self._at_work(lane) for lane in LANES}
+        has_begun = False
         for job in parts.jobs.waiting(parts.robot):
-            if sum(not future.done() for future in self._running.values()) >= parts.at_once:
-                return
+            lane = lane_of(job.request)
+            if free[lane] <= 0:
+                continue
             try:  # its state first: what is cancelled before that is never computed
                 begun = parts.jobs.change(parts.robot, job.id, Event.TAKEN, parts.clock.utc())
             except ProblemError:  # cancelled in this moment
                 continue
-            self._running[job.id] = future = self._handed_over(job.id)
+            future = self._handed_over(job.id, lane, places[lane])
+            self._running[job.id] = begun, future
+            if not future.done():
+                free[lane] -= 1
+            has_begun = True
             self._tell(begun)
             future.add_done_callback(lambda _future: self._wake.set())
+        return has_begun
 
-    def _handed_over(self, identity: str) -> Future[Ended]:
-        """The job in the executor; in a new one where the end of a worker has broken the one there was."""
+    def _at_work(self, lane: Lane) -> int:
+        running = list(self._running.values())
+        return sum(lane_of(job.request) == lane and not future.done() for job, future in running)
+
+    def _handed_over(self, identity: str, lane: Lane, workers: int) -> Future[Ended]:
+        """The job in the executor of its lane; in a new one where the end of a worker has broken the one there was."""
         for _ in range(2):
-            if self._executor is None:
-                self._executor = self._parts.make_executor(self._parts.at_once)
+            executor = self._executors.get(lane)
+            if executor is None:
+                executor = self._executors[lane] = self._parts.make_executor(workers)
             try:
-                return self._executor.submit(carry_out, self._folder(identity))
+                return executor.submit(carry_out, self._folder(identity))
             except BrokenExecutor:
-                self._executor = None
+                del self._executors[lane]
             except Exception as error:
                 log.exception("job %s: no worker takes it", identity)
                 return _failed(error)
         return _failed(BrokenExecutor())
 
-    def _collect(self) -> None:
-        """Ends what has been computed. One whose end cannot be written holds up no other."""
-        for identity, future in list(self._running.items()):
+    def _collect(self) -> bool:
+        """Ends what has been computed. One whose end cannot be written holds up no other. Whether any has ended."""
+        has_ended = False
+        for identity, (job, future) in list(self._running.items()):
             if not future.done():
                 continue
             try:
-                self._end(identity, future)
+                self._end(identity, lane_of(job.request), future)
             except (OSError, OperationalError) as error:
                 # A disk that is full, a database that is locked: the next look may go better.
                 log.warning("job %s: its end is not written yet: %s", identity, error)
@@ -222,14 +255,16 @@ class JobDesk:
             except Exception:
                 log.exception("job %s: its end cannot be written", identity)
             del self._running[identity]
+            has_ended = True
+        return has_ended
 
-    def _end(self, identity: str, future: Future[Ended]) -> None:
+    def _end(self, identity: str, lane: Lane, future: Future[Ended]) -> None:
         parts = self._parts
         event, reason, model, headline = Event.COMPLETED, "", None, ""
         try:
             ended = future.result()
         except BrokenExecutor:
-            self._executor = None
+            self._executors.pop(lane, None)
             event, reason = Event.LOST, "its worker process ended: it was killed, or the memory did not suffice"
         except Exception as error:
             log.exception("job %s", identity)
@@ -258,8 +293,13 @@ class JobDesk:
         path = self._folder(identity) / MODEL
         return parts.models.take_in(path, name or f"{job.request.kind} {identity}", job.submitted_by, identity)
 
+    def _tell_waiting(self) -> None:
+        """What they wait behind has changed."""
+        for job in self.all_as_told(self._parts.jobs.waiting(self._parts.robot)[:MOST_TOLD]):
+            self._parts.changed(job)
+
     def _tell_progress(self, told: dict[str, Reported]) -> None:
-        for identity in self._running:
+        for identity in list(self._running):
             reported = self._reported(identity)
             if reported is not None and told.get(identity) != reported:
                 told[identity] = reported

@@ -17,6 +17,8 @@ import threading
 from multiprocessing import parent_process
 from pathlib import Path
 
+from server import logs
+
 NICENESS = 19
 """Of the process among those of its session."""
 AUTOGROUP, SESSION_NICENESS = Path("/proc/self/autogroup"), 5
@@ -28,6 +30,7 @@ PR_SET_PDEATHSIG = 1
 
 def begin_worker() -> None:
     """In every worker process, ahead of its first job and of what that imports."""
+    logs.begin()
     give_way()
     end_with_parent()
 

@@ -14,6 +14,7 @@ from daq.runner import ArmControl
 from daq.transport import PortBusyError
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.memory_map import default_memory_map, parse_memory_map
+from server import logs
 from server.owner.desk import Desk
 from server.owner.inbox import Inbox
 from server.owner.messages import CannotOpen, Open, Opened
@@ -27,6 +28,7 @@ EXIT_INTERRUPTED = 130
 
 def main() -> int:
     """Opens the robot of the first order, and serves until the service closes its end. Returns the exit code."""
+    logs.begin()
     with Speaker(sys.stdout.fileno()) as speaker:
         inbox = Inbox(sys.stdin.fileno())
         try:

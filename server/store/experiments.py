@@ -114,6 +114,12 @@ class ExperimentStore:
         with self._store.reading() as session:
             return [as_experiment(row) for row in session.scalars(query.limit(500))]
 
+    def count_by_state(self, robot: str) -> dict[str, int]:
+        """How many experiments there are in each state that any is in."""
+        query = select(ExperimentRow.state, func.count()).filter_by(robot=robot).group_by(ExperimentRow.state)
+        with self._store.reading() as session:
+            return dict(session.execute(query).tuples().all())
+
     def count_waiting(self, robot: str) -> int:
         """How many are queued. Asks the database the first time only."""
         if robot not in self._waiting:

@@ -115,6 +115,12 @@ class JobStore:
         with self._store.reading() as session:
             return [as_job(row) for row in session.scalars(query)]
 
+    def requests(self, robot: str, state: JobState) -> list[JobRequest]:
+        """What the jobs in a state are to compute."""
+        query = select(JobRow.request).filter_by(robot=robot, state=state)
+        with self._store.reading() as session:
+            return [_REQUEST.validate_python(request) for request in session.scalars(query)]
+
     def change(
         self,
         robot: str,

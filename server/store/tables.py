@@ -91,6 +91,19 @@ class ScheduleRow(Table):
     created_by: Mapped[str]
 
 
+class ProgramRow(Table):
+    """A taught program. `revision` grows with every change of it."""
+
+    __tablename__ = "programs"
+
+    robot: Mapped[str] = mapped_column(String(32), primary_key=True)
+    name: Mapped[str] = mapped_column(String(64), primary_key=True)
+    program: Mapped[dict[str, Any]]
+    revision: Mapped[int]
+    changed: Mapped[datetime]
+    changed_by: Mapped[str]
+
+
 class QueueRow(Table):
     """Whether a robot's queue is paused, and why."""
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
+from daq.cli.remote.jobs import standing_of
+from daq.contracts.service.jobs import DiagnoseRequest, FitRequest, Job, WaitsBehind
 from model.machine_model.model_file import load_model
 from tests.daq.cli.invoke import CommandLine, Said
 from tests.server.desk import anothers_desk
@@ -22,13 +25,14 @@ Daq = Callable[..., Said]
 
 @pytest.fixture(scope="module", autouse=True)
 def worker(sound_service: Service) -> None:
-    """The worker process is there before the tests, which may leave none behind: it has done one job."""
+    """The workers of both lanes are there before the tests, which may leave none behind: each has had a job."""
     spec = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.2}, "settle": 0.1, "hold": 0.1}
     ended = sound_service.end_of(sound_service.robot.post("/experiments", json={"spec": spec}).json()["id"])
-    request = {"kind": "compare", "traces": [ended["trace"]], "models": ["machine"]}
-    job = sound_service.robot.post("/jobs", json=request).json()["id"]
-    while sound_service.robot.get(f"/jobs/{job}", params={"wait": 30}).json()["state"] in ("queued", "running"):
-        pass
+    compare = {"kind": "compare", "traces": [ended["trace"]], "models": ["machine"]}
+    refused = {"kind": "fit", "traces": [ended["trace"]], "parameters": ["joint9.*"]}
+    for request, state in ((compare, "done"), (refused, "failed")):
+        job = sound_service.robot.post("/jobs", json=request).json()["id"]
+        assert sound_service.end_of(job, "jobs")["state"] == state
 
 
 @pytest.fixture
@@ -91,3 +95,33 @@ def test_diagnose_is_a_job_of_the_service(daq: Daq, sound_service: Service, tmp_
     assert (newest["request"]["kind"], newest["state"]) == ("diagnose", "done")
     assert newest["request"]["effects"] == ["coulomb_friction"]
     daq("diagnose", "last", "--effects", "no_such_effect").complains(2, "no_such_effect")
+
+
+@pytest.mark.parametrize(
+    ("behind", "words"),
+    [
+        (None, "queued"),
+        (
+            WaitsBehind(job="a", request=DiagnoseRequest(traces=("a", "b")), started=None, others=0),
+            "waits behind: diagnosis of 2 traces",
+        ),
+        (
+            WaitsBehind(
+                job="a", request=FitRequest(traces=("a",)), started=datetime.now(UTC) - timedelta(minutes=3), others=2
+            ),
+            "waits behind: fit of 1 trace (3 min so far), 2 more",
+        ),
+    ],
+    ids=["nothing", "one that waits, too", "one that is computed"],
+)
+def test_a_job_that_waits_says_behind_what(behind: WaitsBehind | None, words: str) -> None:
+    job = Job(
+        id="b",
+        robot="ma2000",
+        request=FitRequest(traces=("a",)),
+        state="queued",
+        submitted=datetime.now(UTC),
+        submitted_by="anna",
+        waits_behind=behind,
+    )
+    assert standing_of(job) == words

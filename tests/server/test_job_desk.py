@@ -13,11 +13,12 @@ import pytest
 from sqlalchemy.exc import OperationalError
 
 from daq.contracts.machine import load_machine
-from daq.contracts.service.jobs import CompareRequest, FitRequest, Job
+from daq.contracts.service.jobs import CompareRequest, DiagnoseRequest, FitRequest, Job, JobRequest
 from model.machine_model.model import base_model
 from server.api.traces import delete_trace
 from server.catalogue.catalogue import Catalogue
 from server.jobs.desk import JobDesk, JobParts
+from server.jobs.lanes import lane_of
 from server.jobs.mailbox import CANCEL, MODEL, Mailbox
 from server.jobs.models import Models
 from server.jobs.work import Ended
@@ -71,7 +72,7 @@ class Bench:
         self.carry_out: Callable[[Path], Ended] = lambda _folder: Ended(headline="found")
         self.executor = HandExecutor(self._carry_out)
         self.make_executor: Callable[[int], Executor] = lambda _count: self.executor
-        self._changed = threading.Condition()
+        self.changed = threading.Condition()
         self.told: list[Job] = []
         self.desk = JobDesk(
             JobParts(
@@ -88,14 +89,14 @@ class Bench:
         return self.make_executor(count)
 
     def _hear(self, job: Job) -> None:
-        with self._changed:
+        with self.changed:
             self.told.append(job)
-            self._changed.notify_all()
+            self.changed.notify_all()
 
     def end_of(self, job: Job) -> Job:
         """Waits for it; the test's own time limit ends the wait."""
-        with self._changed:
-            self._changed.wait_for(lambda: self.state_of(job) not in ("queued", "running"))
+        with self.changed:
+            self.changed.wait_for(lambda: self.state_of(job) not in ("queued", "running"))
         return self.jobs.get("ma2000", job.id)
 
     def state_of(self, job: Job) -> str:
@@ -324,3 +325,78 @@ def test_a_trace_is_not_deleted_when_a_job_comes_to_refer_to_it_meanwhile(
     with pytest.raises(ProblemError, match="was made from"):
         delete_trace(TRACE, one, SimpleNamespace(traces=bench.traces), None)  # type: ignore[arg-type]
     assert bench.catalogue.path_of(TRACE).is_file()
+
+
+class HeldExecutor(HandExecutor):
+    """Computes nothing until the test lets it."""
+
+    def __init__(self) -> None:
+        super().__init__(lambda _folder: Ended())
+        self.futures: dict[str, Future[Ended]] = {}
+
+    def submit(self, _function: Any, /, *args: Any, **_named: Any) -> Future[Any]:
+        """As an executor's."""
+        (folder,) = args
+        self.futures[folder.name] = future = Future()
+        return future
+
+
+def _asked(bench: Bench, request: JobRequest) -> Job:
+    return bench.desk.submit(request, "anna", None)[0]
+
+
+def _until(bench: Bench, is_so: Callable[[], bool]) -> None:
+    with bench.changed:
+        bench.changed.wait_for(is_so)
+
+
+def test_a_short_job_waits_behind_no_diagnosis_and_the_next_one_says_behind_what(bench: Bench) -> None:
+    held = HeldExecutor()
+    bench.make_executor = lambda _count: held
+    diagnosis = _asked(bench, DiagnoseRequest(traces=(TRACE,)))
+    fit, other_fit = _asked(bench, FitRequest(traces=(TRACE,))), _asked(bench, FitRequest(traces=(TRACE,)))
+    short, next_short = _asked(bench, COMPARE), _asked(bench, COMPARE)
+    bench.desk.start()
+    _until(bench, lambda: {diagnosis.id, short.id} <= {job.id for job in bench.told if job.state == "running"})
+    assert set(held.futures) == {diagnosis.id, short.id}
+
+    told = {job.id: job for job in bench.desk.all_as_told(bench.jobs.waiting("ma2000"))}
+    behind = [told[job.id].waits_behind for job in (fit, other_fit, next_short)]
+    assert [(one.job, one.request.kind, one.others) for one in behind if one] == [
+        (diagnosis.id, "diagnose", 0), (diagnosis.id, "diagnose", 1), (short.id, "compare", 0),
+    ]  # fmt: skip
+    assert all(one and one.started == bench.clock.utc() for one in behind)
+
+    held.futures[diagnosis.id].set_result(Ended())
+    _until(bench, lambda: any(job.id == other_fit.id and _waits_behind(job) == fit.id for job in bench.told))
+    held.futures[short.id].set_result(Ended())
+    _until(bench, lambda: any(job.id == next_short.id and job.state == "running" for job in bench.told))
+
+
+def _waits_behind(job: Job) -> str | None:
+    return None if job.waits_behind is None else job.waits_behind.job
+
+
+def test_a_worker_that_ends_takes_no_job_of_the_other_lane_with_it(bench: Bench) -> None:
+    executors = [HeldExecutor(), HeldExecutor(), HeldExecutor()]
+    made: list[HeldExecutor] = []
+
+    def make_executor(_count: int) -> Executor:
+        made.append(executors[len(made)])
+        return made[-1]
+
+    bench.make_executor = make_executor
+    diagnosis, short, next_short = _asked(bench, DiagnoseRequest(traces=(TRACE,))), _submitted(bench), _submitted(bench)
+    bench.desk.start()
+    _until(bench, lambda: {diagnosis.id, short.id} <= {job.id for job in bench.told if job.state == "running"})
+    made[1].futures[short.id].set_exception(BrokenExecutor())
+    _until(bench, lambda: any(job.id == next_short.id and job.state == "running" for job in bench.told))
+    assert next_short.id in made[2].futures
+    assert bench.state_of(diagnosis) == "running"
+    assert not made[0].futures[diagnosis.id].done()
+
+
+@pytest.mark.parametrize(("models", "lane"), [(10, "short"), (11, "long")])
+def test_a_comparison_is_short_by_what_it_has_to_compute(models: int, lane: str) -> None:
+    request = CompareRequest.model_construct(traces=(TRACE,) * 2, models=("machine",) * models)
+    assert lane_of(request) == lane

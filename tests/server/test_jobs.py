@@ -18,10 +18,12 @@ SHORT = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.2}, "se
 
 @pytest.fixture(scope="module", autouse=True)
 def worker(sound_service: Service) -> None:
-    """The worker process is there before the tests, which may leave none behind: it has done one job."""
+    """The worker processes of both lanes are there before the tests, which may leave none behind."""
     ended = sound_service.end_of(sound_service.robot.post("/experiments", json={"spec": SHORT}).json()["id"])
     job = _submitted(sound_service, {"kind": "compare", "traces": [ended["trace"]], "models": ["machine"]})
     assert _ended(sound_service, job["id"])["state"] == "done"
+    job = _submitted(sound_service, {"kind": "fit", "traces": [ended["trace"]], "parameters": ["joint9.*"]})
+    assert _ended(sound_service, job["id"])["state"] == "failed"
 
 
 @pytest.fixture

@@ -33,7 +33,7 @@ def folder(tmp_path: Path) -> Path:
 
 def get(folder: Path, path: str, **headers: str) -> httpx.Response:
     """The answer of a server of the page in `folder`."""
-    app = FastAPI()
+    app = FastAPI(docs_url=None)  # the page has its own
     app.include_router(page_router(folder))
 
     async def asked() -> httpx.Response:
@@ -70,8 +70,15 @@ def test_nothing_else_is_served(folder: Path, name: str) -> None:
 
 
 def test_a_page_that_is_not_built_says_how_to_build_it(tmp_path: Path) -> None:
-    answer = get(tmp_path, "/")
-    assert (answer.status_code, answer.text) == (503, NOT_BUILT + "\n")
+    for address in ("/", "/docs"):
+        answer = get(tmp_path, address)
+        assert (answer.status_code, answer.text) == (503, NOT_BUILT + "\n")
+
+
+def test_the_first_load_has_nothing_of_the_reference_of_the_api() -> None:
+    index = (FOLDER / "index.html").read_text("utf-8")
+    assert "reference" not in index
+    assert "reference" in (FOLDER / "reference.html").read_text("utf-8")
 
 
 def test_the_first_load_is_small() -> None:

@@ -139,11 +139,8 @@ def test_a_trace_from_elsewhere_is_read_before_it_is_taken_in(service: Service) 
     assert not list((service.folder / "traces").glob(".upload-*"))
 
 
-def test_health_metrics_and_system_tell_how_it_is(service: Service) -> None:
+def test_health_and_system_tell_how_it_is(service: Service) -> None:
     base = service.url
     assert service.client.get(f"{base}/healthz").json()["status"] == "ok"
     assert service.client.get(f"{base}/readyz").json()["checks"] == {"database": "", "traces": "", "robot ma2000": ""}
-    metrics = service.client.get(f"{base}/metrics").text
-    assert 'daq_connected{robot="ma2000"} 1.0' in metrics
-    assert 'daq_link{counter="retries",robot="ma2000"}' in metrics
     assert service.client.get("/system").json()["storage"]["database"] == "sqlite"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from daq.cli.context import Invocation, console
 from daq.cli.model_progress import shown_progress
 from daq.cli.remote.robot import remote_robot
 from daq.contracts.errors import DaqError, SpecError
-from daq.contracts.service.jobs import MACHINE, JobRequest
+from daq.contracts.service.jobs import MACHINE, JobKind, JobRequest
 
 if TYPE_CHECKING:
     from daq.client import Robot
@@ -22,6 +23,12 @@ if TYPE_CHECKING:
     from server.jobs.results import JobResult
 
 LOOK_EVERY = 1.0
+KINDS: dict[JobKind, str] = {
+    "fit": "fit",
+    "validate": "validation",
+    "compare": "comparison",
+    "diagnose": "diagnosis",
+}
 EXIT_PROGRAM_FAULT, PROGRAM_FAULT = 1, "program fault"
 """As the reason of such a job begins."""
 EXIT_CODES = {"failed": 2, "cancelled": 130, "interrupted": 3}
@@ -92,12 +99,24 @@ def done_at_server(call: Invocation, request: JobRequest, report: Path | None) -
     return found
 
 
+def standing_of(job: Job) -> str:
+    """How far a job is, or what it waits behind, in a few words."""
+    behind = job.waits_behind
+    if job.state != "queued" or behind is None:
+        return job.progress_text or job.state
+    traces = len(behind.request.traces)
+    of = f"{KINDS[behind.request.kind]} of {traces} trace{'' if traces == 1 else 's'}"
+    minutes = None if behind.started is None else (datetime.now(UTC) - behind.started).total_seconds() / 60
+    so_far = "" if minutes is None else f" ({max(0, round(minutes))} min so far)"
+    return f"waits behind: {of}{so_far}" + (f", {behind.others} more" if behind.others else "")
+
+
 def _followed(robot: Robot, request: JobRequest) -> Job:
     job = robot.jobs.submit(request)
     try:
         with shown_progress(f"{request.kind} at the server") as tell:
             return robot.jobs.wait(
-                job.id, lambda now: tell(now.progress or 0.0, now.progress_text or now.state), look_every=LOOK_EVERY
+                job.id, lambda now: tell(now.progress or 0.0, standing_of(now)), look_every=LOOK_EVERY
             )
     except KeyboardInterrupt:
         robot.jobs.cancel(job.id)

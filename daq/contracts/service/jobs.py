@@ -108,6 +108,17 @@ class KnownEffect(Wire):
     """It belongs to the machine, not to a joint."""
 
 
+class WaitsBehind(Wire):
+    """What a queued job waits for: the first of the jobs of its lane that come before it."""
+
+    job: str
+    request: JobRequest
+    started: AwareDatetime | None
+    """None while that job waits, too."""
+    others: int
+    """Further jobs that come before."""
+
+
 class Job(Wire):
     """One computation and what became of it. `progress` is a fraction from 0 to 1."""
 
@@ -128,6 +139,9 @@ class Job(Wire):
     model: str | None = None
     """The model that it made."""
     has_report: bool = False
+    waits_behind: WaitsBehind | None = None
+    """While it is queued and others come before it. Short jobs (comparisons and validations of few traces) have a
+    worker of their own, and wait behind no fit and no diagnosis."""
 
 
 class ModelEntry(Wire):

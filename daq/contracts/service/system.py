@@ -51,6 +51,8 @@ class SystemStatus(Wire):
     live_clients: int
     live_dropped: int
     jobs_at_once: int
+    short_jobs_at_once: int
+    """Further workers, for short jobs alone."""
     unattended: bool
     stop_port: int
     """Where a stop is answered even while the service is too busy to."""

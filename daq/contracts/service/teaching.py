@@ -66,6 +66,17 @@ class TeachingStatus(Wire):
     """What was led by hand last."""
 
 
+class ProgramEntry(Wire):
+    """A taught program that the service keeps. `revision` grows with every change; `instructions` is their number."""
+
+    name: str
+    robot: str
+    revision: int
+    instructions: int
+    changed: AwareDatetime
+    changed_by: str
+
+
 class CalibrationRequest(Wire):
     """Joints whose actual proportional gain is to be found, by small steps at several postures (section 6.5)."""
 

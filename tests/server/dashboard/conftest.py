@@ -73,11 +73,14 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Service, 
 
 @pytest.fixture
 def dashboard(browser: Browser, served: tuple[Service, MockControl]) -> Iterator[Dashboard]:
-    """A tab on a service as every test wants to find it: not stopped, nobody in control, the queue open and empty."""
+    """A tab on a service as every test wants to find it: not stopped, nobody in control, the queue open and empty, no
+    program kept."""
     service, mock = served
     service.until_connected()
     for one in service.robot.get("/queue/experiments").json():
         service.robot.post(f"/experiments/{one['id']}/cancel")
+    for one in service.robot.get("/programs").json():
+        service.robot.delete(f"/programs/{one['name']}")
     service.robot.post("/reset", json={})
     service.robot.post("/queue/resume", json={})
     context = browser.new_context(viewport=WIDE, color_scheme="light")

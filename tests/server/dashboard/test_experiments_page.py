@@ -286,3 +286,29 @@ def test_axe_finds_no_fault_while_limits_are_broken(
     found = faults_of(page)
     context.close()
     assert found == []
+
+
+def test_an_experiment_that_has_ended_is_run_again_by_way_of_the_form(dashboard: Dashboard, form: Page) -> None:
+    service = dashboard.service
+    spec = {"name": "once-more", "trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.4}, "hold": 0.1}
+    first = service.end_of(service.robot.post("/experiments", json={"spec": spec}).json()["id"])
+    form.get_by_role("button", name="Run again: once-more").first.click()
+    expect(form.get_by_label("Name", exact=True)).to_have_value("once-more")
+    assert service.robot.get("/queue/experiments").json() == []
+    form.get_by_role("button", name="Add to the queue").click()
+    form.get_by_role("link", name="Watch live").click()
+    expect(form).to_have_url(re.compile("#/live$"))
+    again = service.robot.get("/experiments", params={"limit": 1}).json()["items"][0]
+    assert again["id"] != first["id"]
+    assert again["spec"] == first["spec"]
+    assert service.end_of(again["id"])["state"] == "done"
+
+
+def test_a_schedule_may_begin_later(dashboard: Dashboard, form: Page) -> None:
+    form.get_by_label("Every so often").check()
+    form.get_by_label("First run").fill("2199-01-02T03:04")
+    form.get_by_role("button", name="Schedule it").click()
+    expect(form.get_by_text(re.compile("scheduled every .*, first 02 Jan 2199"))).to_be_visible()
+    made = dashboard.service.robot.get("/schedules", params={"limit": 1}).json()["items"][0]
+    assert made["next"].startswith(("2199-01-01", "2199-01-02"))
+    dashboard.service.robot.delete(f"/schedules/{made['id']}")

@@ -6,11 +6,14 @@ const KEY = 'ma2000-theme';
 class Theme {
   choice = $state<Choice>('system');
   private systemIsDark = $state(false);
+  private told: (shown: 'light' | 'dark') => void = () => {};
   shown: 'light' | 'dark' = $derived(
     this.choice === 'system' ? (this.systemIsDark ? 'dark' : 'light') : this.choice,
   );
 
-  start(): void {
+  /** `told` hears of every change, and of what is shown at first. */
+  start(told: (shown: 'light' | 'dark') => void = () => {}): void {
+    this.told = told;
     const system = matchMedia('(prefers-color-scheme: dark)');
     this.systemIsDark = system.matches;
     system.addEventListener('change', (event) => {
@@ -36,6 +39,7 @@ class Theme {
 
   private show(): void {
     document.documentElement.dataset['theme'] = this.shown;
+    this.told(this.shown);
   }
 }
 

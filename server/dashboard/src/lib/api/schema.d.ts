@@ -412,6 +412,77 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/robots/{robot}/programs": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Programs
+         * @description Programs that are kept, the one changed last first.
+         */
+        get: operations["list_programs"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/programs/{program}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Program
+         * @description One program, with the revision that a change of it names.
+         */
+        get: operations["get_program"];
+        /**
+         * Put Program
+         * @description Keeps a program, or a change of it: `revision` is the one that was changed. Moves nothing, and needs no control.
+         *
+         *     A body with another name than the address renames it. What somebody else has changed meanwhile is not overwritten:
+         *     409.
+         */
+        put: operations["put_program"];
+        post?: never;
+        /**
+         * Delete Program
+         * @description Deletes a program for good.
+         */
+        delete: operations["delete_program"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/programs/{program}/run": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Run Stored Program
+         * @description Carries out a kept program, as POST …/teaching/program does with one that is sent.
+         */
+        post: operations["run_stored_program"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/robots/{robot}/experiments": {
         parameters: {
             query?: never;
@@ -856,6 +927,8 @@ export interface paths {
         /**
          * Submit Job
          * @description Begins a computation as soon as a worker is free. The same Idempotency-Key gives the same job (200).
+         *
+         *     Comparisons and validations of few traces have a worker of their own: they wait behind no fit and no diagnosis.
          */
         post: operations["submit_job"];
         delete?: never;
@@ -2526,6 +2599,7 @@ export interface components {
              * @default false
              */
             has_report?: boolean;
+            waits_behind?: components["schemas"]["WaitsBehind"] | null;
         };
         /**
          * JobMessage
@@ -3526,6 +3600,27 @@ export interface components {
             instructions: (components["schemas"]["Absolute"] | components["schemas"]["Relative"] | components["schemas"]["PlayPath"] | components["schemas"]["Wait"] | components["schemas"]["SetOutput"] | components["schemas"]["AwaitInput"] | components["schemas"]["Gripper"])[];
         };
         /**
+         * ProgramEntry
+         * @description A taught program that the service keeps. `revision` grows with every change; `instructions` is their number.
+         */
+        ProgramEntry: {
+            /** Name */
+            name: string;
+            /** Robot */
+            robot: string;
+            /** Revision */
+            revision: number;
+            /** Instructions */
+            instructions: number;
+            /**
+             * Changed
+             * Format: date-time
+             */
+            changed: string;
+            /** Changed By */
+            changed_by: string;
+        };
+        /**
          * ProgressMessage
          * @description How far the experiment is that runs.
          */
@@ -4329,6 +4424,14 @@ export interface components {
             database_size: number | null;
         };
         /**
+         * StoredProgram
+         * @description A program with what is known about it.
+         */
+        StoredProgram: {
+            entry: components["schemas"]["ProgramEntry"];
+            program: components["schemas"]["Program"];
+        };
+        /**
          * SystemStatus
          * @description The service: version, since when it runs, storage, watchers.
          */
@@ -4344,6 +4447,8 @@ export interface components {
             live_dropped: number;
             /** Jobs At Once */
             jobs_at_once: number;
+            /** Short Jobs At Once */
+            short_jobs_at_once: number;
             /** Unattended */
             unattended: boolean;
             /** Stop Port */
@@ -4765,6 +4870,20 @@ export interface components {
             kind: "wait";
             /** Duration */
             duration: number;
+        };
+        /**
+         * WaitsBehind
+         * @description What a queued job waits for: the first of the jobs of its lane that come before it.
+         */
+        WaitsBehind: {
+            /** Job */
+            job: string;
+            /** Request */
+            request: components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"];
+            /** Started */
+            started: string | null;
+            /** Others */
+            others: number;
         };
         /**
          * Where
@@ -5358,6 +5477,137 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MeasuredGain"][];
+                };
+            };
+        };
+    };
+    list_programs: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProgramEntry"][];
+                };
+            };
+        };
+    };
+    get_program: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the program. */
+                program: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StoredProgram"];
+                };
+            };
+        };
+    };
+    put_program: {
+        parameters: {
+            query?: {
+                /** @description That which was changed; none for a new program. */
+                revision?: number | null;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the program. */
+                program: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Program"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProgramEntry"];
+                };
+            };
+        };
+    };
+    delete_program: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the program. */
+                program: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+        };
+    };
+    run_stored_program: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description The lease that POST …/control gave. */
+                "Control-Lease"?: string | null;
+            };
+            path: {
+                /** @description Name of the program. */
+                program: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TeachingStatus"];
                 };
             };
         };

@@ -62,6 +62,7 @@ export type HistoryMessage = Told<Schemas['HistoryMessage']>;
 export type LinkMessage = Told<Schemas['LinkMessage']>;
 export type LiveFrame = Told<Schemas['LiveFrame']>;
 export type LiveMessage = LiveFrame['messages'][number];
+export type ProgramEntry = Told<Schemas['ProgramEntry']>;
 export type ProgressMessage = Told<Schemas['ProgressMessage']>;
 export type RecordEventMessage = Told<Schemas['RecordEventMessage']>;
 export type RobotMessage = Told<Schemas['RobotMessage']>;

@@ -10,6 +10,9 @@ export type Instruction = Program['instructions'][number];
 export type TaughtPath = components['schemas']['TaughtPath'];
 
 export const MOVE_SPEED = 0.25;
+/** As the service allows. */
+const FASTEST_RATE = 10;
+const LONGEST_WAIT = 3600;
 
 /** Keeps the posture that is measured now: a move to it. */
 export function moveTo(joints: readonly number[], position: readonly number[]): Instruction {
@@ -44,6 +47,52 @@ export function told(instruction: Instruction, machine: Machine, unit: AngleUnit
       return `Wait until input ${instruction.line} is ${instruction.on ? 'on' : 'off'}`;
     case 'gripper':
       return instruction.closed ? 'Close the gripper' : 'Open the gripper';
+  }
+}
+
+/** The one number of an instruction that can be changed afterwards: how fast it moves, or how long it waits. */
+export interface Adjustable {
+  readonly label: string;
+  readonly unit: string;
+  /** As shown. */
+  readonly value: number;
+  readonly most: number;
+  /** The instruction with another such number, as shown. */
+  with(value: number): Instruction;
+}
+
+const DEGREES = 180 / Math.PI;
+
+/** Null where an instruction has no such number. */
+export function adjustable(instruction: Instruction): Adjustable | null {
+  switch (instruction.kind) {
+    case 'absolute':
+    case 'relative':
+      return {
+        label: 'Speed',
+        unit: '°/s',
+        value: Number(((instruction.speed ?? MOVE_SPEED) * DEGREES).toFixed(1)),
+        most: 3 * DEGREES,
+        with: (value) => ({ ...instruction, speed: Math.min(3, value / DEGREES) }),
+      };
+    case 'path':
+      return {
+        label: 'Rate',
+        unit: '×',
+        value: instruction.rate ?? 1,
+        most: FASTEST_RATE,
+        with: (rate) => ({ ...instruction, rate }),
+      };
+    case 'wait':
+      return {
+        label: 'Duration',
+        unit: 's',
+        value: instruction.duration,
+        most: LONGEST_WAIT,
+        with: (duration) => ({ ...instruction, duration }),
+      };
+    default:
+      return null;
   }
 }
 

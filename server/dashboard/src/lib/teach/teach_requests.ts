@@ -1,4 +1,4 @@
-/** What is asked of the service to teach; all of it needs the control. */
+/** What is asked of the service to teach; what moves the arm needs the control. */
 
 import { api, ask, here } from '../api';
 import { control } from '../control/control.svelte';
@@ -6,7 +6,17 @@ import type { TeachRequests } from './teaching.svelte';
 
 const params = () => ({ path: here(), header: control.header() });
 
+const PROGRAM = '/api/v1/robots/{robot}/programs/{program}';
+const at = (program: string) => ({ path: { ...here(), program } });
+
 export const TEACH_REQUESTS: TeachRequests = {
+  list: () => ask(api.GET('/api/v1/robots/{robot}/programs', { params: { path: here() } })),
+  load: (name) => ask(api.GET(PROGRAM, { params: at(name) })),
+  put: (name, body, revision) =>
+    ask(api.PUT(PROGRAM, { params: { ...at(name), query: { revision } }, body })),
+  async remove(name) {
+    await ask(api.DELETE(PROGRAM, { params: at(name) }));
+  },
   run: (body) => ask(api.POST('/api/v1/robots/{robot}/teaching/program', { params: params(), body })),
   lead: (joints) =>
     ask(

@@ -1,11 +1,15 @@
-/** Teaching: a program is put together from postures and led paths, and run. What asks the service is handed in. */
+/**
+ * Teaching: a program is put together from postures and led paths, kept by the service, and run. What asks the service is
+ * handed in.
+ */
 
 import { asProblem, type Problem } from '../api/problem';
 import type { Machine, TeachingStatus } from '../api/types';
 import { ledAtFirst } from './lead';
-import { moved, play, programOf, type Instruction, type Program } from './program';
+import { KeptPrograms, type ProgramRequests } from './kept.svelte';
+import { moved, play, type Instruction, type Program } from './program';
 
-export interface TeachRequests {
+export interface TeachRequests extends ProgramRequests {
   run(program: Program): Promise<TeachingStatus>;
   lead(joints: readonly number[]): Promise<TeachingStatus>;
   /** Ends leading: the path is in the answer. */
@@ -13,7 +17,7 @@ export interface TeachRequests {
 }
 
 export class Teaching {
-  instructions = $state.raw<readonly Instruction[]>([]);
+  readonly programs: KeptPrograms;
   /** Joints that are led next. */
   chosen = $state.raw<readonly number[]>([]);
   /** Joints that this page has begun to lead; none where somebody else has. */
@@ -23,22 +27,33 @@ export class Teaching {
   problem = $state.raw<Problem | null>(null);
 
   constructor(
-    private readonly machine: Machine,
+    machine: Machine,
     private readonly requests: TeachRequests,
   ) {
+    this.programs = new KeptPrograms(machine.name, requests);
     this.chosen = ledAtFirst(machine);
   }
 
+  get instructions(): readonly Instruction[] {
+    return this.programs.instructions;
+  }
+
   keep(instruction: Instruction): void {
-    this.instructions = [...this.instructions, instruction];
+    void this.programs.change([...this.instructions, instruction]);
   }
 
   move(place: number, step: -1 | 1): void {
-    this.instructions = moved(this.instructions, place, step);
+    void this.programs.change(moved(this.instructions, place, step));
   }
 
+  /** The last one stays: a program has an instruction at least, and is deleted as a whole. */
   takeAway(place: number): void {
-    this.instructions = this.instructions.filter((_, other) => other !== place);
+    if (this.instructions.length > 1)
+      void this.programs.change(this.instructions.filter((_, other) => other !== place));
+  }
+
+  edit(place: number, instruction: Instruction): void {
+    void this.programs.change(this.instructions.map((one, other) => (other === place ? instruction : one)));
   }
 
   choose(joint: number): void {
@@ -48,12 +63,8 @@ export class Teaching {
       : [...chosen, joint].sort((one, other) => one - other);
   }
 
-  program(name: string): Program {
-    return programOf(name, this.machine.name, this.instructions);
-  }
-
-  async run(name: string): Promise<void> {
-    await this.tried(() => this.requests.run(this.program(name)));
+  async run(): Promise<void> {
+    await this.tried(() => this.requests.run(this.programs.program()));
   }
 
   async lead(): Promise<void> {

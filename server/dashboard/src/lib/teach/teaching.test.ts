@@ -14,7 +14,14 @@ const refused = (): Promise<never> => Promise.reject(new Problem(409, 'arm-busy'
 
 function teaching(answers: Partial<TeachRequests>): Teaching {
   const well = (): Promise<TeachingStatus> => Promise.resolve(status);
-  return new Teaching(machine as unknown as Machine, { run: well, lead: well, finish: well, ...answers });
+  const kept = {
+    list: () => Promise.resolve([]),
+    load: (): Promise<never> => Promise.reject(new Error('there is none')),
+    put: () => Promise.resolve({ name: 'taught', revision: 1 } as never),
+    remove: () => Promise.resolve(),
+  };
+  const requests = { run: well, lead: well, finish: well, ...kept, ...answers };
+  return new Teaching(machine as unknown as Machine, requests);
 }
 
 describe('teaching', () => {
@@ -72,6 +79,13 @@ describe('teaching', () => {
     expect(taught.led).toEqual([]);
   });
 
+  it('takes no program its last instruction: it is deleted as a whole', () => {
+    const taught = teaching({});
+    taught.keep({ kind: 'wait', duration: 1 });
+    taught.takeAway(0);
+    expect(taught.instructions).toHaveLength(1);
+  });
+
   it('runs the instructions in the order in which they stand', async () => {
     const ran: unknown[] = [];
     const taught = teaching({ run: (program) => (ran.push(program), Promise.resolve(status)) });
@@ -80,7 +94,9 @@ describe('teaching', () => {
     taught.keep({ kind: 'wait', duration: 2 });
     taught.move(1, -1);
     taught.takeAway(2);
-    await taught.run('mine');
+    taught.edit(0, { kind: 'gripper', closed: false });
+    taught.programs.name = 'mine';
+    await taught.run();
     expect(ran).toEqual([
       {
         version: 1,
@@ -88,7 +104,7 @@ describe('teaching', () => {
         machine: 'arm',
         notes: '',
         instructions: [
-          { kind: 'gripper', closed: true },
+          { kind: 'gripper', closed: false },
           { kind: 'wait', duration: 1 },
         ],
       },

@@ -1,6 +1,7 @@
 /** When an experiment is to be run, and handing it to the service: once, however often the button is pressed. */
 
 import { api, ask, asProblem, here, type ExperimentSpec, type Problem } from '../../lib/api';
+import { dayAndTime } from '../../lib/format';
 import { typedNumber, type NumberRule } from '../../lib/trajectory/numbers';
 import { interval, localMoment, momentOf, UNITS, type Unit } from '../../lib/trajectory/when';
 
@@ -21,6 +22,8 @@ export class Sending {
   when = $state<When>('now');
   /** Value of a `datetime-local` field. */
   at = $state(localMoment(new Date(Date.now() + 10 * 60_000)));
+  /** The same for the first run of a schedule; empty for at once. */
+  starts = $state('');
   every = $state('30');
   unit = $state<Unit>('min');
   count = $state('10');
@@ -63,9 +66,11 @@ export class Sending {
   private async schedule(spec: ExperimentSpec): Promise<string> {
     const every = this.seconds();
     const count = this.count.trim() === '' ? null : Number(this.count);
-    const body = { spec, every, count, priority: Number(this.priority) };
+    const starts = momentOf(this.starts);
+    const body = { spec, every, count, starts, priority: Number(this.priority) };
     const made = await ask(api.POST('/api/v1/robots/{robot}/schedules', { params: { path: here() }, body }));
-    return `scheduled every ${interval(every)}, number ${made.id}`;
+    const first = starts === null ? '' : `, first ${dayAndTime(starts)}`;
+    return `scheduled every ${interval(every)}${first}, number ${made.id}`;
   }
 
   private seconds(): number {

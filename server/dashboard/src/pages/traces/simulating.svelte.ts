@@ -27,8 +27,8 @@ interface Compared {
 }
 
 export interface SimulatingRequests {
-  /** The number of a new job. */
-  begin(trace: string, model: string): Promise<string>;
+  /** A new job. */
+  begin(trace: string, model: string): Promise<Job>;
   /** The job once it has ended, or after a while. */
   news(job: string): Promise<Job>;
   result(job: string): Promise<unknown>;
@@ -38,7 +38,8 @@ export interface SimulatingRequests {
 export class Simulating {
   shown = $state.raw<Simulation | null>(null);
   busy = $state(false);
-  progress = $state('');
+  /** Its job, as far as it was told of; null before it is known. */
+  job = $state.raw<Job | null>(null);
   problem = $state.raw<Problem | null>(null);
   private turn = 0;
 
@@ -52,15 +53,16 @@ export class Simulating {
     const turn = ++this.turn;
     this.busy = true;
     this.problem = null;
-    this.progress = 'waits for a worker';
+    this.job = null;
     try {
       const job = await this.requests.begin(this.trace, model);
       try {
-        const found = await this.ended(job, turn);
+        this.told(job, turn);
+        const found = await this.ended(job.id, turn);
         if (turn === this.turn) this.shown = simulationOf(found, model);
       } finally {
         // What was only looked at is not kept, nor what failed: a job would keep the trace from being deleted.
-        await this.requests.remove(job).catch(() => {});
+        await this.requests.remove(job.id).catch(() => {});
       }
     } catch (error) {
       if (turn === this.turn) this.problem = asProblem(error);
@@ -76,10 +78,14 @@ export class Simulating {
     this.problem = null;
   }
 
+  private told(job: Job, turn: number): void {
+    if (turn === this.turn) this.job = job;
+  }
+
   private async ended(id: string, turn: number): Promise<Compared> {
     for (;;) {
       const job = await this.requests.news(id);
-      if (turn === this.turn) this.progress = job.progress_text;
+      this.told(job, turn);
       if (job.state === 'done') break;
       if (job.state !== 'queued' && job.state !== 'running') throw new Error(job.reason);
     }

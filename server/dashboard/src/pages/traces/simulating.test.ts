@@ -12,7 +12,7 @@ let simulating: Simulating;
 
 beforeEach(() => {
   requests = {
-    begin: vi.fn(() => Promise.resolve('a')),
+    begin: vi.fn(() => Promise.resolve(job('queued'))),
     news: vi.fn(() => Promise.resolve(job('done'))),
     result: vi.fn(() => Promise.resolve(COMPARED)),
     remove: vi.fn(() => Promise.resolve()),
@@ -27,6 +27,14 @@ describe('a simulation', () => {
     expect(requests.begin).toHaveBeenCalledWith('trace', 'machine');
     expect([simulating.shown?.rms, simulating.problem, simulating.busy]).toEqual([[3], null, false]);
     expect(requests.remove).toHaveBeenCalledExactlyOnceWith('a');
+  });
+
+  it('that has to wait tells of its job at once', async () => {
+    const waiting = job('queued');
+    requests.begin.mockResolvedValueOnce(waiting);
+    requests.news.mockReturnValueOnce(new Promise<Job>(() => {}));
+    void simulating.with('machine');
+    await vi.waitFor(() => expect(simulating.job).toBe(waiting));
   });
 
   it('that failed says why, and its job does not keep the trace from being deleted', async () => {

@@ -4,14 +4,14 @@ import { api, ask, here, type Job } from '../../lib/api';
 import type { SimulatingRequests } from './simulating.svelte';
 
 /** s that one question waits for the job's end. */
-const WAIT = 20;
+const WAIT = 5;
 
 const at = (job: string): { path: { robot: string; job: string } } => ({ path: { ...here(), job } });
 
 export const SIMULATING_REQUESTS: SimulatingRequests = {
   async begin(trace, model) {
     const body = { kind: 'compare' as const, traces: [trace], models: [model] };
-    return (await ask(api.POST('/api/v1/robots/{robot}/jobs', { params: { path: here() }, body }))).id;
+    return (await ask(api.POST('/api/v1/robots/{robot}/jobs', { params: { path: here() }, body }))) as Job;
   },
   async news(job) {
     const params = { ...at(job), query: { wait: WAIT } };

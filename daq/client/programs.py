@@ -1,0 +1,50 @@
+"""Taught programs that the service keeps."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict
+
+from daq.client.connection import Connection, Request
+from daq.contracts.service.teaching import ProgramEntry
+
+Content = TypeVar("Content", bound=BaseModel)
+
+
+class _Kept(BaseModel):
+    model_config = ConfigDict(extra="ignore")
+
+    entry: ProgramEntry
+    program: dict[str, Any]
+
+
+class Programs:
+    """Listed, fetched, kept, deleted. Their content is a `daq.teaching.Program`, of which this part of the client knows
+    nothing: it is handed in."""
+
+    def __init__(self, connection: Connection, robot: str) -> None:
+        self._connection = connection
+        self._path = f"{robot}/programs"
+
+    def list(self) -> tuple[ProgramEntry, ...]:
+        """Those that are kept, the one changed last first."""
+        return self._connection.get(tuple[ProgramEntry, ...], self._path)
+
+    def get(self, kind: type[Content], name: str) -> tuple[Content, ProgramEntry]:
+        """One of them, read as `kind`, with the revision that a change of it names. Raises ServiceError."""
+        found = self._connection.get(_Kept, f"{self._path}/{name}")
+        return kind.model_validate(found.program), found.entry
+
+    def put(self, program: BaseModel, name: str, *, revision: int | None = None) -> ProgramEntry:
+        """Keeps a new program as `name`, or a change of the `revision` of the one that has it.
+
+        A program with another name in it renames that one. Raises ServiceError where that revision is not the newest.
+        """
+        query = {} if revision is None else {"revision": revision}
+        request = Request("PUT", f"{self._path}/{name}", program, query=query, repeatable=True)
+        return self._connection.ask(ProgramEntry, request)
+
+    def delete(self, name: str) -> None:
+        """Deletes one for good."""
+        self._connection.do(Request("DELETE", f"{self._path}/{name}"))

@@ -1,0 +1,47 @@
+/** What a job waits behind, in words. Pure. */
+
+import type { Job } from '../api/types';
+import { duration } from '../format';
+import type { JobKind } from './jobs';
+
+/** What a job is, as a noun. */
+const NOUNS: Readonly<Record<JobKind, string>> = {
+  fit: 'fit',
+  validate: 'validation',
+  compare: 'simulation',
+  diagnose: 'diagnosis',
+};
+
+/** Traces that are called by name; of more, how many. */
+const MOST_NAMED = 1;
+
+/**
+ * `waits behind: diagnosis of ramp, 21 Nov 2026, 10:22:05 (3 min so far)`.
+ *
+ * `now` in ms since 1970; `name`: what a trace is called.
+ */
+export function waitingWords(job: Job, now: number, name: (trace: string) => string): string {
+  const behind = job.waits_behind ?? null;
+  if (behind === null) return 'waits for a worker';
+  const { traces } = behind.request;
+  const of = traces.length <= MOST_NAMED ? traces.map(name).join(', ') : `${traces.length} traces`;
+  const more = behind.others === 0 ? '' : `, then ${behind.others} more`;
+  return `waits behind: ${NOUNS[behind.request.kind]} of ${of}${soFar(behind.started, now)}${more}`;
+}
+
+/** Traces whose names the words need. */
+export function namedTraces(job: Job): readonly string[] {
+  const traces = job.waits_behind?.request.traces ?? [];
+  return traces.length <= MOST_NAMED ? traces : [];
+}
+
+function soFar(started: string | null, now: number): string {
+  if (started === null) return '';
+  const seconds = Math.max(0, (now - Date.parse(started)) / 1000);
+  return ` (${seconds < 60 ? `${Math.round(seconds)} s` : coarse(seconds)} so far)`;
+}
+
+/** Whole minutes, since nobody waits by the second for a job of minutes. */
+function coarse(seconds: number): string {
+  return seconds < 3600 ? `${Math.floor(seconds / 60)} min` : duration(seconds);
+}

@@ -1,0 +1,51 @@
+"""Lanes of jobs: one that is bounded from the outset does not wait behind one that computes until it converges."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Literal, get_args
+
+from daq.contracts.service.jobs import CompareRequest, Job, JobRequest, ValidateRequest, WaitsBehind
+
+Lane = Literal["short", "long"]
+LANES: tuple[Lane, ...] = get_args(Lane)
+SHORT_LANE_WORKERS = 1
+"""Worker processes of the short lane. One suffices, since a job there takes seconds; each costs about 250 MB."""
+MOST_PASSES = 20
+"""Passes over a trace that a short job may consist of; one takes a second or so. A comparison of more is as long as a
+fit."""
+
+
+def lane_of(request: JobRequest) -> Lane:
+    """The lane of a job, from what it has to compute. Fits and diagnoses iterate: they are always long."""
+    match request:
+        case CompareRequest():
+            passes = len(request.traces) * len(request.models)
+        case ValidateRequest():
+            passes = len(request.traces)
+        case _:
+            return "long"
+    return "short" if passes <= MOST_PASSES else "long"
+
+
+def with_what_it_waits_for(job: Job, running: Iterable[Job], waiting: Sequence[Job]) -> Job:
+    """A queued job with the job that it waits behind, in `waits_behind`.
+
+    Args:
+        running: jobs that are computed now, of any lane
+        waiting: queued jobs of any lane, the first submitted first
+    """
+    lane = lane_of(job.request)
+    computed = sorted((one for one in running if lane_of(one.request) == lane), key=lambda one: one.submitted)
+    before = []
+    for one in waiting:
+        if one.id == job.id:
+            break
+        if lane_of(one.request) == lane:
+            before.append(one)
+    ahead = [*computed, *before]
+    if not ahead:
+        return job
+    first = ahead[0]
+    behind = WaitsBehind(job=first.id, request=first.request, started=first.started, others=len(ahead) - 1)
+    return job.model_copy(update={"waits_behind": behind})

@@ -1,0 +1,105 @@
+"""Taught programs in the database: kept until somebody deletes them, whoever taught them and from whichever page."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from daq.contracts.service.base import Wire
+from daq.contracts.service.teaching import ProgramEntry
+from daq.teaching import Program
+from server.problems import conflict, not_found
+from server.store.engine import Store
+from server.store.tables import ProgramRow
+
+MOST_PROGRAMS = 1000
+"""Of one robot. They are listed in one piece."""
+
+
+class StoredProgram(Wire):
+    """A program with what is known about it."""
+
+    entry: ProgramEntry
+    program: Program
+
+
+class ProgramStore:
+    """Programs of all robots."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def all(self, robot: str) -> tuple[ProgramEntry, ...]:
+        """Those of a robot, the one changed last first."""
+        query = select(ProgramRow).filter_by(robot=robot).order_by(ProgramRow.changed.desc(), ProgramRow.name)
+        with self._store.reading() as session:
+            return tuple(_entry(row) for row in session.scalars(query))
+
+    def get(self, robot: str, name: str) -> StoredProgram:
+        """One of them. Raises a 404."""
+        with self._store.reading() as session:
+            row = _row(session, robot, name)
+            return StoredProgram(entry=_entry(row), program=Program.model_validate(row.program))
+
+    def put(
+        self, robot: str, name: str, program: Program, revision: int | None, now: datetime, by: str
+    ) -> ProgramEntry:
+        """Keeps a program under its own name; where that is another than `name`, the program `name` is renamed.
+
+        `revision` is that which was changed, None for a new program. Raises a 409 when somebody else has changed it
+        meanwhile, when its new name is taken, or when there are MOST_PROGRAMS; a 404 when what was changed is gone.
+        What is kept already in this very form is no change: an answer that was lost may be asked for again.
+        """
+        content = program.model_dump(mode="json")
+        with self._store.writing() as session:
+            there = session.get(ProgramRow, (robot, program.name))
+            if there is not None and there.program == content:
+                return _entry(there)
+            if revision is None:
+                if there is not None:
+                    raise _taken(program.name)
+                count = session.scalar(select(func.count()).select_from(ProgramRow).filter_by(robot=robot)) or 0
+                if count >= MOST_PROGRAMS:
+                    raise conflict("program-exists", f"there are {count} programs", "delete some of them first")
+                row = ProgramRow(robot=robot, revision=0)
+                session.add(row)
+            else:
+                row = _row(session, robot, name)
+                if program.name != name and there is not None:
+                    raise _taken(program.name)
+                if row.revision != revision:
+                    line = f"program {name!r} was changed by {row.changed_by} meanwhile (revision {row.revision})"
+                    raise conflict("program-changed", line, "load it again, or keep yours under another name")
+            row.name, row.program, row.revision = program.name, content, row.revision + 1
+            row.changed, row.changed_by = now, by
+            session.flush()
+            return _entry(row)
+
+    def remove(self, robot: str, name: str) -> None:
+        """For good. Raises a 404."""
+        with self._store.writing() as session:
+            session.delete(_row(session, robot, name))
+
+
+def _taken(name: str) -> Exception:
+    return conflict("program-exists", f"there is a program {name!r} already", "choose another name, or delete that one")
+
+
+def _entry(row: ProgramRow) -> ProgramEntry:
+    return ProgramEntry(
+        name=row.name,
+        robot=row.robot,
+        revision=row.revision,
+        instructions=len(row.program["instructions"]),
+        changed=row.changed,
+        changed_by=row.changed_by,
+    )
+
+
+def _row(session: Session, robot: str, name: str) -> ProgramRow:
+    row = session.get(ProgramRow, (robot, name))
+    if row is None:
+        raise not_found(f"program {name!r}", "GET …/programs lists those there are")
+    return row

@@ -1,0 +1,44 @@
+"""The reference of the API at `/docs`: everything that the service describes, without a network."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from playwright.sync_api import Request, expect
+
+from tests.server.dashboard.browser import Dashboard
+
+pytestmark = pytest.mark.browser
+
+
+def test_every_tag_and_operation_is_shown_and_nothing_is_asked_of_elsewhere(dashboard: Dashboard) -> None:
+    """That the policy forbids nothing, and that no request leaves, the tab itself watches: see its complaints."""
+    described = dashboard.service.client.get("/openapi.json").json()
+    operations = [one for path in described["paths"].values() for one in path.values()]
+    page = dashboard.open("system")
+    page.get_by_role("link", name="API reference").click()
+    expect(page).to_have_url(f"{dashboard.service.url}/docs")
+    expect(page.locator(".opblock")).to_have_count(len(operations))
+    shown = {heading.get_attribute("data-tag") for heading in page.locator(".opblock-tag").all()}
+    assert shown == {tag for one in operations for tag in one.get("tags", ["default"])}
+
+
+def test_what_changes_something_cannot_be_tried_from_a_page_without_stop(dashboard: Dashboard) -> None:
+    page = dashboard.page
+    sent: list[str] = []
+
+    def note(request: Request) -> None:
+        sent.append(f"{request.method} {request.url}")
+
+    page.goto(f"{dashboard.service.url}/docs#/robots/stop_robot")
+    expect(page.get_by_text("Freezes the arm at its measured posture")).to_be_visible()
+    expect(page.get_by_role("button", name="Execute")).to_have_count(0)
+    page.on("request", note)
+    page.goto(f"{dashboard.service.url}/docs#/robots/list_robots")
+    page.reload()
+    page.get_by_role("button", name=re.compile("Try it out")).click()
+    page.get_by_role("button", name="Execute").click()
+    expect(page.locator(".live-responses-table").get_by_text("200")).to_be_visible()
+    assert f"GET {dashboard.service.url}/api/v1/robots" in sent
+    assert not [one for one in sent if not one.startswith("GET ")]
