@@ -31,7 +31,7 @@ async def store_upload(request: Request, one: RobotServices, found: Services, wh
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind not in KINDS:
         allowed = " or ".join(KINDS)
-        raise ProblemError(415, "not-a-trace", f"Content-Type {kind!r} is not taken", f"send {allowed}")
+        raise ProblemError(415, "not-a-trace", f"Content-Type {kind!r} is not supported", f"send {allowed}")
     one.catalogue.folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".upload-", dir=one.catalogue.folder) as folder:
         path = Path(folder) / f"upload{KINDS[kind]}"
@@ -57,11 +57,11 @@ def _take_in(path: Path, one: RobotServices, found: Services, who: Caller) -> Ca
         trace = import_csv(path) if path.suffix == ".csv" else read_trace(path)
     except TraceError as error:
         line = str(error).replace(str(path), "upload")
-        raise ProblemError(422, "not-a-trace", line, "docs/traces.md tells what a trace looks like") from error
+        raise ProblemError(422, "not-a-trace", line, "docs/traces.md describes what a trace looks like") from error
     record = trace.record
     if not SAFE_NUMBER.fullmatch(record.trace_id):
         advice = "letters, digits, - and _ are allowed"
-        raise ProblemError(422, "not-a-trace", "its number is not one of a trace", advice)
+        raise ProblemError(422, "not-a-trace", "its trace number is not valid", advice)
     target = trace_path(one.catalogue.folder, record)
     made = path
     if path.suffix == ".csv":

@@ -101,6 +101,6 @@ def test_an_experiment_waits_while_a_client_has_the_control(service: Service) ->
     made = service.robot.post("/experiments", json={"spec": spec}).json()
     while not (waiting_for := service.robot.get("/queue").json()["waiting_for"]):
         pass
-    assert waiting_for == "a client has the control of the robot"
+    assert waiting_for == "somebody has control of the robot"
     service.robot.delete("/control", headers=mine)
     assert service.end_of(made["id"])["state"] == "done"

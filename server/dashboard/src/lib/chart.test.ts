@@ -28,8 +28,14 @@ describe('names at the ends of lines', () => {
   });
 
   it('do not change places for noise', () => {
-    expect(apart([50, 51], 12, 0, 100)).toEqual([50, 62]);
-    expect(apart([51, 50], 12, 0, 100)).toEqual([51, 63]);
+    expect(apart([50, 51], 12, 0, 100)).toEqual([44.5, 56.5]);
+    expect(apart([51, 50], 12, 0, 100)).toEqual([44.5, 56.5]);
+  });
+
+  it('stand about the middle of their lines, none further away than its stack is high', () => {
+    const places = apart([50, 50, 50, 50, 50, 90], 12, 0, 100);
+    expect(places).toEqual([26, 38, 50, 62, 74, 90]);
+    expect(apart([50, 60, 70], 12, 0, 100)).toEqual([48, 60, 72]);
   });
 
   it('stay within the chart', () => {

@@ -57,15 +57,15 @@ export class Sending {
     const params = { path: here(), header: { 'idempotency-key': this.key } };
     const body = { spec, priority: Number(this.priority), ...(at === null ? {} : { at }) };
     const made = await ask(api.POST('/api/v1/robots/{robot}/experiments', { params, body }));
-    return `${made.spec.name ?? made.spec.trajectory.kind} is in the queue, number ${made.id}`;
+    return `${made.spec.name ?? made.spec.trajectory.kind} was added to the queue`;
   }
 
   private async schedule(spec: ExperimentSpec): Promise<string> {
     const every = this.seconds();
     const count = this.count.trim() === '' ? null : Number(this.count);
     const body = { spec, every, count, priority: Number(this.priority) };
-    const made = await ask(api.POST('/api/v1/robots/{robot}/schedules', { params: { path: here() }, body }));
-    return `scheduled every ${interval(every)}, number ${made.id}`;
+    await ask(api.POST('/api/v1/robots/{robot}/schedules', { params: { path: here() }, body }));
+    return `scheduled every ${interval(every)}`;
   }
 
   private seconds(): number {

@@ -52,7 +52,7 @@ export class Simulating {
     const turn = ++this.turn;
     this.busy = true;
     this.problem = null;
-    this.progress = 'waits for a worker';
+    this.progress = 'waiting for a worker';
     try {
       const job = await this.requests.begin(this.trace, model);
       try {
