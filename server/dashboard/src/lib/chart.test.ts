@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { apart, padded } from './chart';
+import { apart, padded, withRoom } from './chart';
 
 describe('the range of a chart', () => {
   it('leaves room, and does not draw noise as motion', () => {
@@ -10,6 +10,15 @@ describe('the range of a chart', () => {
 
   it('is something also without data', () => {
     expect(padded(Infinity, -Infinity)).toEqual([-1, 1]);
+  });
+});
+
+describe('places at an axis', () => {
+  it('are fewer where the chart is narrow, and always the last one', () => {
+    const places = [-30, -25, -20, -15, -10, -5, 0];
+    expect(withRoom(places, 800)).toEqual(places);
+    expect(withRoom(places, 300)).toEqual([-30, -20, -10, 0]);
+    expect(withRoom(places, 160).at(-1)).toBe(0);
   });
 });
 

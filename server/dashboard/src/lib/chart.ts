@@ -121,7 +121,9 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
         size: 26,
         gap: 4,
         ...written(axes.x),
-        ...(places === undefined ? {} : { splits: (_, __, low, high) => places(low, high) }),
+        ...(places === undefined
+          ? {}
+          : { splits: (plot, __, low, high) => withRoom(places(low, high), plot.width) }),
       },
       { ...axis, size: 56, gap: 6, ...written(axes.y) },
     ],
@@ -146,6 +148,15 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
       ],
     },
   };
+}
+
+/** px that a time at the axis needs: -30 s, and some room. */
+const LABEL_WIDTH = 52;
+
+/** Every second, every third … of `places`, the last one among them, where all would cover each other in `width` px. */
+export function withRoom(places: readonly number[], width: number): number[] {
+  const every = Math.max(1, Math.ceil((places.length * LABEL_WIDTH) / Math.max(1, width - 2 * LABEL_WIDTH)));
+  return places.filter((_, index) => (places.length - 1 - index) % every === 0);
 }
 
 function select(plot: uPlot, drawing: ChartDrawing): void {
