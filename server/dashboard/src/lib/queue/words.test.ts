@@ -20,14 +20,14 @@ describe('what goes on', () => {
       isFree: false,
     });
     expect(whatGoesOn(robot, paused, 0)).toEqual({
-      text: 'The queue is paused: paused by anna.',
+      text: 'The queue is paused by anna.',
       isFree: false,
     });
   });
 
   it('is what the arm does, also while the queue is paused', () => {
     expect(whatGoesOn({ ...robot, activity: 'experiment' }, paused, 0).text).toBe(
-      'An experiment is running. The queue is paused: paused by anna.',
+      'An experiment is running. The queue is paused by anna.',
     );
   });
 });
@@ -45,7 +45,11 @@ describe('the queue', () => {
 
   it('that is paused lets what runs go on', () => {
     const running = { ...paused, running: '9f3c' };
-    expect(queueState(running, true).text).toMatch(/paused by anna\. The experiment .* goes on/);
+    expect(queueState(running, true).text).toMatch(/^by anna\. The experiment .* goes on/);
+    expect(queueState({ ...paused, reason: 'the arm is stopped' }, true)).toEqual({
+      head: 'Paused:',
+      text: 'the arm is stopped.',
+    });
     expect(queueBadge(running, true)).toEqual({ tone: 'busy', text: 'running the last one' });
     expect(queueBadge(paused, true)).toEqual({ tone: 'warn', text: 'paused' });
   });
