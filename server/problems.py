@@ -28,18 +28,18 @@ TITLES = {
     401: "A token is needed",
     403: "Not allowed",
     404: "Not found",
-    405: "This address does not know this method",
-    406: "Not in that form",
-    409: "Not now",
+    405: "Method not allowed here",
+    406: "Not available in that format",
+    409: "Not possible now",
     413: "Too large",
-    414: "Too long an address",
-    415: "In no form that is understood here",
+    414: "Address too long",
+    415: "Format not supported",
     422: "The request is not valid",
     429: "Too many requests",
-    431: "Too many or too long headers",
-    500: "A fault of this program",
-    503: "Something that this needs cannot be reached",
-    507: "No room",
+    431: "Headers too many or too long",
+    500: "Internal error",
+    503: "Not available",
+    507: "Disk full",
 }
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -95,14 +95,14 @@ def of_database(error: DatabaseError) -> ProblemError:
     line = line_of(error)
     log.error("database: %s", line)
     if "full" in str(error.orig):
-        return ProblemError(507, "no-room", "the disk of the database is full", "make room on it")
+        return ProblemError(507, "no-room", "the disk of the database is full", "free some space on it")
     return ProblemError(503, "database", f"the database: {line}", advice_of(line))
 
 
 def no_room(error: OSError) -> ProblemError:
     """A 507: the disk takes no more."""
     log.error("disk: %s", error)
-    return ProblemError(507, "no-room", f"the disk: {error.strerror}", "make room on it")
+    return ProblemError(507, "no-room", f"the disk: {error.strerror}", "free some space on it")
 
 
 def of_exit_code(exit_code: int, line: str) -> ProblemError:
@@ -185,8 +185,8 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(Exception)
     async def fault(request: Request, error: Exception) -> JSONResponse:
         log.exception("fault in %s %s", request.method, request.url.path, exc_info=error)
-        detail = f"{type(error).__name__} while this was carried out"
-        return response(request, ProblemError(500, "fault", detail, "the log has more, under the request's id"))
+        detail = f"{type(error).__name__}: an error of this program"
+        return response(request, ProblemError(500, "fault", detail, "the log has details under the id of this request"))
 
 
 def field_of(place: Sequence[int | str]) -> str:

@@ -79,7 +79,7 @@ class RobotServices:
         identity = self.robot.identity
         if identity is not None and not identity.simulated and not held.moves_real_arm:
             line = f"{self.robot.place.url} is a real arm: it moves only with the operator's word"
-            raise conflict("consent-needed", line, "take the control again, with moves_real_arm")
+            raise conflict("consent-needed", line, "take control again, with moves_real_arm")
 
 
 class Services:
@@ -261,7 +261,7 @@ class Services:
         if one is not None:
             one.queue.control_lapsed(holder)
             one.teaching.hold()
-        self.tell(robot.name, "control", f"the control of {holder} has lapsed: the arm holds", actor=holder)
+        self.tell(robot.name, "control", f"{holder} lost control: the arm holds its posture", actor=holder)
 
     def _given_back(self, robot: Robot, holder: str) -> None:
         one = self._robots.get(robot.name)

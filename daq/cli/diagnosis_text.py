@@ -40,7 +40,7 @@ def answer_text(found: Diagnosis) -> str:
         lines += ["", *_filled("ask", _asked(found.next_experiment))]
     for note in found.notes:
         lines += [] if is_warning(note) else ["", *_filled("note", note)]
-    lines += ["", f"{found.seconds:.1f} s of computing, {found.robot_seconds:.0f} s of motion"]
+    lines += ["", f"Took {found.seconds:.1f} s, for {found.robot_seconds:.0f} s of motion"]
     return "\n".join(lines)
 
 

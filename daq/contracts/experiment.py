@@ -34,7 +34,7 @@ class _Part(BaseModel):
 
 
 class Ramp(_Part):
-    """Equal small increments through `amplitude` in `duration`, all joints arriving together (section 6.5)."""
+    """Constant speed through `amplitude` in `duration`; all joints arrive together."""
 
     kind: Literal["ramp"] = "ramp"
     amplitude: Amplitude = DEFAULT_AMPLITUDE
@@ -42,7 +42,7 @@ class Ramp(_Part):
 
 
 class Step(_Part):
-    """The whole amplitude in one set point."""
+    """The whole `amplitude` at once, in one set point."""
 
     kind: Literal["step"] = "step"
     amplitude: Amplitude = math.radians(5.4)
@@ -59,7 +59,7 @@ class Staircase(_Part):
 
 
 class SlowRamp(_Part):
-    """Constant speed out to `amplitude` and back, `reversals` changes of direction: friction shows at low speed."""
+    """Constant low speed out to `amplitude` and back, with `reversals` changes of direction. Shows friction."""
 
     kind: Literal["slow_ramp"] = "slow_ramp"
     amplitude: Amplitude = math.radians(10.8)
@@ -68,7 +68,7 @@ class SlowRamp(_Part):
 
 
 class Sine(_Part):
-    """`cycles` of a sine about the start posture; joint k of the list lags by k · `phase` rad."""
+    """`cycles` of a sine about the start posture. Each joint lags `phase` rad behind the one before it."""
 
     kind: Literal["sine"] = "sine"
     amplitude: Amplitude = math.radians(10.8)
@@ -96,7 +96,7 @@ class Multisine(_Part):
 
 
 class Cubic(_Part):
-    """Cubic in time through `amplitude` in `duration`, at rest at both ends (section 3.7)."""
+    """Cubic in time through `amplitude` in `duration`, at rest at both ends."""
 
     kind: Literal["cubic"] = "cubic"
     amplitude: Amplitude = DEFAULT_AMPLITUDE

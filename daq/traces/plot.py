@@ -36,7 +36,8 @@ JOINTS_ABREAST = 3
 _ALARMS: frozenset[EventKind] = frozenset({"limit", "restart", "link_lost", "stop", "fault"})
 _UNMARKED: frozenset[EventKind] = frozenset({"start", "end", "note", "gains", "retry", "missing", "missed_set_point"})
 """Kinds without a line of their own: there may be hundreds, or they say what the axes say."""
-_WORDS = {"ramp_start": "ramp starts", "ramp_end": "ramp ends", "link_lost": "link lost"}
+_MOTIONS: frozenset[EventKind] = frozenset({"ramp_start", "ramp_end"})
+"""The ends of a motion, whose messages say which motion it is: "sine ends"."""
 
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -224,10 +225,16 @@ def _head(axes: Axes, trace: Trace, joint: int, column: int) -> None:
         axes.set_title("P {} · I {} · D {}".format(*gains), loc="right", fontsize=8, color=QUIET, pad=14)
     for event in _labelled(trace, column):
         axes.annotate(
-            _WORDS.get(event.kind, event.kind), (event.time, 1.0), xycoords=("data", "axes fraction"),
+            _mark(event), (event.time, 1.0), xycoords=("data", "axes fraction"),
             xytext=(0, 2), textcoords="offset points", ha="center", va="bottom", fontsize=6.5,
             color=ALARM if event.kind in _ALARMS else QUIET, annotation_clip=False,
         )  # fmt: skip
+
+
+def _mark(event: TraceEvent) -> str:
+    if event.kind in _MOTIONS and event.message:
+        return event.message
+    return event.kind.replace("_", " ")
 
 
 def _labelled(trace: Trace, column: int) -> list[TraceEvent]:

@@ -135,7 +135,7 @@ PARTS = {
 }
 
 PRESETS: dict[str, Preset] = {
-    "ramp": Preset("the source's experiment: joints 1-3 through 21.6° in 0.65 s", ExperimentSpec(name="ramp")),
+    "ramp": Preset("the ramp of the 1991 thesis: joints 1-3 through 21.6° in 0.65 s", ExperimentSpec(name="ramp")),
     "diagnostic": Preset(
         "parts a to e one after the other, about 55 s: tells hidden effects apart",
         _sequence("diagnostic", [segment for _, segments in PARTS.values() for segment in segments]),

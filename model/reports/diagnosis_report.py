@@ -63,7 +63,7 @@ def _facts(found: Diagnosis) -> tuple[tuple[str, str], ...]:
         ("model after", f"{found.model_after.identity}, {spoken([u.name for u in found.model_after.effects])}"),
         ("fitted to", listed(found.traces)),
         ("held out", listed(found.holdout) if found.holdout else "none: nothing below was judged on other data"),
-        ("time", f"{found.seconds:.1f} s of computing; {found.robot_seconds:.0f} s of motion"),
+        ("time", f"took {found.seconds:.1f} s, for {found.robot_seconds:.0f} s of motion"),
     )
 
 

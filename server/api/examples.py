@@ -92,7 +92,7 @@ def _experiments() -> list[BaseModel]:
             id=EXPERIMENT, robot=ROBOT, spec=SPEC, state="running", priority=10, at=NOON, submitted=NOON,
             submitted_by="anna", started=NOON, progress=0.4, progress_text="120 of 300 samples", trace=TRACE,
         ),
-        ExperimentPreset(name="ramp", description="the ramp step of section 6.5", spec=SPEC),
+        ExperimentPreset(name="ramp", description="the ramp of the 1991 thesis", spec=SPEC),
         ScheduleRequest(spec=SPEC, every=86400, starts=NOON, count=30),
         ScheduleChange(active=False),
         Schedule(

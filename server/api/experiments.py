@@ -12,6 +12,7 @@ from daq.contracts.service.experiments import (
     ENDS,
     Experiment,
     ExperimentChange,
+    ExperimentOrder,
     ExperimentRequest,
     ExperimentState,
     MotionPreview,
@@ -65,11 +66,12 @@ async def list_experiments(
     _: Viewer,
     state: StateFilter = None,
     schedule: Annotated[str | None, Query(max_length=64)] = None,
+    order: Annotated[ExperimentOrder, Query(description="By `ended`: only those that have ended.")] = "submitted",
     limit: Limit = 50,
     cursor: CursorOf = None,
 ) -> Page[Experiment]:
-    """Experiments, the newest first."""
-    page = await found.experiments.page.told(one.robot.name, tuple(state or ()), schedule, cursor, limit)
+    """Experiments, those submitted last first, or those that ended last."""
+    page = await found.experiments.page.told(one.robot.name, tuple(state or ()), schedule, cursor, limit, order)
     return page.model_copy(update={"items": tuple(one.queue.as_told(item) for item in page.items)})
 
 

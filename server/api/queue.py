@@ -111,7 +111,7 @@ def take_control(request: ControlRequest, one: RobotPart, found: ServicesPart, w
         line = f"{one.robot.place.url} is a real arm: it moves only with the operator's word"
         raise ProblemError(409, "consent-needed", line, "is its workspace clear? then ask again with moves_real_arm")
     lease = one.control.take(who.name, moves_real_arm=request.moves_real_arm)
-    found.tell(one.robot.name, "control", f"{who.name} has the control", actor=who.name)
+    found.tell(one.robot.name, "control", f"{who.name} took control", actor=who.name)
     return lease
 
 

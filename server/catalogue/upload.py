@@ -25,7 +25,7 @@ async def store_upload(request: Request, one: RobotServices, found: Services, wh
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind not in KINDS:
         allowed = " or ".join(KINDS)
-        raise ProblemError(415, "not-a-trace", f"Content-Type {kind!r:.100} is not taken", f"send {allowed}")
+        raise ProblemError(415, "not-a-trace", f"Content-Type {kind!r:.100} is not supported", f"send {allowed}")
     one.catalogue.folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".upload-", dir=one.catalogue.folder) as folder:
         path = Path(folder) / f"upload{KINDS[kind]}"

@@ -265,7 +265,7 @@ class JobDesk:
             ended = future.result()
         except BrokenExecutor:
             self._executors.pop(lane, None)
-            event, reason = Event.LOST, "its worker process ended: it was killed, or the memory did not suffice"
+            event, reason = Event.LOST, "its worker process ended: it was killed, or ran out of memory"
         except Exception as error:
             log.exception("job %s", identity)
             event, reason = Event.FAULT, _fault(error)

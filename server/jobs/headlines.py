@@ -29,7 +29,7 @@ def of_fit(found: FitResult, comparison: Comparison) -> str:
 
 def of_validation(found: Fidelity) -> str:
     """Whether expected deviations explain what is left."""
-    said = "expected deviations explain what is left" if found.explains else "something is not in the model"
+    said = "expected deviations explain the residual" if found.explains else "the model lacks something"
     return f"Σλ² = {found.sum_of_contributions:.3g}: {said}"
 
 

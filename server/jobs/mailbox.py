@@ -66,10 +66,11 @@ class Mailbox:
 
     # ---- the worker's side
 
-    def tell(self, fraction: float, text: str) -> None:
-        """Progress, as `daq.contracts.progress.Progress`."""
+    def tell(self, fraction: float, text: str, *, at_once: bool = False) -> None:
+        """Progress, as `daq.contracts.progress.Progress`. What comes too soon after the report before it is left out,
+        unless it is to be told `at_once`: the beginning of something long."""
         now = time.monotonic()
-        if now - self._told < TELL_EVERY and fraction < 1:
+        if now - self._told < TELL_EVERY and not at_once:
             return
         self._told = now
         part = self.folder / f"{PROGRESS}.part"

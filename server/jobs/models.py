@@ -63,7 +63,7 @@ class Models:
             advice = "send a file as `daq fit` writes it"
             raise ProblemError(422, "not-a-model", "the body is not JSON", advice) from error
         if _has_program(data):
-            line = "this model has effects that are programs of its user's own: a service does not run those"
+            line = "this model has effects that are programs of a user: a service does not run those"
             raise ProblemError(422, "not-a-model", line, "use it with the command line")
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self.folder / f"upload-{os.urandom(6).hex()}.json"

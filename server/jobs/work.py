@@ -36,8 +36,10 @@ if TYPE_CHECKING:
     AnyResult = FitJobResult | ValidationJobResult | ComparisonJobResult | DiagnosisJobResult
 
 CURVE_POINTS = 21
-FIT_SHARE, VALIDATION_SHARE, DIAGNOSIS_SHARE = 0.9, 0.7, 0.95
+FIT_SHARE, VALIDATION_SHARE, DIAGNOSIS_SHARE = 0.9, 0.7, 0.9
 """Of the progress, before comparison and report."""
+MAP_SHARE, REPORT_SHARE = 0.94, 0.98
+"""Of the progress, before the map of disagreement of a diagnosis, and before the report."""
 
 
 class Task(BaseModel):
@@ -136,7 +138,8 @@ class _Worker:
         )  # fmt: skip
         in_time = []
         for number, trace in enumerate(traces):
-            self._tell(VALIDATION_SHARE, 1, number / len(traces), f"variation with time: {trace.record.trace_id}")
+            text = f"variation with time, trace {number + 1} of {len(traces)}"
+            self._tell(VALIDATION_SHARE, REPORT_SHARE, number / len(traces), text)
             in_time.append(vary_in_time(model, trace, names))
         three = in_convention(fidelity, model, "three_sigma")
         data = ValidationData(
@@ -186,8 +189,8 @@ class _Worker:
         controlled = not isinstance(begin.machine.controller, NoController)
         if controlled and all(trace.set_point is not None for trace in (*traces, *held)):
             models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
-            comparison = self._compared(models, [*traces, *held], request.held_out, DIAGNOSIS_SHARE)
-            self.mailbox.tell(DIAGNOSIS_SHARE, "where the model as it was given disagrees")
+            comparison = self._compared(models, [*traces, *held], request.held_out, DIAGNOSIS_SHARE, MAP_SHARE)
+            self.mailbox.tell(MAP_SHARE, "locating where the model as given disagrees", at_once=True)
             given = where_given(begin, traces)
         changed = found.model_after.identity != found.model_before.identity
         if changed:
@@ -197,12 +200,17 @@ class _Worker:
         return self._done(result, report, of_diagnosis(found), found.model_after if changed else None)
 
     def _compared(
-        self, models: list[tuple[str, Model]], traces: Sequence[Trace], held: Sequence[str] | None, share: float
+        self,
+        models: list[tuple[str, Model]],
+        traces: Sequence[Trace],
+        held: Sequence[str] | None,
+        begin: float,
+        end: float = REPORT_SHARE,
     ) -> Comparison:
         from model.comparison.compare import compare
 
         return compare(
-            models, traces, held, progress=lambda f, text: self._tell(share, 1, f, text), cancel=self.mailbox
+            models, traces, held, progress=lambda f, text: self._tell(begin, end, f, text), cancel=self.mailbox
         )
 
     def _traces(self, numbers: Sequence[str]) -> list[Trace]:
@@ -218,7 +226,9 @@ class _Worker:
         return self.task.names.get(number, number)
 
     def _tell(self, begin: float, end: float, fraction: float, text: str) -> None:
-        self.mailbox.tell(begin + (end - begin) * fraction, text)
+        """A stage's progress as the job's. The end of a stage ends no job, and what follows says what it is."""
+        if fraction < 1:
+            self.mailbox.tell(begin + (end - begin) * fraction, text)
 
     def _keep_model(self, model: Model) -> None:
         self.mailbox.write_text(MODEL, model.model_dump_json(indent=1) + "\n")
@@ -226,6 +236,7 @@ class _Worker:
     def _done(self, result: AnyResult, report: Report, headline: str, model: Model | None = None) -> Ended:
         from model.reports.page import html
 
+        self.mailbox.tell(REPORT_SHARE, "writing the report", at_once=True)
         self.mailbox.write_text(REPORT, html(report))
         self.mailbox.write_text(RESULT, result.model_dump_json())
         return Ended(model=None if model is None else model.identity, headline=headline)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
 from daq.contracts.errors import DaqError
-from daq.contracts.service.experiments import Experiment, ExperimentRequest
+from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState
 from daq.contracts.service.queue import QueueStatus
 from server.owner.messages import Answer, ArmReport, HaltRun, RunExperiment
 from server.problems import ProblemError, conflict
@@ -220,10 +220,10 @@ class QueueDesk:
         if before is not None and before.paused:
             return before
         if waiting or interrupted:
-            line = f"the service was started again with {waiting} waiting and {len(interrupted)} interrupted"
+            line = f"the service was restarted with {waiting} waiting and {len(interrupted)} interrupted"
             state = QueueState(True, f"{line}: look at the arm, then resume the queue", now)
         else:
-            state = QueueState(False, "nothing was waiting when the service began", now)
+            state = QueueState(False, "nothing was waiting when the service started", now)
         parts.queues.set(name, state)
         return state
 
@@ -266,7 +266,7 @@ class QueueDesk:
             except Exception:
                 # A disk that is full, a database that is locked: the queue must not end with it, nor go on blindly.
                 log.exception("queue")
-                self._waiting_for = "the queue met a fault of this program: see the log"
+                self._waiting_for = "the queue met an error of this program: see the log"
             self._changed.wait(LOOK_EVERY)
 
     def _settle(self) -> None:
@@ -291,7 +291,7 @@ class QueueDesk:
             if self._state.paused or self._waiting_for or self._closing:
                 return None
             if not parts.control.take_for_queue(following.id):
-                self._waiting_for = "a client has the control of the robot"
+                self._waiting_for = "somebody has control of the robot"
                 return None
             if self.notices.reason:  # a control that has just ended, say: the queue is held first
                 parts.control.give_back_for_queue()
@@ -345,7 +345,7 @@ class QueueDesk:
         with self._lock:
             ending = self._as_wished(ending, self._running)
             state = advance("running", ending.event)
-            why = f"experiment {experiment.id} ended as {state} ({ending.reason}): look at the arm, then resume"
+            why = f"{_ended_as(experiment, state)} ({ending.reason}): look at the arm, then resume the queue"
             held = ending.holds_queue and self._hold(why)  # whoever hears of the end finds the queue paused
             self._ended = Ended(experiment.id, ending, parts.clock.utc())
             try:
@@ -411,7 +411,7 @@ class QueueDesk:
                 if self._needs_attendance() and not self._attended():
                     running = self._running
                     if running is not None and running.cancelled_by is None:
-                        running.cancelled_by = "the service: no operator said to be there"
+                        running.cancelled_by = "the service: no operator confirmed to be present"
                         self._parts.robot.tell(HaltRun())
 
     def _as_wished(self, ending: Ending, running: Running | None) -> Ending:
@@ -423,3 +423,9 @@ class QueueDesk:
         if running is not None and running.cancelled_by is not None:
             return replace(ending, reason=f"cancelled by {running.cancelled_by}")
         return ending
+
+
+def _ended_as(experiment: Experiment, state: ExperimentState) -> str:
+    """`ramp failed`: people know an experiment by its name, not by its number."""
+    name = experiment.spec.name or experiment.spec.trajectory.kind.replace("_", " ")
+    return f"{name} {state}" if state == "failed" else f"{name} was {state}"

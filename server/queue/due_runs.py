@@ -27,7 +27,7 @@ class DueRuns:
         """At the start: what was due while nobody was there to submit it is not made up for."""
         parts = self._parts
         for identity in parts.schedules.leave_out_missed(parts.robot.name, parts.clock.utc()):
-            line = "what was due while the service was off is left out"
+            line = "runs that were due while the service was off were skipped"
             parts.told("schedule", f"schedule {identity}: {line}")
 
     def submit(self) -> None:
@@ -43,7 +43,7 @@ class DueRuns:
                 self._hindered[identity] = type(error)
                 log.exception("schedule %s", identity)
                 why = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: see the log"
-                self._parts.told("schedule", f"schedule {identity}: its run waits: {why}")
+                self._parts.told("schedule", f"schedule {identity}: its run has to wait: {why}")
 
     def _submit_one(self, identity: str, now: datetime) -> None:
         parts = self._parts
@@ -53,7 +53,7 @@ class DueRuns:
             parts.schedules.leave_out(name, identity, now)
             if identity not in self._left_out:
                 self._left_out.add(identity)
-                line = "the run before still waits; until it has ended, those that are due are left out"
+                line = "its previous run is still waiting: runs are skipped until that one has ended"
                 parts.told("schedule", f"schedule {identity}: {line}")
             return
         require_room(parts.robot.place.folder)

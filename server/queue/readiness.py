@@ -46,11 +46,11 @@ def what_is_missing(now: Circumstances) -> Missing | None:
         (now.arm.activity != "none", Missing(f"the arm is busy: {now.arm.activity}")),
         (
             not now.identity.simulated and not now.consent,
-            Missing("an operator's word that the queue may move this arm: resume the queue with moves_real_arm"),
+            Missing("an operator has to allow the queue to move this arm: pause it, then resume it (moves_real_arm)"),
         ),
         (
             not now.attended,
-            Missing("an operator who is there", "no operator says to be there, and this arm may not run unattended"),
+            Missing("no operator is present", "no operator is present, and this arm may not run unattended"),
         ),
     ]
     return next((missing for applies, missing in found if applies), None)

@@ -15,7 +15,7 @@ def free_room(folder: Path) -> int:
         return shutil.disk_usage(folder).free
     except OSError as error:
         line = f"the folder of traces, {folder}: {error.strerror}"
-        raise ProblemError(503, "traces-away", line, "bring its disk back, then ask again") from error
+        raise ProblemError(503, "traces-away", line, "mount its disk, then try again") from error
 
 
 def require_room(folder: Path) -> None:
@@ -23,4 +23,4 @@ def require_room(folder: Path) -> None:
     free = free_room(folder)
     if free < RESERVE:
         line = f"{free / 1e6:.0f} MB are free for traces, {RESERVE / 1e6:.0f} MB stay free"
-        raise ProblemError(507, "no-room", line, "make room on the disk of the traces")
+        raise ProblemError(507, "no-room", line, "free some space on the disk of the traces")

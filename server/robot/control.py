@@ -65,12 +65,14 @@ class ControlDesk:
         with self._changed:
             now = self._clock.monotonic()
             if self._queue is not None:
-                line = f"experiment {self._queue} of the queue runs"
-                raise conflict("control-held", line, "wait for its end, or cancel it; pause the queue to be next")
+                line = "an experiment of the queue is running"
+                raise conflict(
+                    "control-held", line, "wait until it has ended, or cancel it; pause the queue to be next"
+                )
             if self._lease is not None and self._lease.holds(now):
                 left = self._lease.expires - now
-                line = f"{self._lease.name} has the control, for {left:.0f} s more unless it is renewed"
-                raise conflict("control-held", line, "ask for it again when it is given back")
+                line = f"{self._lease.name} has control of the robot, for {left:.0f} s more unless it is renewed"
+                raise conflict("control-held", line, "try again when it has been released")
             silent, self._lease = self._lease, Lease(secrets.token_urlsafe(24), name, now + LEASE_TIME, moves_real_arm)
             self._endings += silent is not None
             self._changed.notify_all()
@@ -108,9 +110,11 @@ class ControlDesk:
             now = self._clock.monotonic()
             held = self._lease is not None and self._lease.holds(now)
             if self._queue is not None:
-                raise conflict("control-held", f"experiment {self._queue} of the queue runs", "wait for its end")
+                raise conflict("control-held", "an experiment of the queue is running", "wait until it has ended")
             if held and self._lease is not None and not _same(self._lease.secret, secret):
-                raise conflict("control-held", f"{self._lease.name} has the control", "wait until it is given back")
+                raise conflict(
+                    "control-held", f"{self._lease.name} has control of the robot", "wait until it has been released"
+                )
 
     def take_for_queue(self, experiment: str) -> bool:
         """The queue's own control, for one experiment; False while a client has it, or its end is still being told:
@@ -148,12 +152,13 @@ class ControlDesk:
 
     def _require(self, secret: str | None, now: float) -> Lease:
         if secret is None:
-            advice = "take it with POST …/control, and send its lease in the header Control-Lease"
-            raise ProblemError(409, "control-needed", "this moves the robot and needs its control", advice)
+            advice = "take control with POST …/control, and send its lease in the header Control-Lease"
+            raise ProblemError(409, "control-needed", "only who has control of the robot can move it", advice)
         if self._lease is None or not _same(self._lease.secret, secret):
-            raise conflict("control-lost", "this lease is not valid any more", "take the control again")
+            raise conflict("control-lost", "you no longer have control of the robot", "take control again")
         if not self._lease.holds(now):
-            raise conflict("control-lost", "this lease has lapsed: there was no heartbeat", "take the control again")
+            line = f"you lost control of the robot: nothing was heard of this client for {LEASE_TIME:g} s"
+            raise conflict("control-lost", line, "take control again")
         return self._lease
 
     def _told(self, lease: Lease, now: float) -> ControlLease:

@@ -18,7 +18,7 @@ def answer_of(robot: Robot, order: Callable[..., Any], **fields: object) -> Answ
     if activity not in ("none", "jog"):
         raise conflict("arm-busy", f"the arm is busy: {activity}", "wait for its end, or stop it")
     if not robot.room_for_orders.acquire(blocking=False):
-        line = f"as many gains, signals and resets are asked for as may wait: robot {robot.name} does not answer"
+        line = f"too many orders are waiting already: robot {robot.name} does not answer"
         raise ProblemError(429, "too-many", line, "ask less often", (), {"Retry-After": "1"})
     try:
         answer = robot.ask(order, asked=robot.clock.monotonic(), **fields).result(ANSWER_WITHIN)

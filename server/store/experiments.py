@@ -7,19 +7,19 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 
-from sqlalchemy import func, or_, select
+from sqlalchemy import func, or_, select, tuple_
 from sqlalchemy.orm import Session
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
-from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState
+from daq.contracts.service.experiments import Experiment, ExperimentOrder, ExperimentRequest, ExperimentState
 from daq.contracts.trace import Outcome
 from daq.traces.naming import new_trace_id
 from server.problems import conflict, not_found
 from server.queue.order import Waiting
 from server.queue.states import Event, IllegalEventError, advance, after_restart
 from server.store.engine import Store
-from server.store.pages import newest_first
+from server.store.pages import Cursor, newest_first, page_of
 from server.store.remembered import Remembered
 from server.store.submitted import digest_of, made_before, new_columns
 from server.store.tables import ExperimentRow
@@ -88,15 +88,29 @@ class ExperimentStore:
             return as_experiment(_row(session, robot, identity))
 
     def _page(
-        self, robot: str, states: Sequence[ExperimentState], schedule: str | None, cursor: str | None, limit: int
+        self,
+        robot: str,
+        states: Sequence[ExperimentState],
+        schedule: str | None,
+        cursor: str | None,
+        limit: int,
+        order: ExperimentOrder = "submitted",
     ) -> Page[Experiment]:
-        """The newest first."""
+        """Those submitted last first; by `ended` those that have ended, the last one first."""
         query = select(ExperimentRow).where(ExperimentRow.robot == robot)
         if states:
             query = query.where(ExperimentRow.state.in_(states))
         if schedule is not None:
             query = query.where(ExperimentRow.schedule == schedule)
-        return newest_first(self._store, query, ExperimentRow.sequence, cursor, limit, as_experiment)
+        if order == "submitted":
+            return newest_first(self._store, query, ExperimentRow.sequence, cursor, limit, as_experiment)
+        query = query.where(ExperimentRow.ended.is_not(None))
+        if cursor is not None:
+            place = Cursor.parse(cursor)
+            query = query.where(tuple_(ExperimentRow.ended, ExperimentRow.id) < tuple_(place.moment, place.identity))
+        query = query.order_by(ExperimentRow.ended.desc(), ExperimentRow.id.desc()).limit(limit + 1)
+        with self._store.reading() as session:
+            return page_of(list(session.scalars(query)), limit, as_experiment, _place_by_end)
 
     def due(self, robot: str, now: datetime) -> list[Waiting]:
         """The first of those that are queued and due: of 100 000 that wait one is read, and not all."""
@@ -217,6 +231,11 @@ def as_experiment(row: ExperimentRow) -> Experiment:
         reason=row.reason,
         trace=row.trace if has_trace else None,
     )
+
+
+def _place_by_end(row: ExperimentRow) -> Cursor:
+    assert row.ended is not None
+    return Cursor(row.ended.timestamp(), row.id)
 
 
 def _count_waiting(session: Session, robot: str) -> int:

@@ -8,6 +8,7 @@ import binascii
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any, Self, TypeVar
 
 from sqlalchemy import Select
@@ -40,7 +41,12 @@ class Cursor:
                 return cls(number, identity)
         except (ValueError, TypeError, binascii.Error):
             pass
-        raise ProblemError(422, "not-valid", "cursor: is none that a list gave out", "begin without a cursor")
+        raise ProblemError(422, "not-valid", "cursor: not one that a list returned", "begin without a cursor")
+
+    @property
+    def moment(self) -> datetime:
+        """The number of a list by time; the routes take no cursor whose number is none (`CursorOf`)."""
+        return datetime.fromtimestamp(self.number, UTC)
 
 
 def page_of(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 
 from sqlalchemy import delete, select, tuple_, update
 from sqlalchemy.orm import Session
@@ -121,8 +121,7 @@ class TraceStore:
             query = query.where(TraceRow.created < search.until)
         if cursor is not None:
             place = Cursor.parse(cursor)
-            moment = datetime.fromtimestamp(place.number, UTC)
-            query = query.where(tuple_(TraceRow.created, TraceRow.id) < tuple_(moment, place.identity))
+            query = query.where(tuple_(TraceRow.created, TraceRow.id) < tuple_(place.moment, place.identity))
         query = query.order_by(TraceRow.created.desc(), TraceRow.id.desc()).limit(limit + 1)
         with self._store.reading() as session:
             rows = list(session.scalars(query))
@@ -159,8 +158,8 @@ class TraceStore:
             row = _row(session, robot, identity)
             users = list(session.scalars(select(TraceUseRow.used_by).filter_by(trace=identity).limit(5)))
             if users:
-                line = f"trace {identity} is what {', '.join(users)} was made from"
-                raise conflict("trace-in-use", line, "it is kept as long as they are")
+                line = f"trace {identity} is used by {', '.join(users)}"
+                raise conflict("trace-in-use", line, "delete those first")
             session.delete(row)
             session.flush()
             also()

@@ -112,7 +112,7 @@ def _without_the_worker(service: Service, trace: str) -> None:
         assert service.robot.get(f"/jobs/{fit['id']}", params={"wait": 0.1}).json()["state"] in ("queued", "running")
     os.kill(json.loads(progress.read_text())["process"], signal.SIGKILL)
     ended = service.end_of(fit["id"], "jobs")
-    told = "its worker process ended: it was killed, or the memory did not suffice"
+    told = "its worker process ended: it was killed, or ran out of memory"
     assert (ended["state"], ended["reason"]) == ("interrupted", told)
     assert service.end_of(following["id"], "jobs")["state"] == "done"
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from server.jobs.mailbox import Mailbox
 from tests.server.service import Service
 
 LONG_FIT = {"kind": "fit", "method": "nelder_mead", "starts": 20}
@@ -66,6 +67,9 @@ def test_a_model_is_compared_with_a_trace_and_the_trace_is_kept(service: Service
     job = _submitted(service, {"kind": "compare", "traces": [trace], "models": ["machine"]})
     ended = _ended(service, job["id"])
     assert (ended["state"], ended["reason"]) == ("done", "")
+    told = Mailbox(service.folder / "service" / "jobs" / job["id"]).reported()
+    assert told is not None
+    assert (told.fraction < 1, told.text) == (True, "writing the report")  # never "100 %, done" while it ran
     data = service.robot.get(f"/jobs/{job['id']}/result").json()["data"]
     (signals,) = data["signals"]
     assert signals["trace"] == trace

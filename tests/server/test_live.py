@@ -140,7 +140,7 @@ def test_a_robot_that_is_not_there_is_no_stream(service: Service) -> None:
 def test_jogging_through_the_stream_needs_the_control(service: Service) -> None:
     with watching(service, subscribe=["robot"]) as socket:
         socket.send(json.dumps({"jog": {"lease": "no lease", "velocities": {"1": 0.1}}}))
-        assert "lease is not valid" in next(messages(socket, "refused")).detail
+        assert "no longer have control" in next(messages(socket, "refused")).detail
         lease = service.robot.post("/control", json={}).json()["lease"]
         socket.send(json.dumps({"jog": {"lease": lease, "velocities": {"1": 0.1}}}))
         for message in messages(socket, "robot"):

@@ -101,7 +101,7 @@ def test_an_experiment_waits_while_a_client_has_the_control_and_then_for_a_perso
     made = service.robot.post("/experiments", json={"spec": spec}).json()
     while not (waiting_for := service.robot.get("/queue").json()["waiting_for"]):
         pass
-    assert waiting_for == "a client has the control of the robot"
+    assert waiting_for == "somebody has control of the robot"
     service.robot.delete("/control", headers=mine)
     queue = service.robot.get("/queue").json()
     line = "local gave the control back while 1 experiment waited: look at the arm, then resume the queue"

@@ -28,7 +28,7 @@ def test_a_run_that_a_full_disk_refuses_is_not_counted_and_comes_when_there_is_r
     monkeypatch.setattr(shutil, "disk_usage", lambda _path: SimpleNamespace(free=10**6))
     bench.queue.start()
     line = "1 MB are free for traces, 20 MB stay free"
-    bench.until(lambda event: event == f"schedule: schedule {schedule.id}: its run waits: {line}")
+    bench.until(lambda event: event == f"schedule: schedule {schedule.id}: its run has to wait: {line}")
     assert (bench.runs(schedule), bench.counted(schedule)) == ([], 0)
     monkeypatch.setattr(shutil, "disk_usage", usage)
     bench.queue.wake()
@@ -71,7 +71,7 @@ def test_a_schedule_that_cannot_be_read_holds_up_neither_another_nor_the_queue(b
     good = bench.schedule()
     bench.experiments.submit("ma2000", ExperimentRequest(spec=SPEC), bench.clock.utc(), "anna")
     bench.queue.start()
-    bench.until(lambda event: event.startswith(f"schedule: schedule {bad.id}: its run waits"))
+    bench.until(lambda event: event.startswith(f"schedule: schedule {bad.id}: its run has to wait"))
     bench.until(lambda event: event == f"experiment: queued by schedule {good.id}")
     bench.until(lambda event: event == "experiment: failed: refused")
 
@@ -84,7 +84,8 @@ def test_events_and_the_queue_call_an_end_as_the_experiment_does(bench: Bench, e
     bench.until(lambda event: event == f"experiment: {state}: why")
     bench.until(lambda event: event.startswith("queue: paused"))
     assert bench.experiments.get("ma2000", made.id).state == state
-    expected = f"experiment {made.id} ended as {state} (why): look at the arm, then resume"
+    how = state if state == "failed" else f"was {state}"
+    expected = f"{SPEC.name or SPEC.trajectory.kind} {how} (why): look at the arm, then resume the queue"
     assert bench.queue.status().reason == expected
 
 
@@ -222,7 +223,7 @@ def test_what_was_due_while_the_service_was_off_is_left_out(bench: Bench) -> Non
     schedule = bench.schedule()
     bench.clock.turn(3 * 3600 + 60)
     bench.queue = bench.begun_anew()
-    line = "what was due while the service was off is left out"
+    line = "runs that were due while the service was off were skipped"
     assert bench.events == [f"schedule: schedule {schedule.id}: {line}"]
     assert bench.schedules.due("ma2000", bench.clock.utc()) == []
     found = bench.schedules.get("ma2000", schedule.id)
@@ -250,5 +251,5 @@ def test_runs_that_are_left_out_are_told_once(bench: Bench) -> None:
     for _ in range(5):
         runs.submit()
         bench.clock.turn(10)
-    assert len([event for event in bench.events if "left out" in event]) == 1
+    assert len([event for event in bench.events if "skipped" in event]) == 1
     assert bench.counted(schedule) == 5

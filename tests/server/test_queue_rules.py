@@ -160,7 +160,7 @@ MOCK = REAL.model_copy(update={"simulated": True})
         (Circumstances(MOCK, _arm(arm="stopped", cause="x"), "", True, True), "the arm is stopped", True),
         (Circumstances(MOCK, _arm(arm="fault"), "", True, True), "the arm is fault", True),
         (Circumstances(MOCK, _arm(activity="jog"), "", True, True), "the arm is busy: jog", False),
-        (Circumstances(REAL, _arm(), "", True, False), "an operator who is there", True),
+        (Circumstances(REAL, _arm(), "", True, False), "no operator is present", True),
     ],
 )
 def test_what_is_missing_is_said_and_pauses_the_queue_where_a_person_must_look(

@@ -116,6 +116,19 @@ def test_a_clock_that_is_set_back_keeps_the_order_of_submission(store: Store) ->
     assert [one.id for one in listed] == made[::-1]
 
 
+def test_what_ended_last_comes_first_whenever_it_was_submitted(store: Store) -> None:
+    experiments = ExperimentStore(store)
+    made = [experiments.submit("ma2000", ExperimentRequest(), NOW, "anna")[0].id for _ in range(5)]
+    ends = [2, 0, 4, 1]
+    for minutes, place in enumerate(ends):
+        experiments.cancel_waiting("ma2000", made[place], NOW + timedelta(minutes=minutes // 2), "anna")
+    first = experiments.page("ma2000", (), None, None, 3, "ended")
+    rest = experiments.page("ma2000", (), None, first.next, 3, "ended")
+    found = [one.id for one in (*first.items, *rest.items)]
+    assert (set(found[:2]), set(found[2:])) == ({made[4], made[1]}, {made[2], made[0]})
+    assert rest.next is None
+
+
 def test_pages_leave_nothing_out_and_double_nothing_while_rows_come(store: Store) -> None:
     experiments = ExperimentStore(store)
     for _ in range(7):

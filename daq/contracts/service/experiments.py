@@ -17,6 +17,9 @@ stopped by somebody. `interrupted`: the link, a process or the power was lost; i
 ENDS: frozenset[ExperimentState] = frozenset({"done", "failed", "cancelled", "interrupted"})
 """States that nothing leaves; those of jobs too."""
 
+ExperimentOrder = Literal["submitted", "ended"]
+"""Of a list: submitted last first, or, of those that have ended, ended last first."""
+
 Priority = Annotated[int, Field(ge=-100, le=100)]
 """Higher goes first; among equals the one submitted first."""
 Interval = Annotated[float, Field(ge=10, le=366 * 86400)]

@@ -35,7 +35,7 @@ def test_a_service_that_hangs_is_missed_and_found_again(dashboard: Dashboard) ->
         expect(page.get_by_text("No connection to the service.")).to_be_visible()
         expect(page.get_by_role("banner").get_by_text(LIVE)).not_to_be_attached()
         expect(page.get_by_text("stale:")).to_be_visible()
-        expect(page.get_by_text("Without a connection nothing is known of what the arm does.")).to_be_visible()
+        expect(page.get_by_text("Without a connection it is not known what the arm does.")).to_be_visible()
     expect(page.get_by_text("No connection to the service.")).not_to_be_attached()
     expect(page.get_by_role("banner").get_by_text(LIVE).or_(dashboard.degraded)).to_be_visible()
     dashboard.forgive()

@@ -23,9 +23,9 @@ def test_a_diagnosis_is_begun_followed_and_ended(studied: Studied, studied_dashb
     first, second = (row_of(page, trace) for trace in studied.traces)
     first.get_by_role("radio", name="Fit to").check()
     expect(page.get_by_text("Without a trace to judge by")).to_be_visible()
-    second.get_by_role("radio", name="Judge by").check()
+    second.get_by_role("radio", name="Hold out").check()
     page.get_by_role("checkbox", name="2", exact=True).check()
-    page.get_by_label("Effects to add at most").fill("1")
+    page.get_by_label("Most effects to add").fill("1")
     page.get_by_text("Effects to look for").click()
     page.get_by_role("checkbox", name=re.compile("^Coulomb friction")).check()
     begin.click()
@@ -38,8 +38,8 @@ def test_a_diagnosis_is_begun_followed_and_ended(studied: Studied, studied_dashb
     page.get_by_role("button", name="Cancel").click()
     expect(page.get_by_role("heading", level=1, name="No answer")).to_be_visible()
     assert studied.service.robot.get(f"/jobs/{job}").json()["state"] == "cancelled"
-    page.get_by_role("button", name="Take it off the list").click()
-    page.get_by_role("button", name="for good").click()
+    page.get_by_role("button", name="Delete").click()
+    page.get_by_role("button", name="permanently").click()
     expect(page.get_by_role("link", name=re.compile("friction"))).to_have_count(1)
 
 
@@ -103,7 +103,7 @@ def test_axe_finds_no_fault_in_an_answer(studied: Studied, studied_dashboard: Da
     page = studied_dashboard.page
     page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
     studied_dashboard.open(f"diagnosis/{studied.diagnosis}")
-    expect(page.get_by_role("region", name="What to know about this answer")).to_be_attached()
+    expect(page.get_by_role("region", name="Remarks")).to_be_attached()
     for summary in page.get_by_text("As a table").all():
         summary.click()
     assert faults_of(page) == []

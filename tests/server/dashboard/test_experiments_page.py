@@ -22,7 +22,7 @@ SHORT = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.2}, "se
 def form(dashboard: Dashboard) -> Page:
     """The page, once its form can be used."""
     page = dashboard.open("experiments")
-    expect(page.get_by_role("combobox", name="Begin from")).to_be_visible()
+    expect(page.get_by_role("combobox", name="Start from")).to_be_visible()
     return page
 
 
@@ -53,7 +53,7 @@ def _waiting(page: Page) -> Locator:
 def test_a_limit_that_would_be_broken_is_marked_and_nothing_is_sent(dashboard: Dashboard, form: Page) -> None:
     before = len(dashboard.service.robot.get("/experiments").json()["items"])
     _amplitude(form).fill("200")
-    broken = form.get_by_role("list", name="Limits that the motion breaks")
+    broken = form.get_by_role("list", name="Limits that the motion exceeds")
     expect(broken.get_by_text(re.compile(r"joint 2: 24\d\.\d\d° at .* allowed are .* to 224\.6"))).to_be_visible()
     expect(form.get_by_text("this motion would break a limit: see the preview")).to_be_visible()
     form.get_by_role("button", name="Add to the queue").press("Enter")
@@ -83,10 +83,10 @@ def test_a_field_says_what_is_allowed_and_the_button_stays_under_the_pointer(for
 
 
 def test_a_preset_fills_the_form_and_can_be_changed_as_text(dashboard: Dashboard, form: Page) -> None:
-    form.get_by_role("combobox", name="Begin from").select_option("diagnostic-c")
+    form.get_by_role("combobox", name="Start from").select_option("diagnostic-c")
     expect(form.get_by_text("staircases of 0.3°, 1° and 3°")).to_be_visible()
     expect(form.get_by_text("3 pieces, one after the other")).to_be_visible()
-    form.get_by_role("button", name="as text").click()
+    form.get_by_role("button", name="Edit as text").click()
     text = form.get_by_role("textbox", name="Specification")
     expect(text).to_have_value(re.compile('"kind": "sequence"'))
     text.fill('{"trajectory": {"kind": "spiral"}}')
@@ -95,7 +95,7 @@ def test_a_preset_fills_the_form_and_can_be_changed_as_text(dashboard: Dashboard
     dashboard.forgive()  # what is not a specification is a 422, which the browser notes
     text.fill('{"trajectory": {"kind": "cubic", "amplitude": 0.1}, "joints": [2]}')
     expect(form.get_by_text("within all limits")).to_be_visible()
-    form.get_by_role("button", name="as text").click()
+    form.get_by_role("button", name="Edit as text").click()
     expect(form.get_by_role("combobox", name="Motion")).to_have_value("cubic")
     expect(_amplitude(form)).to_have_value("5.72958")
     expect(form.get_by_role("checkbox", name="Joint 1 moves")).not_to_be_checked()
@@ -130,17 +130,17 @@ def test_the_queue_is_paused_put_in_another_order_taken_back_and_resumed(paused:
         _submit(paused, name=name)
     rows = _waiting(form)
     expect(rows).to_have_text([re.compile("first"), re.compile("second"), re.compile("third")])
-    expect(form.get_by_text("Paused:")).to_be_visible()
+    expect(form.get_by_text("Paused", exact=True)).to_be_visible()
     form.get_by_role("button", name="Run third earlier").click()
     expect(rows).to_have_text([re.compile("first"), re.compile("third"), re.compile("second")])
     form.get_by_role("button", name="Run first later").click()
     expect(rows).to_have_text([re.compile("third"), re.compile("first"), re.compile("second")])
-    form.get_by_role("button", name="Take second back").click()
+    form.get_by_role("button", name="Remove second from the queue").click()
     expect(rows).to_have_count(2)
     names = [one["spec"]["name"] for one in paused.service.robot.get("/queue/experiments").json()]
     assert names == ["third", "first"]
     form.get_by_role("button", name="Resume the queue").click()
-    expect(form.get_by_text("Nothing waits")).to_be_visible()
+    expect(form.get_by_text("The queue is empty")).to_be_visible()
     expect(form.get_by_role("link", name="Trace of third").first).to_be_visible()
 
 
@@ -148,7 +148,7 @@ def test_what_runs_shows_its_progress_and_is_stopped_from_the_queue(dashboard: D
     _submit(dashboard, name="long", trajectory={"kind": "pause", "duration": 120})
     expect(form.get_by_role("progressbar", name="Progress of long")).to_be_visible()
     expect(form.get_by_text(re.compile(r"of \d+"))).to_be_visible()
-    form.get_by_role("button", name="Stop it").click()
+    form.get_by_role("button", name="Stop the experiment").click()
     expect(form.get_by_text("The arm is stopped.")).to_be_visible()
     expect(form.get_by_text("cancelled", exact=True).first).to_be_visible()
     assert dashboard.mock is not None
@@ -159,20 +159,20 @@ def test_an_experiment_waits_for_its_time_and_one_is_run_every_so_often(dashboar
     form.get_by_role("radio", name="At a time").check()
     form.get_by_role("button", name="Add to the queue").click()
     expect(_waiting(form).first).to_contain_text(re.compile(r"in (9|10) min"))
-    form.get_by_role("button", name=re.compile("Take .* back")).click()
-    form.get_by_role("radio", name="Every so often").check()
+    form.get_by_role("button", name=re.compile("Remove .* from the queue")).click()
+    form.get_by_role("radio", name="Repeatedly").check()
     form.get_by_role("textbox", name="Every", exact=True).fill("5")
     form.get_by_role("combobox", name="Unit").select_option("s")
     expect(form.get_by_text("allowed: 10 s to 366 d")).to_be_visible()
     form.get_by_role("combobox", name="Unit").select_option("h")
     dashboard.service.robot.post("/queue/pause")
-    form.get_by_role("button", name="Schedule it").click()
+    form.get_by_role("button", name="Add the schedule").click()
     row = form.get_by_role("row", name=re.compile("ramp"))
     expect(row).to_contain_text("5 h")
     expect(row).to_contain_text(re.compile(r"[01] / 10"))
-    row.get_by_role("button", name="Switch off").click()
+    row.get_by_role("button", name="Turn off").click()
     expect(row).to_contain_text("off")
-    row.get_by_role("button", name=re.compile("Take the schedule")).click()
+    row.get_by_role("button", name=re.compile("Delete the schedule")).click()
     expect(row).not_to_be_attached()
     assert dashboard.service.robot.get("/schedules").json()["items"] == []
 
@@ -228,8 +228,8 @@ def test_whoever_uses_the_page_attends_what_runs_on_a_real_arm(paused: Dashboard
 
     page.on("request", note)
     paused.open("experiments")
-    expect(page.get_by_text("Paused:")).to_be_visible()
-    expect(page.get_by_role("button", name="I am here")).to_be_visible()
+    expect(page.get_by_text("Paused", exact=True)).to_be_visible()
+    expect(page.get_by_role("button", name="I am present")).to_be_visible()
     assert [url for url in requested if "attend" in url] == []
     with page.expect_request("**/queue/attend"):
         page.keyboard.press("Tab")
@@ -281,8 +281,8 @@ def test_axe_finds_no_fault_while_limits_are_broken(
     tab = watched(context, *served)
     page = tab.open("experiments")
     _amplitude(page).fill("200")
-    expect(page.get_by_role("list", name="Limits that the motion breaks")).to_be_visible()
-    page.get_by_role("radio", name="Every so often").check()
+    expect(page.get_by_role("list", name="Limits that the motion exceeds")).to_be_visible()
+    page.get_by_role("radio", name="Repeatedly").check()
     found = faults_of(page)
     context.close()
     assert found == []

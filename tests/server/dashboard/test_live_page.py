@@ -41,10 +41,10 @@ def test_an_experiment_is_seen_to_run_and_its_motion_in_the_numbers(dashboard: D
     ramp = {"kind": "ramp", "amplitude": amplitude, "duration": 0.5}
     sent = dashboard.service.robot.post("/experiments", json={"spec": {"trajectory": ramp, "joints": [1]}})
     assert sent.status_code == 201, sent.text
-    expect(page.get_by_text("An experiment runs")).to_be_visible()
+    expect(page.get_by_text("An experiment is running.")).to_be_visible()
     ended = dashboard.service.end_of(sent.json()["id"])
     assert ended["state"] == "done", ended
-    expect(page.get_by_text("Nothing runs, nothing waits.")).to_be_visible()
+    expect(page.get_by_text("Nothing is running or waiting.")).to_be_visible()
     assert abs(_number(_cell(page, 1, 0)) - before) > 2
 
 
@@ -79,19 +79,19 @@ def test_a_joint_can_be_hidden_and_the_choice_is_kept(dashboard: Dashboard) -> N
 
 def test_a_joint_moves_while_its_key_is_held_and_holds_when_it_is_let_go(dashboard: Dashboard) -> None:
     page = dashboard.until_live()
-    page.get_by_role("button", name="Take the control").click()
+    page.get_by_role("button", name="Take control").click()
     before = dashboard.mock.ask("state")["set_points"][0]
     button = page.get_by_role("button", name="Joint 1 backward while held")
     button.hover()
     page.mouse.down()
-    expect(page.get_by_text("Jogged by hand")).to_be_visible()
+    expect(page.get_by_text("The arm is being jogged.")).to_be_visible()
     while abs(dashboard.mock.ask("state")["set_points"][0] - before) < 5:
         page.wait_for_timeout(20)  # lets the page repeat its command; the test's own time limit ends the wait
     page.mouse.up()
     page.get_by_role("button", name="Keep this posture").click()
     expect(page.get_by_text("Move to J1")).to_be_visible()
-    page.get_by_role("button", name="Give it back").click()
-    expect(page.get_by_role("button", name="Take the control")).to_be_visible()
+    page.get_by_role("button", name="Release control").click()
+    expect(page.get_by_role("button", name="Take control")).to_be_visible()
     assert dashboard.service.robot.get("/control").json()["holder"] == "nobody"
 
 
@@ -120,24 +120,24 @@ def test_a_joint_is_not_driven_on_when_the_connection_was_lost_while_its_key_was
     page = dashboard.page
     page.route_web_socket(re.compile("/live"), join)
     dashboard.until_live()
-    page.get_by_role("button", name="Take the control").click()
+    page.get_by_role("button", name="Take control").click()
     page.get_by_role("group", name="Jog:").focus()
     page.keyboard.down("ArrowLeft")
-    expect(page.get_by_text("Jogged by hand")).to_be_visible()
+    expect(page.get_by_text("The arm is being jogged.")).to_be_visible()
     before = len(connections)
     connections[-1].close()
     while len(connections) == before or len(heard) < 50:
         page.wait_for_timeout(20)  # lets the page connect again; the test's own time limit ends the wait
     assert [text for text in sent if "jog" in text] == []
     page.keyboard.up("ArrowLeft")
-    page.get_by_role("button", name="Give it back").click()
-    expect(page.get_by_role("button", name="Take the control")).to_be_visible()
+    page.get_by_role("button", name="Release control").click()
+    expect(page.get_by_role("button", name="Take control")).to_be_visible()
     dashboard.forgive()
 
 
 def test_the_gripper_closes_for_whoever_has_the_control(dashboard: Dashboard) -> None:
     page = dashboard.until_live()
-    page.get_by_role("button", name="Take the control").click()
+    page.get_by_role("button", name="Take control").click()
     page.get_by_role("button", name="Close", exact=True).click()
     expect(page.get_by_text("Gripper: closed")).to_be_visible()
     assert dashboard.service.robot.get("/process").json()["gripper"] == "closed"
@@ -147,7 +147,7 @@ def test_the_gripper_closes_for_whoever_has_the_control(dashboard: Dashboard) ->
     page.get_by_role("button", name="Open", exact=True).click()
     page.get_by_role("button", name="Output 3").click()
     expect(page.get_by_role("button", name="Output 3")).to_have_attribute("aria-pressed", "false")
-    page.get_by_role("button", name="Give it back").click()
+    page.get_by_role("button", name="Release control").click()
 
 
 def test_where_there_is_no_3d_the_arm_is_told_in_words(dashboard: Dashboard) -> None:

@@ -48,7 +48,7 @@ def test_parameters_have_their_intervals_and_say_what_is_not_known(
     expect(panel).to_contain_text(f"{verdicts.count('known')} of {len(verdicts)} known")
     expect(panel.get_by_text("not identifiable")).to_have_count(verdicts.count("unknown"))
     expect(panel.get_by_text("only with others")).to_have_count(verdicts.count("combination"))
-    panel.get_by_role("checkbox", name="also what was not asked for").check()
+    panel.get_by_role("checkbox", name="show all parameters").check()
     expect(panel.get_by_role("rowheader", name="link 1")).to_be_visible()
 
 
@@ -70,7 +70,7 @@ def test_a_comparison_is_begun_here_and_its_result_shown(studied: Studied, studi
     page = studied_dashboard.open(f"models/{studied.model}")
     page.get_by_role("button", name="Compare…").click()
     row_of(page, studied.traces[1]).get_by_role("radio", name="Use").check()
-    page.get_by_role("button", name="Begin").click()
+    page.get_by_role("button", name="Start", exact=True).click()
     expect(page.get_by_role("region", name=re.compile("^Agreement"))).to_be_visible()
     expect(page.get_by_role("img", name=re.compile("^Position of joint 1"))).to_be_visible()
     expect(page.get_by_role("tree")).to_contain_text("Comparison")
@@ -82,10 +82,10 @@ def test_what_the_service_refuses_is_said_beside_the_form(studied: Studied, stud
     page = studied_dashboard.open("models/machine")
     page.get_by_role("button", name="Fit…").click()
     row_of(page, studied.traces[0]).get_by_role("radio", name="Fit to").check()
-    page.get_by_label("Name of the model that is made").fill("/no/such name/")
-    page.get_by_role("button", name="Begin").click()
+    page.get_by_label("Name of the new model").fill("/no/such name/")
+    page.get_by_role("button", name="Start", exact=True).click()
     expect(page.get_by_role("alert").filter(has_text="name")).to_be_visible()
-    expect(page.get_by_role("button", name="Begin")).to_be_enabled()
+    expect(page.get_by_role("button", name="Start", exact=True)).to_be_enabled()
     studied_dashboard.forgive()
 
 
@@ -96,7 +96,7 @@ def test_axe_finds_no_fault_in_a_model(studied: Studied, studied_dashboard: Dash
     studied_dashboard.open(f"models/{studied.model}")
     expect(page.get_by_role("region", name=re.compile("^Validation"))).to_be_visible()
     page.get_by_role("button", name="Fit…").click()
-    expect(page.get_by_role("button", name="Begin")).to_be_visible()
+    expect(page.get_by_role("button", name="Start", exact=True)).to_be_visible()
     assert faults_of(page) == []
 
 

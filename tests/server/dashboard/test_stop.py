@@ -59,13 +59,13 @@ def test_a_pressed_stop_freezes_the_board_before_it_is_let_go(dashboard: Dashboa
 
 def test_the_key_stops_also_while_somebody_types(dashboard: Dashboard) -> None:
     page = dashboard.until_live()
-    page.get_by_role("button", name="Take the control").click()
+    page.get_by_role("button", name="Take control").click()
     page.get_by_label("Wait").focus()
     page.keyboard.press("F8")
     expect(page.locator(CONFIRMED)).to_be_visible()
     assert dashboard.mock.ask("state")["frozen"]
-    page.get_by_role("button", name="Give it back").click()
-    expect(page.get_by_role("button", name="Take the control")).to_be_visible()
+    page.get_by_role("button", name="Release control").click()
+    expect(page.get_by_role("button", name="Take control")).to_be_visible()
 
 
 def test_stop_is_on_every_page_also_on_a_tablet(dashboard: Dashboard) -> None:

@@ -147,7 +147,7 @@ def test_a_simulation_is_laid_over_in_place(dashboard: Dashboard, traces: tuple[
     told = page.get_by_text(re.compile("simulated with the machine file, rms"))
     expect(told).to_be_visible()
     expect(told).to_contain_text(re.compile(r"J1 \d+\.\d\d°, J2 \d+\.\d\d°, J3 \d+\.\d\d°"))
-    page.get_by_role("button", name="Without simulation").click()
+    page.get_by_role("button", name="Remove simulation").click()
     expect(told).not_to_be_attached()
     assert dashboard.service.robot.get("/jobs").json()["items"] == []
 
@@ -159,8 +159,8 @@ def test_tags_and_notes_are_kept_and_searched(dashboard: Dashboard, traces: tupl
     expect(page.get_by_text("“bad/tag”: letters, digits")).to_be_visible()
     tags.fill("good, wear-study")
     page.get_by_role("textbox", name="Notes").fill("the belt was new")
-    page.get_by_role("button", name="Keep tags and notes").click()
-    expect(page.get_by_role("button", name="Kept")).to_be_visible()
+    page.get_by_role("button", name="Save tags and notes").click()
+    expect(page.get_by_role("button", name="Saved")).to_be_visible()
     entry = dashboard.service.robot.get(f"/traces/{traces[0]}").json()["entry"]
     assert (entry["tags"], entry["notes"]) == (["good", "wear-study"], "the belt was new")
     page.get_by_role("button", name="wear-study").click()
@@ -181,7 +181,7 @@ def test_a_trace_is_downloaded_in_both_forms_and_deleted(dashboard: Dashboard, t
         page.get_by_role("button", name="CSV").click()
     assert Path(table.value.path()).read_text("utf-8").startswith("time,")
     page.get_by_role("button", name="Delete…").click()
-    page.get_by_role("button", name="Delete for good").click()
+    page.get_by_role("button", name="Delete permanently").click()
     expect(page.get_by_text("Choose a trace")).to_be_visible()
     assert dashboard.service.robot.get(f"/traces/{number}").status_code == 404
 
@@ -192,7 +192,7 @@ def test_a_table_from_elsewhere_is_taken_in_and_shown(dashboard: Dashboard, tmp_
     table.write_text("time,set_point_1,position_1\n" + "\n".join(rows), "utf-8")
     page = dashboard.open("traces")
     with page.expect_file_chooser() as chooser:
-        page.get_by_role("button", name="Take in a file").click()
+        page.get_by_role("button", name="Import a file").click()
     chooser.value.set_files(table)
     expect(_chart(page)).to_have_accessible_name(re.compile(r"of joint 1, 0\.00 to 1\.98 s"))
     expect(page.get_by_role("definition").filter(has_text="imported").first).to_be_visible()

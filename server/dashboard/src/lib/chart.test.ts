@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { apart, padded } from './chart';
+import { apart, padded, withRoom } from './chart';
 
 describe('the range of a chart', () => {
   it('leaves room, and does not draw noise as motion', () => {
@@ -10,6 +10,15 @@ describe('the range of a chart', () => {
 
   it('is something also without data', () => {
     expect(padded(Infinity, -Infinity)).toEqual([-1, 1]);
+  });
+});
+
+describe('places at an axis', () => {
+  it('are fewer where the chart is narrow, and always the last one', () => {
+    const places = [-30, -25, -20, -15, -10, -5, 0];
+    expect(withRoom(places, 800)).toEqual(places);
+    expect(withRoom(places, 300)).toEqual([-30, -20, -10, 0]);
+    expect(withRoom(places, 160).at(-1)).toBe(0);
   });
 });
 
@@ -28,8 +37,14 @@ describe('names at the ends of lines', () => {
   });
 
   it('do not change places for noise', () => {
-    expect(apart([50, 51], 12, 0, 100)).toEqual([50, 62]);
-    expect(apart([51, 50], 12, 0, 100)).toEqual([51, 63]);
+    expect(apart([50, 51], 12, 0, 100)).toEqual([44.5, 56.5]);
+    expect(apart([51, 50], 12, 0, 100)).toEqual([44.5, 56.5]);
+  });
+
+  it('stand about the middle of their lines, none further away than its stack is high', () => {
+    const places = apart([50, 50, 50, 50, 50, 90], 12, 0, 100);
+    expect(places).toEqual([26, 38, 50, 62, 74, 90]);
+    expect(apart([50, 60, 70], 12, 0, 100)).toEqual([48, 60, 72]);
   });
 
   it('stay within the chart', () => {

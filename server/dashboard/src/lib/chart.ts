@@ -65,6 +65,8 @@ export interface ChartDrawing {
 }
 
 const AXIS_FONT_SIZE = 12;
+/** px from the end of a line to its name: room for what joins them where the name had to move away. */
+const LEADER = 12;
 
 /** Room below and above what the data needs, so that no line runs along the edge. */
 export function padded(low: number, high: number, least = 0): [number, number] {
@@ -98,7 +100,7 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
   return {
     width,
     height,
-    padding: [8, drawing.series.some((one) => one.end) ? 30 : 10, 0, 0],
+    padding: [8, drawing.series.some((one) => one.end) ? LEADER + 26 : 10, 0, 0],
     legend: { show: false },
     cursor: {
       drag: { x: drawing.zoomable, y: false, setScale: false },
@@ -119,7 +121,9 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
         size: 26,
         gap: 4,
         ...written(axes.x),
-        ...(places === undefined ? {} : { splits: (_, __, low, high) => places(low, high) }),
+        ...(places === undefined
+          ? {}
+          : { splits: (plot, __, low, high) => withRoom(places(low, high), plot.width) }),
       },
       { ...axis, size: 56, gap: 6, ...written(axes.y) },
     ],
@@ -144,6 +148,15 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
       ],
     },
   };
+}
+
+/** px that a time at the axis needs: -30 s, and some room. */
+const LABEL_WIDTH = 52;
+
+/** Every second, every third … of `places`, the last one among them, where all would cover each other in `width` px. */
+export function withRoom(places: readonly number[], width: number): number[] {
+  const every = Math.max(1, Math.ceil((places.length * LABEL_WIDTH) / Math.max(1, width - 2 * LABEL_WIDTH)));
+  return places.filter((_, index) => (places.length - 1 - index) % every === 0);
 }
 
 function select(plot: uPlot, drawing: ChartDrawing): void {
@@ -200,7 +213,7 @@ function drawMarkers(plot: uPlot, drawing: ChartDrawing): void {
   ctx.restore();
 }
 
-/** Names at the right end of lines, moved apart where they would cover each other. */
+/** Names at the right end of lines: moved apart where they would cover each other, and joined to their lines then. */
 function drawEnds(plot: uPlot, drawing: ChartDrawing): void {
   const { ctx, bbox } = plot;
   const ratio = devicePixelRatio;
@@ -220,31 +233,46 @@ function drawEnds(plot: uPlot, drawing: ChartDrawing): void {
   ctx.font = `600 ${11 * ratio}px ${drawing.colours.font}`;
   ctx.textBaseline = 'middle';
   ctx.textAlign = 'left';
+  const right = bbox.left + bbox.width;
+  ctx.lineWidth = ratio;
   ends.forEach((end, index) => {
-    ctx.fillStyle = end.colour;
-    ctx.fillText(end.text, bbox.left + bbox.width + 6 * ratio, places[index] ?? end.y);
+    const y = places[index] ?? end.y;
+    ctx.fillStyle = ctx.strokeStyle = end.colour;
+    ctx.beginPath();
+    ctx.moveTo(right + ratio, end.y);
+    ctx.lineTo(right + (LEADER - 2) * ratio, y);
+    ctx.stroke();
+    ctx.fillText(end.text, right + LEADER * ratio, y);
   });
   ctx.restore();
 }
 
 /**
- * Places near `wanted`, at least `distance` apart and within [low, high] if there is room. In the order of height; those
- * that are nearly as high stay in the order given, so that noise does not make them change places.
+ * Places near `wanted`, at least `distance` apart and within [low, high] if there is room: those that would cover each
+ * other stand about the middle of their lines, so that none is further from its own than it has to be. In the order of
+ * height; those that are nearly as high stay in the order given, so that noise does not make them change places.
  */
 export function apart(wanted: readonly number[], distance: number, low: number, high: number): number[] {
   const step = (index: number): number => Math.round((wanted[index] ?? 0) / distance);
   const order = wanted.map((_, index) => index).sort((one, other) => step(one) - step(other) || one - other);
-  const places = [...wanted];
-  let free = low;
+  const stacks: { members: number[]; top: number }[] = [];
+  const stacked = (members: number[]): { members: number[]; top: number } => {
+    const height = (members.length - 1) * distance;
+    const middle = members.reduce((sum, index) => sum + (wanted[index] ?? 0), 0) / members.length;
+    return { members, top: Math.max(low, Math.min(high - height, middle - height / 2)) };
+  };
   for (const index of order) {
-    places[index] = Math.max(places[index] ?? 0, free);
-    free = (places[index] ?? 0) + distance;
+    let last = stacked([index]);
+    for (let before = stacks.at(-1); before !== undefined; before = stacks.at(-1)) {
+      if (before.top + before.members.length * distance <= last.top) break;
+      stacks.pop();
+      last = stacked([...before.members, ...last.members]);
+    }
+    stacks.push(last);
   }
-  let limit = high;
-  for (const index of order.reverse()) {
-    places[index] = Math.min(places[index] ?? 0, limit);
-    limit = (places[index] ?? 0) - distance;
-  }
+  const places = [...wanted];
+  for (const { members, top } of stacks)
+    members.forEach((index, place) => (places[index] = top + place * distance));
   return places;
 }
 

@@ -492,7 +492,7 @@ export interface paths {
         };
         /**
          * List Experiments
-         * @description Experiments, the newest first.
+         * @description Experiments, those submitted last first, or those that ended last.
          */
         get: operations["list_experiments"];
         put?: never;
@@ -1591,7 +1591,7 @@ export interface components {
         };
         /**
          * Cubic
-         * @description Cubic in time through `amplitude` in `duration`, at rest at both ends (section 3.7).
+         * @description Cubic in time through `amplitude` in `duration`, at rest at both ends.
          */
         Cubic: {
             /**
@@ -3717,7 +3717,7 @@ export interface components {
         };
         /**
          * Ramp
-         * @description Equal small increments through `amplitude` in `duration`, all joints arriving together (section 6.5).
+         * @description Constant speed through `amplitude` in `duration`; all joints arrive together.
          */
         Ramp: {
             /**
@@ -4254,7 +4254,7 @@ export interface components {
         };
         /**
          * Sine
-         * @description `cycles` of a sine about the start posture; joint k of the list lags by k · `phase` rad.
+         * @description `cycles` of a sine about the start posture. Each joint lags `phase` rad behind the one before it.
          */
         Sine: {
             /**
@@ -4287,7 +4287,7 @@ export interface components {
         };
         /**
          * SlowRamp
-         * @description Constant speed out to `amplitude` and back, `reversals` changes of direction: friction shows at low speed.
+         * @description Constant low speed out to `amplitude` and back, with `reversals` changes of direction. Shows friction.
          */
         SlowRamp: {
             /**
@@ -4348,7 +4348,7 @@ export interface components {
         };
         /**
          * Step
-         * @description The whole amplitude in one set point.
+         * @description The whole `amplitude` at once, in one set point.
          */
         Step: {
             /**
@@ -5618,6 +5618,8 @@ export interface operations {
                 /** @description Only those in one of these states. */
                 state?: ("queued" | "running" | "done" | "failed" | "cancelled" | "interrupted")[] | null;
                 schedule?: string | null;
+                /** @description By `ended`: only those that have ended. */
+                order?: "submitted" | "ended";
                 /** @description Length of this part of the list. */
                 limit?: number;
                 /** @description `next` of the part before. */

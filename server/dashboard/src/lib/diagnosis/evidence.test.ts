@@ -39,10 +39,10 @@ describe('candidates', () => {
       ['base tilt', 0, false],
     ]);
     expect(bars.map((one) => one.reason)).toEqual([
-      'leads by 20 over the next other answer',
+      'leads the next candidate by 20',
       'explains 20 less than the best',
       'explains less than its parameters cost',
-      'promised by a probe alone, not fitted',
+      'estimated by a quick probe, not fitted',
     ]);
   });
 
@@ -72,7 +72,7 @@ describe('an answer without a step', () => {
   it('shows how far its best candidates stay below what is needed', () => {
     const turn = turnWithoutStep(answer({ candidates: [tried('backlash', 2, 4), tried('stiction', 1, -2)] }));
     expect(turn === null ? [] : evidenceBars(turn, 9).map((one) => [one.width, one.reason])).toEqual([
-      [0.4, '10 are needed'],
+      [0.4, 'below the 10 that are needed'],
       [0, 'explains less than its parameters cost'],
     ]);
   });
@@ -111,7 +111,7 @@ describe('words', () => {
       'Either Stribeck friction, joint 2 or Coulomb friction, joint 2',
     );
     expect(verdictTitle({ verdict: 'unknown-effect', steps: [step([])] })).toBe(
-      'Coulomb friction, joint 2, and something that is not known',
+      'Coulomb friction, joint 2, and an unknown effect',
     );
     expect(verdictTitle({ verdict: 'nothing-significant', steps: [] })).toBe(
       'Nothing significant is missing',

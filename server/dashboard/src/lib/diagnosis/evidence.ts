@@ -61,12 +61,14 @@ export function evidenceBars(turn: Turn, most: number): EvidenceBar[] {
 
 /** Why a candidate stands where it stands, in one line. */
 function reasonOf(one: TriedEffect, turn: Turn, chosen: boolean): string {
-  if (chosen && turn.group.length > 1) return 'these traces cannot tell it from the others of its group';
-  if (chosen) return `leads by ${Math.round(turn.margin)} over the next other answer`;
-  if (!one.refitted) return 'promised by a probe alone, not fitted';
+  if (chosen && turn.group.length > 1)
+    return 'not distinguishable from the others of its group by these traces';
+  if (chosen) return `leads the next candidate by ${Math.round(turn.margin)}`;
+  if (!one.refitted) return 'estimated by a quick probe, not fitted';
   if (one.evidence <= 0) return 'explains less than its parameters cost';
-  if (turn.needed !== null && one.evidence < turn.needed) return `${Math.round(turn.needed)} are needed`;
-  if (turn.effect === null) return 'not taken';
+  if (turn.needed !== null && one.evidence < turn.needed)
+    return `below the ${Math.round(turn.needed)} that are needed`;
+  if (turn.effect === null) return 'rejected';
   return `explains ${Math.round(turn.evidence - one.evidence)} less than the best`;
 }
 

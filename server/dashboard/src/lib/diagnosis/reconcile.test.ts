@@ -16,8 +16,8 @@ const found = (
 describe('a residual that goes with something although nothing is missing', () => {
   it('is told why it does not count, with what came nearest', () => {
     expect(whyNotCounted(found('nothing-significant'), { joint: null })).toBe(
-      'σ tells how surely the mean goes with it, not how large it is: no joint is off by more than noise. ' +
-        'It is no finding: an effect is named from evidence 30 on; the best, Coulomb friction, joint 2, has evidence 4.',
+      'σ says how certain the dependence is, not how large: no joint is off by more than noise. ' +
+        'This is not a finding: an effect is named from evidence 30 on; the best, Coulomb friction, joint 2, has evidence 4.',
     );
   });
 
@@ -29,7 +29,7 @@ describe('a residual that goes with something although nothing is missing', () =
 
   it('names no number that an older answer does not tell', () => {
     const said = whyNotCounted(found('nothing-significant', null), { joint: 2 });
-    expect(said).toBe('It is no finding: the best, Coulomb friction, joint 2, has evidence 4.');
+    expect(said).toBe('This is not a finding: the best, Coulomb friction, joint 2, has evidence 4.');
   });
 
   it('needs no word where something is named', () => {

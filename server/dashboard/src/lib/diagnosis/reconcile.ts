@@ -12,7 +12,7 @@ export function whyNotCounted(
   if (found.verdict !== 'nothing-significant') return '';
   const size =
     where.joint === null
-      ? 'σ tells how surely the mean goes with it, not how large it is: no joint is off by more than noise. '
+      ? 'σ says how certain the dependence is, not how large: no joint is off by more than noise. '
       : '';
   const [best] = found.steps
     .flatMap((step) => step.candidates)
@@ -22,7 +22,7 @@ export function whyNotCounted(
   const needed =
     found.significant === null ? '' : `an effect is named from evidence ${fixed(found.significant, 0)} on`;
   const said = [needed, nearest].filter((part) => part !== '').join('; ');
-  return `${size}It is no finding${said === '' ? '' : `: ${said}`}.`;
+  return `${size}This is not a finding${said === '' ? '' : `: ${said}`}.`;
 }
 
 /** What a cell of the map is, beside a sentence about whole phases; empty without a cell. */
@@ -33,9 +33,9 @@ export function cellMeaning(cells: readonly PhaseCell[], trace: number, chance: 
   const quiet = own.filter((cell) => cell.significance <= chance);
   const most = Math.max(0, ...quiet.map((cell) => Math.sqrt(cell.mean_square)));
   const reached =
-    quiet.length === 0 ? '' : `, which chance alone takes up to ${fixed(most, 1)} times the noise here`;
+    quiet.length === 0 ? '' : `; by chance alone it reaches up to ${fixed(most, 1)} times the noise here`;
   return (
-    `The sentence above is of all windows of a joint's phase together; a cell is one window of ${fixed(length, 1)} s, ` +
-    `or the few that share its place${reached}. Beyond chance: ${own.length - quiet.length} of ${own.length} windows.`
+    `The sentence above is about all windows of a joint and phase together. A cell is one window of ${fixed(length, 1)} s, ` +
+    `or a few neighbouring ones${reached}. Beyond chance: ${own.length - quiet.length} of ${own.length} windows.`
   );
 }

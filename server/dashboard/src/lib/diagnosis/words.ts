@@ -17,18 +17,18 @@ export const PHASE_NAMES: Record<Phase, string> = {
 };
 
 export const PHASE_MEANINGS: Record<Phase, string> = {
-  ramp_start: 'the first 0.3 s after a rest',
-  steady_ramp: 'moving steadily',
+  ramp_start: 'the first 0.3 s of a motion',
+  steady_ramp: 'at steady speed',
   reversal: '0.5 s after a change of direction',
   creep: 'below 6 °/s',
-  hold: 'standing',
+  hold: 'at rest',
 };
 
 export const VERDICTS: Record<Verdict, { title: string; tone: 'good' | 'warn' | 'bad' | 'quiet' }> = {
   'nothing-significant': { title: 'Nothing significant is missing', tone: 'good' },
   named: { title: 'Named', tone: 'good' },
-  ambiguous: { title: 'One of several, undecided', tone: 'warn' },
-  'unknown-effect': { title: 'Something that is not known', tone: 'bad' },
+  ambiguous: { title: 'One of several candidates', tone: 'warn' },
+  'unknown-effect': { title: 'An unknown effect', tone: 'bad' },
 };
 
 /** Names that keep their capital letters. */
@@ -87,7 +87,7 @@ export function verdictTitle(found: Pick<DiagnosisData, 'verdict' | 'steps'>): s
   const group = found.verdict === 'ambiguous' ? (found.steps.at(-1)?.group ?? []) : [];
   if (group.length > 0 && group.length <= 3) return `Either ${listed(group.map(candidateName), 'or')}`;
   if (found.verdict === 'unknown-effect' && names.length > 0) {
-    return `${capital(listed(names))}, and something that is not known`;
+    return `${capital(listed(names))}, and an unknown effect`;
   }
   return VERDICTS[found.verdict].title;
 }

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { ageText, ServiceClock } from './age';
+import { ageText, lastHeard, ServiceClock } from './age';
 
 describe('the age of a value', () => {
   it('is told by the service and grows by this clock', () => {
@@ -32,6 +32,12 @@ describe('the age of a value', () => {
     clock.heard(1000, 1e9, 5);
     expect(clock.wentBack(999.5, 1)).toBe(false);
     expect(clock.wentBack(12, 1)).toBe(true);
+  });
+
+  it('is the newest sample’s also where the service was heard of later', () => {
+    expect(lastHeard(4.7, 47)).toBe('the newest sample is 47 s old');
+    expect(lastHeard(4.7, null)).toBe('the service was last heard 4.7 s ago');
+    expect(lastHeard(null, null)).toBe('');
   });
 
   it.each([

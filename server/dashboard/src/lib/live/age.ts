@@ -45,6 +45,12 @@ export class ServiceClock {
   }
 }
 
+/** How old what is shown is, as the end of a sentence; empty before anything was heard. Ages in s. */
+export function lastHeard(silence: number | null, sampleAge: number | null): string {
+  if (sampleAge !== null) return `the newest sample is ${ageText(sampleAge)} old`;
+  return silence === null ? '' : `the service was last heard ${ageText(silence)} ago`;
+}
+
 /** An age as a person reads it: 20 ms, 3.4 s, 12 min. */
 export function ageText(age: number | null): string {
   if (age === null) return 'never';

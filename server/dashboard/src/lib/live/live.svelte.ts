@@ -27,7 +27,7 @@ import { armNow } from '../stop/standing';
 import { stop } from '../stop/stop.svelte';
 import { ServiceClock, STALE_AFTER } from './age';
 import { asked, askSystem, newTicket } from './asked';
-import { ReceivedRate } from './rate';
+import { SampleRate } from './rate';
 import { Recording } from './recording';
 
 const SHOWN_EVERY = 100;
@@ -87,7 +87,7 @@ class Live {
   now = $state(seconds());
   /** Largest lateness of samples in the last second, s. */
   jitter = $state<number | null>(null);
-  /** Samples a second that arrive, Hz; null while none do. */
+  /** Samples a second, Hz; null while none arrive. */
   rate = $state<number | null>(null);
   /** Whether the service has lately left out samples for this page, which did not take them in time. */
   isThinned = $state(false);
@@ -106,7 +106,7 @@ class Live {
   newest: SampleMessage | null = null;
   private listeners = new Set<(message: LiveMessage) => void>();
   private lateness: number[] = [];
-  private readonly received = new ReceivedRate();
+  private readonly received = new SampleRate();
   /** What was said before it was known what the robot is, and when. */
   private unheard: [LiveFrame, number][] = [];
   private connection: LiveSocket | null = null;
@@ -287,7 +287,7 @@ class Live {
     this.newest = sample;
     this.recording?.addSample(sample);
     this.lateness.push(sample.lateness);
-    this.received.heard(seconds());
+    this.received.heard(sample.host_time);
     if (isFirst) this.tick();
   }
 
@@ -300,7 +300,8 @@ class Live {
   private tick(): void {
     this.now = seconds();
     this.silence = this.clock.silence(this.now);
-    this.rate = this.received.rate(this.now);
+    const there = this.clock.at(this.now);
+    this.rate = there === null ? null : this.received.rate(there);
     this.isThinned = this.received.isThinned(this.now);
     this.tellStop();
     if (this.newest !== this.sample) this.sample = this.newest;

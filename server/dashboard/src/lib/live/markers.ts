@@ -7,8 +7,6 @@ type Kind = RecordEventMessage['kind'];
 
 const FLAGS: Partial<Record<Kind, { label: string; tone: ChartMarker['tone'] }>> = {
   start: { label: 'start', tone: 'plain' },
-  ramp_start: { label: 'ramp', tone: 'plain' },
-  ramp_end: { label: 'ramp ends', tone: 'plain' },
   reversal: { label: 'reversal', tone: 'plain' },
   gains: { label: 'gains', tone: 'plain' },
   limit: { label: '▲ limit', tone: 'warn' },
@@ -21,14 +19,59 @@ const FLAGS: Partial<Record<Kind, { label: string; tone: ChartMarker['tone'] }>>
   end: { label: 'end', tone: 'plain' },
 };
 
-/** Marks of these events within [from, to]; what comes often (retries, missing samples) is a tick without a name. */
+type RecordEvent = Pick<RecordEventMessage, 'kind' | 'message'>;
+
+/** What a mark is called. The ends of a motion say themselves which motion it is: `ramp starts`, `sine ends`. */
+export function markLabel(event: RecordEvent): string {
+  if (event.kind === 'ramp_start' || event.kind === 'ramp_end') return event.message || 'motion';
+  return FLAGS[event.kind]?.label ?? '';
+}
+
+/** The mark of an event at `x`; what comes often (retries, missing samples) is a tick without a name. */
+export function markOf(event: RecordEvent, x: number): ChartMarker {
+  const label = markLabel(event);
+  if (label === '') return { x, label, tone: 'tick' };
+  return { x, label, tone: FLAGS[event.kind]?.tone ?? 'plain' };
+}
+
+/** Marks of these events within [from, to]. */
 export function marksOf(events: readonly RecordEventMessage[], from: number, to: number): ChartMarker[] {
-  const marks: ChartMarker[] = [];
+  return events
+    .filter((event) => event.host_time >= from && event.host_time <= to && event.kind !== 'note')
+    .map((event) => markOf(event, event.host_time));
+}
+
+export interface Explanation {
+  label: string;
+  count: number;
+  /** What the events said: the newest of them. */
+  text: string;
+}
+
+const UNUSUAL: readonly Kind[] = [
+  'limit',
+  'pause',
+  'restart',
+  'link_lost',
+  'stop',
+  'fault',
+  'missing',
+  'retry',
+];
+const TICKS: Partial<Record<Kind, string>> = { missing: 'missing samples', retry: 'repeated requests' };
+
+/** What the marks of unusual events within [from, to] mean, by name in the order in which they first came. */
+export function explanationsOf(
+  events: readonly RecordEventMessage[],
+  from: number,
+  to: number,
+): Explanation[] {
+  const found = new Map<Kind, Explanation>();
   for (const event of events) {
-    if (event.host_time < from || event.host_time > to || event.kind === 'note') continue;
-    const flag = FLAGS[event.kind];
-    if (flag === undefined) marks.push({ x: event.host_time, label: '', tone: 'tick' });
-    else marks.push({ x: event.host_time, label: flag.label, tone: flag.tone ?? 'plain' });
+    if (event.host_time < from || event.host_time > to || !UNUSUAL.includes(event.kind)) continue;
+    const label = TICKS[event.kind] ?? markLabel(event);
+    const count = (found.get(event.kind)?.count ?? 0) + 1;
+    found.set(event.kind, { label, count, text: event.message });
   }
-  return marks;
+  return [...found.values()];
 }

@@ -60,7 +60,7 @@ export function ofDiagnosis(found: Pick<DiagnosisData, 'steps'>): Map<string, Fo
         low: one.low,
         high: one.high,
         known: bounded ? 'known' : 'unknown',
-        reason: bounded ? 'added by the diagnosis' : 'these traces do not bound it',
+        reason: bounded ? 'added by the diagnosis' : 'these traces do not determine it',
         expected: null,
         deviation: null,
       });
@@ -109,7 +109,7 @@ export function parameterRows(
       low: own?.low ?? null,
       high: own?.high ?? null,
       known: own?.known ?? 'given',
-      reason: own?.reason ?? 'was not asked for',
+      reason: own?.reason ?? 'was not fitted',
       expected: own?.expected ?? null,
       deviation: own?.deviation ?? one.deviation,
     };

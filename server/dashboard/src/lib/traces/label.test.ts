@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { dayAndSecond } from '../format';
-import { traceLabel } from './label';
+import { isWhole, outcomeText, traceLabel } from './label';
 
 const created = '2026-11-21T10:22:05+00:00';
 
@@ -10,6 +10,14 @@ describe('a trace to be chosen', () => {
     expect(traceLabel({ id: '9f3c', name: 'ramp-3', kind: 'ramp', created })).toBe(`ramp-3, ${time}`);
     expect(traceLabel({ id: '9f3c', name: null, kind: 'held_out', created })).toBe(`held out, ${time}`);
     expect(traceLabel({ id: '9f3c', name: null, kind: null, created })).toBe(`9f3c, ${time}`);
+  });
+
+  it('says how it ended where that was before its end', () => {
+    const entry = { id: '9f3c', name: 'ramp', kind: 'ramp', created };
+    expect(traceLabel({ ...entry, outcome: 'stopped' })).toMatch(/ \(stopped\)$/);
+    expect(traceLabel({ ...entry, outcome: 'complete' })).not.toContain('complete');
+    expect([isWhole({ outcome: 'fault' }), isWhole({ outcome: null })]).toEqual([false, true]);
+    expect(outcomeText({ outcome: null })).toBe('outcome not known');
   });
 
   it('is told from one of the same minute', () => {

@@ -7,6 +7,7 @@ export interface Named {
   readonly name: string | null;
   readonly kind: string | null;
   readonly created: string;
+  readonly outcome?: string | null;
 }
 
 /** Its name, else its kind. */
@@ -14,7 +15,21 @@ export function traceName(entry: Named): string {
   return entry.name ?? entry.kind?.replaceAll('_', ' ') ?? entry.id;
 }
 
-/** `ramp, 21 Nov 2026, 10:22:05`: to the second, for a short motion is repeated within a minute. */
+/**
+ * `ramp, 21 Nov 2026, 10:22:05`: to the second, for a short motion is repeated within a minute. One that was not carried
+ * out to its end says so.
+ */
 export function traceLabel(entry: Named): string {
-  return `${traceName(entry)}, ${dayAndSecond(entry.created)}`;
+  const ended = isWhole(entry) ? '' : ` (${outcomeText(entry)})`;
+  return `${traceName(entry)}, ${dayAndSecond(entry.created)}${ended}`;
+}
+
+/** How its recording ended, for every place where traces are chosen. */
+export function outcomeText(entry: Pick<Named, 'outcome'>): string {
+  return entry.outcome ?? 'outcome not known';
+}
+
+/** Whether nothing ended its recording before its time, as far as is known. */
+export function isWhole(entry: Pick<Named, 'outcome'>): boolean {
+  return entry.outcome === 'complete' || entry.outcome == null;
 }

@@ -99,6 +99,15 @@ describe('a form filled with a specification', () => {
     expect([settle, formOf(without, RULES).settle]).toEqual([0.5, '0.5']);
   });
 
+  it('gives no motion the name of another, and keeps a name that somebody chose', () => {
+    const form = formOf(RAMP, RULES);
+    const cubic = RULES.kinds[0]!;
+    expect(withKind({ ...form, name: 'ramp' }, cubic).name).toBe('cubic');
+    expect(withKind({ ...form, name: 'diagnostic-c' }, cubic, ['diagnostic-c']).name).toBe('cubic');
+    expect(withKind({ ...form, name: 'monday' }, cubic, ['diagnostic-c']).name).toBe('monday');
+    expect(withKind({ ...form, name: '' }, cubic).name).toBe('');
+  });
+
   it('keeps a sequence as it is', () => {
     const sequence = { kind: 'sequence', segments: [{ move: { kind: 'pause', duration: 1 } }] };
     const form = formOf({ ...RAMP, trajectory: sequence }, RULES);

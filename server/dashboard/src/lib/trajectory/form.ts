@@ -122,11 +122,16 @@ export function formOf(given: Partial<Spec>, rules: SpecRules): SpecForm {
   };
 }
 
-/** The same form with another kind of trajectory, filled with what is usual for it. */
-export function withKind(form: SpecForm, kind: TrajectoryKind): SpecForm {
+/**
+ * The same form with another kind of trajectory, filled with what is usual for it. A name that a preset or the form gave
+ * (`given`: the presets' names) goes with the motion that it named; one that somebody chose stays.
+ */
+export function withKind(form: SpecForm, kind: TrajectoryKind, given: readonly string[] = []): SpecForm {
+  const isGiven = [form.kind, ...given].includes(form.name);
   return {
     ...form,
     kind: kind.kind,
+    name: isGiven ? kind.kind : form.name,
     values: valuesOf(kind, {}),
     perJoint: false,
     amplitudes: {},

@@ -81,9 +81,8 @@ export class Draft {
 
   /** Why it cannot change between fields and text now; empty where it can. What cannot be read would be lost. */
   keptFromChanging: string = $derived.by(() => {
-    if (this.text === null)
-      return this.result.spec === null ? 'first put right what is wrong in the fields' : '';
-    return this.result.spec !== null && this.isCurrent ? '' : 'only what the service accepts has fields';
+    if (this.text === null) return this.result.spec === null ? 'first correct the fields that are wrong' : '';
+    return this.result.spec !== null && this.isCurrent ? '' : 'first correct the text';
   });
 
   /** Edits the specification as text instead of its fields, or its fields again. */

@@ -10,7 +10,6 @@ const TOPICS = new Set(['queue', 'event', 'robot']);
 /** s in which several changes are taken together. */
 const TOGETHER = 0.15;
 const ENDED_SHOWN = 12;
-const ENDS = ['done', 'failed', 'cancelled', 'interrupted'] as const;
 
 export class QueueLists {
   waiting = $state.raw<readonly Experiment[]>([]);
@@ -54,7 +53,7 @@ export class QueueLists {
         ),
         ask(
           api.GET('/api/v1/robots/{robot}/experiments', {
-            params: { path, query: { state: [...ENDS], limit: ENDED_SHOWN } },
+            params: { path, query: { order: 'ended', limit: ENDED_SHOWN } },
           }),
         ),
         ask(api.GET('/api/v1/robots/{robot}/schedules', { params: { path } })),
@@ -76,9 +75,7 @@ export class QueueLists {
   async move(from: number, to: number): Promise<void> {
     const changes = reordered(this.waiting, from, to);
     if (changes === null) {
-      await this.change(() =>
-        Promise.reject(new Error('no priority above 100 is left: lower another one first')),
-      );
+      await this.change(() => Promise.reject(new Error('priorities end at 100: lower another one first')));
       return;
     }
     await this.change(async () => {

@@ -60,7 +60,7 @@ export class Sending {
     const params = { path: here(), header: { 'idempotency-key': this.key } };
     const body = { spec, priority: Number(this.priority), ...(at === null ? {} : { at }) };
     const made = await ask(api.POST('/api/v1/robots/{robot}/experiments', { params, body }));
-    return `${made.spec.name ?? made.spec.trajectory.kind} is in the queue, number ${made.id}`;
+    return `${made.spec.name ?? made.spec.trajectory.kind} was added to the queue`;
   }
 
   private async schedule(spec: ExperimentSpec): Promise<string> {
@@ -68,9 +68,9 @@ export class Sending {
     const count = this.count.trim() === '' ? null : Number(this.count);
     const starts = momentOf(this.starts);
     const body = { spec, every, count, starts, priority: Number(this.priority) };
-    const made = await ask(api.POST('/api/v1/robots/{robot}/schedules', { params: { path: here() }, body }));
+    await ask(api.POST('/api/v1/robots/{robot}/schedules', { params: { path: here() }, body }));
     const first = starts === null ? '' : `, first ${dayAndTime(starts)}`;
-    return `scheduled every ${interval(every)}${first}, number ${made.id}`;
+    return `scheduled every ${interval(every)}${first}`;
   }
 
   private seconds(): number {

@@ -1,0 +1,56 @@
+import { describe, expect, it } from 'vitest';
+import { queueBadge, queueState, whatGoesOn } from './words';
+
+const robot = { connection: 'connected', arm: 'idle', activity: 'none' } as const;
+const queue = { paused: false, reason: 'resumed by anna', running: null, waiting_for: '' };
+const paused = { ...queue, paused: true, reason: 'paused by anna' };
+
+describe('what goes on', () => {
+  it('is nothing only where something could be started at once', () => {
+    expect(whatGoesOn(robot, queue, 0)).toEqual({ text: 'Nothing is running or waiting.', isFree: true });
+    expect(whatGoesOn(robot, queue, 2)).toEqual({ text: '', isFree: false });
+    expect(whatGoesOn({ ...robot, connection: 'lost' }, queue, 0).isFree).toBe(false);
+    expect(whatGoesOn(null, null, 0).isFree).toBe(false);
+  });
+
+  it('says that the arm is stopped and the queue paused', () => {
+    const found = whatGoesOn({ ...robot, arm: 'stopped' }, { ...paused, reason: 'the arm is stopped' }, 0);
+    expect(found).toEqual({
+      text: 'Nothing moves until the arm is reset. The queue is paused: the arm is stopped.',
+      isFree: false,
+    });
+    expect(whatGoesOn(robot, paused, 0)).toEqual({
+      text: 'The queue is paused by anna.',
+      isFree: false,
+    });
+  });
+
+  it('is what the arm does, also while the queue is paused', () => {
+    expect(whatGoesOn({ ...robot, activity: 'experiment' }, paused, 0).text).toBe(
+      'An experiment is running. The queue is paused by anna.',
+    );
+  });
+});
+
+describe('the queue', () => {
+  it('is ready only with a robot, and says why it waits', () => {
+    expect(queueBadge(queue, true)).toEqual({ tone: 'good', text: 'ready' });
+    expect(queueBadge(queue, false).tone).toBe('quiet');
+    expect(queueState(queue, false).text).toBe('Nothing can run until the robot is connected.');
+    expect(queueState({ ...queue, waiting_for: 'the link is lost' }, false)).toEqual({
+      head: 'Waiting:',
+      text: 'the link is lost.',
+    });
+  });
+
+  it('that is paused lets what runs go on', () => {
+    const running = { ...paused, running: '9f3c' };
+    expect(queueState(running, true).text).toMatch(/^by anna\. The experiment .* goes on/);
+    expect(queueState({ ...paused, reason: 'the arm is stopped' }, true)).toEqual({
+      head: 'Paused:',
+      text: 'the arm is stopped.',
+    });
+    expect(queueBadge(running, true)).toEqual({ tone: 'busy', text: 'running the last one' });
+    expect(queueBadge(paused, true)).toEqual({ tone: 'warn', text: 'paused' });
+  });
+});

@@ -1,0 +1,63 @@
+/** What the queue and the arm are doing, in words that hold together: nothing is called free that is held. Pure. */
+
+import type { QueueStatus, RobotMessage } from '../api/types';
+
+type Robot = Pick<RobotMessage, 'connection' | 'arm' | 'activity'>;
+type Queue = Pick<QueueStatus, 'paused' | 'reason' | 'running' | 'waiting_for'>;
+
+export const ACTIVITIES: Readonly<Record<Robot['activity'], string>> = {
+  none: '',
+  experiment: 'An experiment is running.',
+  jog: 'The arm is being jogged.',
+  step: 'The arm is making a step.',
+  program: 'A taught program is running.',
+  lead: 'The arm is led by hand: hold it.',
+};
+
+export interface Doing {
+  text: string;
+  /** Whether the way to start something is offered beside it. */
+  isFree: boolean;
+}
+
+/** What goes on, for the line above the charts. `waiting`: experiments in the queue. */
+export function whatGoesOn(robot: Robot | null, queue: Queue | null, waiting: number): Doing {
+  const activity = ACTIVITIES[robot?.activity ?? 'none'];
+  const isHeld = robot?.arm === 'stopped' || robot?.arm === 'fault';
+  const held = isHeld ? 'Nothing moves until the arm is reset.' : '';
+  const paused = queue?.paused ? `The queue is ${pausedWhy(queue.reason)}.` : '';
+  const said = [activity || held, paused].filter((part) => part !== '').join(' ');
+  if (said !== '' || waiting > 0 || robot === null || queue === null) return { text: said, isFree: false };
+  if (robot.connection !== 'connected') return { text: '', isFree: false };
+  return { text: 'Nothing is running or waiting.', isFree: true };
+}
+
+/** `paused by anna`, `paused: the arm is stopped`: the reason may say itself that it is paused. */
+function pausedWhy(reason: string): string {
+  return reason.startsWith('paused') ? reason : `paused: ${reason}`;
+}
+
+/** Why the queue does what it does. `isConnected`: whether there is an arm to move. */
+export function queueState(queue: Queue, isConnected: boolean): { head: string; text: string } {
+  if (queue.paused) {
+    const goesOn = queue.running ? ' The experiment that is running goes on to its end.' : '';
+    const [, colon = '', why = ''] = /^paused(:?) (.*)$/.exec(pausedWhy(queue.reason)) ?? [];
+    return { head: `Paused${colon}`, text: `${why}.${goesOn}` };
+  }
+  if (queue.waiting_for) return { head: 'Waiting:', text: `${queue.waiting_for}.` };
+  if (queue.running) return { head: '', text: 'One experiment is running.' };
+  if (!isConnected) return { head: '', text: 'Nothing can run until the robot is connected.' };
+  return { head: '', text: 'Experiments run one at a time, as soon as they are added.' };
+}
+
+/** A sign and a word for the queue. */
+export function queueBadge(
+  queue: Queue | null,
+  isConnected: boolean,
+): { tone: 'good' | 'warn' | 'busy' | 'quiet'; text: string } {
+  if (queue === null) return { tone: 'quiet', text: 'not known' };
+  if (queue.running) return { tone: 'busy', text: queue.paused ? 'running the last one' : 'running' };
+  if (queue.paused) return { tone: 'warn', text: 'paused' };
+  if (queue.waiting_for) return { tone: 'warn', text: 'waiting' };
+  return isConnected ? { tone: 'good', text: 'ready' } : { tone: 'quiet', text: 'no robot' };
+}

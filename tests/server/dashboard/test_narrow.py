@@ -1,0 +1,113 @@
+"""On the narrowest screens: Stop is whole on every page, whatever stands beside it, and nothing sticks out."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import pytest
+from playwright.sync_api import WebSocketRoute, expect
+
+from tests.server.dashboard.browser import LIVE, Dashboard
+from tests.server.dashboard.test_stop import PAGES
+
+pytestmark = pytest.mark.browser
+WIDTHS = (320, 360, 390, 768, 1280)
+CONNECTIONS = {"lost": "link lost", "connecting": "robot connects", "disconnected": "robot not connected"}
+STOP = """() => {
+    const stop = document.querySelector('header button[aria-keyshortcuts]');
+    const box = stop.getBoundingClientRect();
+    const inset = 4;
+    const corners = [[box.left + inset, box.top + inset], [box.right - inset, box.top + inset],
+                     [box.left + inset, box.bottom - inset], [box.right - inset, box.bottom - inset]];
+    return {
+        width: box.width, left: box.left, right: box.right, top: box.top, inside: document.documentElement.clientWidth,
+        covered: corners.some(([x, y]) => !stop.contains(document.elementFromPoint(x, y))),
+        beyond: document.documentElement.scrollWidth - document.documentElement.clientWidth,
+    };
+}"""
+
+
+class Line:
+    """The page's connection to the service: what comes over it is changed on its way."""
+
+    def __init__(self, dashboard: Dashboard) -> None:
+        self._route: WebSocketRoute | None = None
+        self._head: dict[str, float] = {}
+        self._robot: dict[str, Any] = {}
+        self.silent: set[str] = set()
+        dashboard.page.route_web_socket(re.compile("/live"), self._join)
+
+    def _join(self, route: WebSocketRoute) -> None:
+        self._route = route
+        server = route.connect_to_server()
+
+        def hear(text: str | bytes) -> None:
+            frame = json.loads(text)
+            self._head = {"now": frame["now"], "utc": frame["utc"]}
+            for message in frame["messages"]:
+                if message["topic"] == "robot":
+                    self._robot = message
+            frame["messages"] = [one for one in frame["messages"] if one["topic"] not in self.silent]
+            route.send(json.dumps(frame))
+
+        server.on_message(hear)
+
+    def say(self, *messages: dict[str, Any]) -> None:
+        """As if the service had said it just now."""
+        assert self._route is not None
+        self._route.send(json.dumps({**self._head, "messages": messages}))
+
+    def robot(self, connection: str) -> None:
+        """The robot's connection, as the page is told from now on."""
+        self.silent.add("robot")
+        self.say({**self._robot, "connection": connection})
+
+
+def _faults(dashboard: Dashboard, where: str) -> list[str]:
+    page, found = dashboard.page, []
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 700})
+        seen = page.evaluate(STOP)
+        if seen["left"] < 0 or seen["right"] > seen["inside"] or seen["top"] < 0 or seen["covered"]:
+            found.append(f"{where} at {width} px: Stop is cut off or covered: {seen}")
+        if seen["width"] < 96:
+            found.append(f"{where} at {width} px: Stop is {seen['width']} px wide")
+        if seen["beyond"] > 0:
+            found.append(f"{where} at {width} px: {seen['beyond']} px stick out")
+    return found
+
+
+def test_stop_is_whole_on_every_page_at_every_width(dashboard: Dashboard) -> None:
+    line = Line(dashboard)
+    page = dashboard.until_live()
+    expect(page.get_by_title("A mock controller: nothing real moves")).to_be_visible()
+    line.robot("disconnected")
+    expect(page.get_by_role("banner").get_by_text("robot not connected")).to_be_visible()
+    found = _faults(dashboard, "live")
+    for path in PAGES[1:]:
+        dashboard.open(path)
+        found += _faults(dashboard, path)
+    assert found == []
+
+
+def test_stop_is_whole_beside_every_badge(dashboard: Dashboard) -> None:
+    line = Line(dashboard)
+    page = dashboard.open("system")  # without charts, which would be drawn anew at every width
+    banner = page.get_by_role("banner")
+    expect(banner.get_by_text(LIVE).or_(dashboard.degraded)).to_be_visible()
+    line.say({"topic": "thinned", "left_out": 7})
+    expect(banner.get_by_text(re.compile("thinned|degraded"))).to_be_visible()
+    found = _faults(dashboard, "thinned")
+    line.silent.add("sample")
+    expect(banner.get_by_text("stale")).to_be_visible()
+    found += _faults(dashboard, "stale")
+    for connection, text in CONNECTIONS.items():
+        line.robot(connection)
+        expect(banner.get_by_text(text)).to_be_visible()
+        found += _faults(dashboard, text)
+    page.keyboard.press("F8")
+    expect(page.locator("[role=alert] [data-stop]")).to_be_visible()
+    found += _faults(dashboard, "stopped")
+    assert found == []
