@@ -13,7 +13,8 @@ import typer
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from daq.cli.context import JsonOption, YesOption, invocation
+from daq.cli import completion
+from daq.cli.context import JsonOption, YesOption, invocation, print_json
 from daq.cli.quantities import parse_angle, parse_gains, parse_per_joint_angles
 from daq.contracts import experiment
 from daq.contracts.errors import SpecError
@@ -54,7 +55,7 @@ _HELP = {
 }
 _ANGLES = {"phase": "degrees", "speed": "degrees/s"}
 
-JointsOption = Annotated[str, typer.Option(help="Joints that move: 1-3, 1,3 or 2.")]
+JointsOption = Annotated[str, typer.Option(help="Joints that move: 1-3, 1,3 or 2.", autocompletion=completion.joints)]
 StartOption = Annotated[str | None, typer.Option(help="Start angles, such as 1=180,2=45 (degrees).")]
 GainsOption = Annotated[str | None, typer.Option(help="Gains P/I/D, such as 1=2/0/0,2=2/0/0 (each 0-20).")]
 SettleOption = Annotated[float, typer.Option(help="Seconds held before the motion, recorded.")]
@@ -189,7 +190,9 @@ def from_file(
 @app.command("preset")
 def by_name(
     context: typer.Context,
-    name: Annotated[str, typer.Argument(help="Name of a preset; none lists them.")] = "",
+    name: Annotated[
+        str, typer.Argument(help="Name of a preset; none lists them.", autocompletion=completion.presets)
+    ] = "",
     folder: FolderOption = None,
     dry_run: DryRunOption = False,
     yes: YesOption = False,
@@ -199,6 +202,9 @@ def by_name(
     from daq.trajectories.presets import PRESETS, preset
 
     if not name:
+        if json:
+            print_json([{"name": known, "description": one.description} for known, one in PRESETS.items()])
+            return
         for known, one in PRESETS.items():
             print(f"{known:14s} {one.description}")
         return

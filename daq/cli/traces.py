@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from daq.cli import completion
 from daq.cli.context import Invocation, JsonOption, console, invocation, print_json, print_table
 from daq.contracts.errors import SpecError, TraceError
 
@@ -19,7 +20,10 @@ if TYPE_CHECKING:
 app = typer.Typer(add_completion=False, help="List, show, plot, convert and verify traces.", no_args_is_help=True)
 
 TraceArgument = Annotated[
-    str, typer.Argument(help="A file, the beginning of a trace's number or name, or `last`.", show_default=True)
+    str,
+    typer.Argument(
+        help="A file, the beginning of a trace's number or name, or `last`.", autocompletion=completion.traces
+    ),
 ]
 FolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (default: the configured one).")]
 
@@ -159,13 +163,14 @@ def plot(
     trace: TraceArgument = "last",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="A .png, .svg, .pdf or .html file.")] = None,
     folder: FolderOption = None,
+    json: JsonOption = False,
 ) -> None:
     """Draw a trace: set point and position, error and drive of every joint."""
     from daq.traces.plot import plot_trace
     from daq.traces.reader import read_trace
 
     path = _path(context, trace, folder)
-    print(plot_trace(read_trace(path), output or path.with_suffix(".png")))
+    _tell_file(path, plot_trace(read_trace(path), output or path.with_suffix(".png")), as_json=json)
 
 
 @app.command("export")
@@ -176,13 +181,21 @@ def export(
         Path | None, typer.Option("--output", "-o", help="A .csv file; a .toml is put beside it.")
     ] = None,
     folder: FolderOption = None,
+    json: JsonOption = False,
 ) -> None:
     """Write a trace as plain CSV, with a TOML file for what columns cannot say."""
     from daq.cli.csv_output import write_csv
     from daq.traces.reader import read_trace
 
     path = _path(context, trace, folder)
-    print(write_csv(read_trace(path), output or path.with_suffix(".csv")))
+    _tell_file(path, write_csv(read_trace(path), output or path.with_suffix(".csv")), as_json=json)
+
+
+def _tell_file(made_from: Path, file: Path, *, as_json: bool) -> None:
+    if as_json:
+        print_json({"trace": made_from, "file": file})
+    else:
+        print(file)
 
 
 @app.command("import")
@@ -196,6 +209,7 @@ def import_(
         ),
     ],
     folder: FolderOption = None,
+    json: JsonOption = False,
 ) -> None:
     """Take in a trace of another rig or tool."""
     from daq.traces.csv_table import import_csv
@@ -206,7 +220,7 @@ def import_(
     if call.server is not None:
         from daq.cli.remote.traces import upload
 
-        upload(call, file)
+        upload(call, file, as_json=json)
         return
     place = _folder(call, folder)
     found = import_csv(file)
@@ -214,7 +228,11 @@ def import_(
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise TraceError(f"{place}: cannot be made: {error.strerror}") from error
-    print(write_trace(found, trace_path(place, found.record)))
+    made = write_trace(found, trace_path(place, found.record))
+    if json:
+        print_json({"trace": found.record.trace_id, "made_from": file, "file": made, "server": None})
+    else:
+        print(made)
 
 
 @app.command("verify")

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
+from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 
 JOINTS = 6
@@ -17,6 +18,12 @@ DEFAULT_AMPLITUDE = math.radians(21.6)
 """21.6°, that is 80 posture units (section 6.5 of the source)."""
 DEFAULT_RAMP_TIME = 0.65
 """Duration of the ramp in s (section 6.5)."""
+
+LONGEST_SHOWN = 60
+"""Characters of a wrong text that an error repeats whole."""
+
+MOST_POINTS = 1_000_000
+"""Points of a path: four hours of set points at 50 Hz are 720 000."""
 
 Duration = Annotated[FiniteFloat, Field(gt=0, le=3600)]
 Hold = Annotated[FiniteFloat, Field(ge=0, le=3600)]
@@ -86,7 +93,7 @@ class Multisine(_Part):
     lowest: Annotated[FiniteFloat, Field(gt=0, le=25)] = 0.1
     highest: Annotated[FiniteFloat, Field(gt=0, le=25)] = 2.0
     tones: Annotated[int, Field(ge=1, le=100)] = 10
-    seed: Annotated[int, Field(ge=0)] = 1
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -110,8 +117,8 @@ class Path(_Part):
     """
 
     kind: Literal["path"] = "path"
-    times: Annotated[tuple[FiniteFloat, ...], Field(min_length=2)]
-    positions: Annotated[tuple[tuple[Angle, ...], ...], Field(min_length=2)]
+    times: Annotated[tuple[FiniteFloat, ...], Field(min_length=2, max_length=MOST_POINTS)]
+    positions: Annotated[tuple[tuple[Angle, ...], ...], Field(min_length=2, max_length=MOST_POINTS)]
     """One row a time, one column a joint."""
 
     @model_validator(mode="after")
@@ -219,8 +226,8 @@ def _one_line(error: ValidationError) -> str:
     bound = next((first.get("ctx", {})[key] for key in ("le", "ge") if key in first.get("ctx", {})), None)
     if bound is not None and math.isclose(abs(bound), 2 * math.pi) and isinstance(value, int | float):
         message, value = "must lie between -360° and 360°", f"{math.degrees(value):g}°"
-    elif not isinstance(value, str):
-        value = repr(value)
+    elif not isinstance(value, str) or len(value) > LONGEST_SHOWN:
+        value = shown(value)
     given = "" if isinstance(first["input"], dict | BaseModel) else f" (got {value})"
     return f"{': '.join(['.'.join(where)] * bool(where) + [message])}{given}"
 
@@ -229,7 +236,7 @@ def parse_joints(text: str) -> tuple[int, ...]:
     """Joint numbers from `1-3`, `1,3` or `1-2,5`. Raises SpecError for anything else."""
     joints: set[int] = set()
     for part in text.split(","):
-        match = re.fullmatch(r"\s*(\d+)\s*(?:-\s*(\d+)\s*)?", part)
+        match = re.fullmatch(r"\s*(\d{1,4})\s*(?:-\s*(\d{1,4})\s*)?", part)
         if match is None:
             raise SpecError(f"joints {text!r}: write 1-3, 1,3 or 2; joints are 1 to {JOINTS}")
         first = int(match[1])

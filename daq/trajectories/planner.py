@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence as Several
 from dataclasses import replace
 
@@ -68,6 +69,7 @@ def plan(spec: ExperimentSpec, machine: Machine, start: Several[float]) -> Plan:
     columns = [joint - 1 for joint in spec.joints]
     unit = np.array([abs(machine.calibration(joint).rad_per_posture_unit) for joint in spec.joints])
     motion = _piece(spec.trajectory, spec.joints, begin[columns], unit, period)
+    _require_motion(spec, motion, unit)
     whole = _with_repeats(spec, motion, period)
     whole = spread(whole, columns, len(begin))
     angles = np.concatenate([begin[None, :], begin + whole.offsets])
@@ -76,9 +78,20 @@ def plan(spec: ExperimentSpec, machine: Machine, start: Several[float]) -> Plan:
     return make_plan(machine, spec.joints, angles, jumps, (ends[0], *whole.marks, ends[1]))
 
 
+def _require_motion(spec: ExperimentSpec, motion: Piece, unit: Floats) -> None:
+    """Raises SpecError for amplitudes that no set point can show. A recorded path may be of an arm at rest."""
+    moved = np.abs(motion.offsets).max(axis=0, initial=0.0)
+    if isinstance(spec.trajectory, Path) or not moved.any() or (moved >= unit / 2).any():
+        return
+    raise SpecError(
+        f"amplitude: no joint would move by as much as half a set point ({math.degrees(unit.max() / 2):.3g}°): give a "
+        "larger one, or 0 to record the arm at rest"
+    )
+
+
 def _with_repeats(spec: ExperimentSpec, motion: Piece, period: float) -> Piece:
     count = len(spec.joints)
-    settle, hold = pause(spec.settle, count, period), pause(spec.hold, count, period)
+    settle, hold = pause(spec.settle, count, period, "settle"), pause(spec.hold, count, period, "hold")
     end = motion.offsets[-1] if len(motion.offsets) else np.zeros(count)
     back = move_piece(-end, period)
     pieces: list[Piece] = []
