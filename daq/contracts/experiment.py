@@ -110,6 +110,41 @@ class Cubic(_Part):
     duration: Duration = 1.0
 
 
+class Via(_Part):
+    """Cubic segments through via points to the last one, at rest at both ends (section 3.7.1).
+
+    `points` are angles (rad) from the start, one for all joints or one a joint; `times` (s) from the start when each is
+    passed, the last being the end. Position, velocity and acceleration are continuous.
+    """
+
+    kind: Literal["via"] = "via"
+    points: Annotated[tuple[Amplitude, ...], Field(min_length=1, max_length=1000)]
+    times: Annotated[tuple[Duration, ...], Field(min_length=1, max_length=1000)]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if len(self.times) != len(self.points):
+            raise ValueError(f"{len(self.times)} times for {len(self.points)} points")
+        if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
+            raise ValueError("times must increase strictly")
+        return self
+
+
+class PickAndPlace(_Part):
+    """Straight up by `lift` m, over to `amplitude` from the start, straight down: a 4-3-4 trajectory (section 3.7.2).
+
+    The lift-off and set-down points are `lift` above the ends; in between joints move by polynomials of orders 4, 3 and
+    4 in `pick`, `travel` and `place` s. Position, velocity and acceleration are continuous, and both ends at rest.
+    """
+
+    kind: Literal["pick_and_place"] = "pick_and_place"
+    amplitude: Amplitude = DEFAULT_AMPLITUDE
+    lift: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.05
+    pick: Duration = 1.0
+    travel: Duration = 2.0
+    place: Duration = 1.0
+
+
 class Path(_Part):
     """A recorded or designed path: absolute angles (rad) of the experiment's joints at times (s), linear between.
 
@@ -138,7 +173,7 @@ class Pause(_Part):
 
 
 Simple = Annotated[
-    Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Pause, Field(discriminator="kind")
+    Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | Pause, Field(discriminator="kind")
 ]  # fmt: skip
 
 
@@ -157,7 +192,8 @@ class Sequence(_Part):
 
 
 Trajectory = Annotated[
-    Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Path | Pause | Sequence, Field(discriminator="kind")
+    Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | PickAndPlace | Path | Pause | Sequence,
+    Field(discriminator="kind"),
 ]  # fmt: skip
 
 
@@ -193,9 +229,11 @@ class ExperimentSpec(_Part):
         for move, joints in moves:
             if not set(joints) <= set(self.joints):
                 raise ValueError(f"a segment moves joints {list(joints)}, the experiment has {list(self.joints)}")
-            amplitude = getattr(move, "amplitude", None)
-            if isinstance(amplitude, dict) and set(amplitude) != set(joints):
-                raise ValueError(f"amplitude is given for joints {sorted(amplitude)}, the motion is on {list(joints)}")
+            given = move.points if isinstance(move, Via) else (getattr(move, "amplitude", None),)
+            for amplitude in given:
+                if isinstance(amplitude, dict) and set(amplitude) != set(joints):
+                    what = "a point" if isinstance(move, Via) else "amplitude"
+                    raise ValueError(f"{what} is given for joints {sorted(amplitude)}, the motion is on {list(joints)}")
         if isinstance(self.trajectory, Path) and len(self.trajectory.positions[0]) != len(self.joints):
             columns = len(self.trajectory.positions[0])
             raise ValueError(f"the path has {columns} columns for {len(self.joints)} joints")
