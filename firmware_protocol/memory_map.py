@@ -170,14 +170,16 @@ def parse_memory_map(text: str, origin: str = "memory map") -> MemoryMap:
     """
     try:
         return MemoryMap.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise MemoryMapError(f"{origin}: not TOML: {error}") from error
+    except RecursionError:
+        raise MemoryMapError(f"{origin}: not a memory map: it is nested too deeply") from None
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "registers"
         found = first["input"]
-        value = f" (found {found!r})" if isinstance(found, bool | int | float | str) else ""
+        value = f" (found {found!r:.60})" if isinstance(found, bool | int | float | str) else ""
         raise MemoryMapError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}{value}") from error
+    except ValueError as error:  # of the TOML; also a whole number of thousands of digits
+        raise MemoryMapError(f"{origin}: not TOML: {error}") from error
 
 
 @cache

@@ -95,8 +95,10 @@ def _read_file(path: Path) -> dict[str, Any]:
         return {key.replace("-", "_"): value for key, value in tomllib.loads(path.read_text("utf-8")).items()}
     except OSError as error:
         raise OptionsError(f"config: {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:  # also what is not UTF-8
         raise OptionsError(f"config: {path}: not TOML: {error}") from None
+    except RecursionError:
+        raise OptionsError(f"config: {path}: is nested too deeply") from None
 
 
 def _numbers(text: str) -> list[str]:

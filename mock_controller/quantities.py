@@ -38,6 +38,8 @@ class QuantityReader:
             self._tables = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             raise DataFileError(f"{origin}: not TOML: {error}") from error
+        except RecursionError:
+            raise DataFileError(f"{origin}: is nested too deeply") from None
 
     def take(self, table: str, key: str, unit: str, low: float = -math.inf, high: float = math.inf) -> float:
         """Value of `[table] key` in `unit`, between `low` and `high`. Raises DataFileError."""

@@ -48,9 +48,10 @@ def _bound(host: str, port: int, setting: str) -> socket.socket:
         listener = socket.socket(family, kind, protocol)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(address)
-    except OSError as error:
+    except (OSError, UnicodeError) as error:
         if listener is not None:
             listener.close()
-        line = f"server.host {host}, {setting} {port}: cannot be listened at: {error.strerror or error}"
+        why = error.strerror if isinstance(error, OSError) and error.strerror else error
+        line = f"server.host {host}, {setting} {port}: cannot be listened at: {why}"
         raise ListenError(line) from error
     return listener

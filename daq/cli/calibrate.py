@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from daq.cli import completion
 from daq.cli.context import JsonOption, YesOption, invocation, print_json
 
 app = typer.Typer(add_completion=False, help="Find what the machine really does.", no_args_is_help=True)
@@ -20,9 +21,14 @@ def calibrations() -> None:
 @app.command()
 def gain(
     context: typer.Context,
-    joints: Annotated[str, typer.Option(help="Joints to measure: 1-3, 1,3 or 2.")] = "1-3",
+    joints: Annotated[
+        str, typer.Option(help="Joints to measure: 1-3, 1,3 or 2.", autocompletion=completion.joints)
+    ] = "1-3",
     trace: Annotated[
-        str | None, typer.Option(help="Use this trace instead of moving: a file, a number, `last`.")
+        str | None,
+        typer.Option(
+            help="Use this trace instead of moving: a file, a number, `last`.", autocompletion=completion.traces
+        ),
     ] = None,
     folder: Annotated[Path | None, typer.Option(help="Where the trace goes (default: configured folder).")] = None,
     yes: YesOption = False,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import os
 import sys
 from pathlib import Path
@@ -16,6 +18,12 @@ from firmware_protocol.errors import ProtocolError
 
 EXIT_PROGRAM_FAULT = 1
 EXIT_WRONG_INPUT = 2
+WRONG_NAMES = frozenset({
+    errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS,
+})  # fmt: skip
+"""What the operating system says of files that were named wrongly; the rest is its own trouble."""
+LONGEST_LINE = 800
+"""Characters of an error; a command line may hold a megabyte."""
 EXIT_INTERRUPTED = 130
 """As shells report a process that Ctrl-C has ended."""
 
@@ -34,6 +42,14 @@ app = typer.Typer(
 )
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"daq {version('ma2000-daq')}")
+        raise typer.Exit
+
+
 @app.callback()
 def options(
     context: typer.Context,
@@ -48,8 +64,12 @@ def options(
         str | None,
         typer.Option(envvar=SERVER_VARIABLE, help="A service that has the robot: http://host:8300. Token: DAQ_TOKEN."),
     ] = None,
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and end.")
+    ] = False,
 ) -> None:
     """Options that go before the subcommand."""
+    del version
     by_default = getattr(context.get_parameter_source("server"), "name", "") == "ENVIRONMENT"
     if server is not None and port is not None:
         if not by_default:
@@ -64,6 +84,7 @@ def options(
 
 def main() -> None:
     """Entry point: errors that are the user's end in one line on standard error and a documented exit code."""
+    _print_whatever_files_are_called()
     try:
         exit_code = app(prog_name="daq", standalone_mode=False)
     except DaqError as error:
@@ -74,18 +95,31 @@ def main() -> None:
         _show_usage_error(error)
     except (KeyboardInterrupt, typer.Abort):
         fail("interrupted", EXIT_INTERRUPTED)
+    except MemoryError:
+        fail("the computer has not enough memory for this", EXIT_PROGRAM_FAULT)
     except BrokenPipeError:
         # `daq traces ls | head`: whoever read has enough. Python would complain at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(EXIT_PROGRAM_FAULT) from None
+    except OSError as error:
+        # Where nobody knew better: a name that is too long, a folder that may not be read, a full disk.
+        file = "" if error.filename is None else f"{error.filename}: "
+        code = EXIT_WRONG_INPUT if error.errno in WRONG_NAMES else EXIT_PROGRAM_FAULT
+        fail(f"{file}{error.strerror or error}", code)
     # typer hands back either an exit code or what the command returned.
     raise SystemExit(exit_code if isinstance(exit_code, int) else 0)
+
+
+def _print_whatever_files_are_called() -> None:
+    """Names of files need not be UTF-8, nor terminals able to show a degree sign: neither may end a command."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="surrogateescape" if sys.stdout.encoding.lower() == "utf-8" else "replace")
 
 
 def _show_usage_error(error: Any) -> NoReturn:
     """A command line that cannot be understood: one line, and where help is; the help itself where nothing was said."""
     message = error.format_message().strip()
-    if "\n" in message:
+    if type(error).__name__ == "NoArgsIsHelpError":
         print(message, file=sys.stderr)
         raise SystemExit(EXIT_WRONG_INPUT)
     path = "daq" if error.ctx is None else error.ctx.command_path
@@ -93,6 +127,9 @@ def _show_usage_error(error: Any) -> NoReturn:
 
 
 def fail(message: str, exit_code: int) -> NoReturn:
-    """One line on standard error, then the end."""
-    print(f"daq: {' '.join(message.split())}", file=sys.stderr)
+    """One line on standard error, then the end. A long one is cut in its middle: what is allowed stands at the end."""
+    line = " ".join(message.split())
+    if len(line) > LONGEST_LINE:
+        line = f"{line[: LONGEST_LINE // 2]} … {line[-LONGEST_LINE // 2 :]}"
+    print("daq: " + "".join(one if one.isprintable() else ascii(one)[1:-1] for one in line), file=sys.stderr)
     raise SystemExit(exit_code)

@@ -109,9 +109,10 @@ class Invocation:
         if path is None:
             return None
         from daq.config.robot_files import load_memory_map
+        from daq.contracts.documents import read_text
 
         load_memory_map(path)
-        return path.read_text("utf-8")
+        return read_text(path, f"memory map {path}")
 
     @property
     def trace_folder(self) -> Path:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
 
 if TYPE_CHECKING:
@@ -35,8 +35,8 @@ def check_csv(path: Path) -> None:
     if not toml.exists():
         return
     try:
-        found = Beside.model_validate(tomllib.loads(toml.read_text("utf-8")))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError, ValidationError):
+        found = Beside.model_validate(parse_toml(read_text(toml, str(toml)), str(toml)))
+    except (SpecError, ValidationError):
         found = Beside()
     if not found.model_fields_set >= WRITTEN:
         raise SpecError(f"{path}: {toml} would be replaced, and is no trace's; give the CSV another name or folder")

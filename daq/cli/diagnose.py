@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from daq.cli import completion
 from daq.cli.context import Invocation, JsonOption, YesOption, console, invocation, print_json
 from daq.cli.held_load import check_held
 from daq.cli.model_input import (
@@ -50,9 +51,16 @@ def diagnose(
     ] = None,
     holdout: HoldoutOption = None,
     effects: Annotated[
-        str | None, typer.Option(help="Candidates: backlash,coulomb and so on (default: every effect known).")
+        str | None,
+        typer.Option(
+            help="Candidates: backlash,coulomb and so on (default: every effect known).",
+            autocompletion=completion.effects,
+        ),
     ] = None,
-    joints: Annotated[str | None, typer.Option(help="Look on these joints only: 1-3, 2 (default: all).")] = None,
+    joints: Annotated[
+        str | None,
+        typer.Option(help="Look on these joints only: 1-3, 2 (default: all).", autocompletion=completion.joints),
+    ] = None,
     load: Annotated[float | None, typer.Option(min=0.0, help="The load that the arm carried, kg.")] = None,
     most: Annotated[int, typer.Option(min=1, max=10, help="Effects to add at most, one after the other.")] = 3,
     out: Annotated[Path | None, OutOption] = None,

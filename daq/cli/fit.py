@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from daq.cli import completion
 from daq.cli.context import Invocation, JsonOption, console, invocation, print_json
 from daq.cli.effect_choice import bounds, patterns, with_effects
 from daq.cli.model_input import (
@@ -40,7 +41,10 @@ app = typer.Typer(add_completion=False)
 
 EffectsOption = Annotated[
     str | None,
-    typer.Option(help="Effects beside rigid bodies and motors: viscous,coulomb:2-3 or none (default: the machine's)."),
+    typer.Option(
+        help="Effects beside rigid bodies and motors: viscous,coulomb:2-3 or none (default: the machine's).",
+        autocompletion=completion.effects,
+    ),
 ]
 ParametersOption = Annotated[
     str | None, typer.Option(help="What to find: names or patterns such as *.mass,joint2.* (default: all uncertain).")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from daq.cli import completion
 from daq.cli.context import Invocation, console
 from daq.cli.output_file import check_folder
 from daq.contracts.errors import SpecError
@@ -18,7 +19,10 @@ if TYPE_CHECKING:
     from model.machine_model.model import Model
 
 TracesArgument = Annotated[
-    list[str], typer.Argument(help="Files (.mcap, .csv), beginnings of traces' numbers or names, or `last`.")
+    list[str],
+    typer.Argument(
+        help="Files (.mcap, .csv), beginnings of traces' numbers or names, or `last`.", autocompletion=completion.traces
+    ),
 ]
 TraceFolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (default: the configured one).")]
 
@@ -48,7 +52,10 @@ def _model_file(path: Path | None) -> Path | None:
 
 OutOption = typer.Option("--out", "-o", callback=_model_file, help="Where the model that is made goes, a .json file.")
 HoldoutOption = Annotated[
-    list[str] | None, typer.Option("--holdout", help="A trace to judge by, not fitted to. May be repeated.")
+    list[str] | None,
+    typer.Option(
+        "--holdout", help="A trace to judge by, not fitted to. May be repeated.", autocompletion=completion.traces
+    ),
 ]
 
 EffectFileOption = Annotated[

@@ -7,7 +7,7 @@ import re
 
 from daq.contracts.errors import SpecError
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 
 
 def parse_angle(text: str, what: str) -> float:
@@ -30,7 +30,7 @@ def parse_gains(text: str) -> dict[int, tuple[int, int, int]]:
     """P/I/D of joints as `1=2/0/0,3=4/0/1`. Raises SpecError."""
     gains: dict[int, tuple[int, int, int]] = {}
     for joint, value in _pairs(text, "gains"):
-        match = re.fullmatch(r"(\d+)/(\d+)/(\d+)", value)
+        match = re.fullmatch(r"(\d{1,4})/(\d{1,4})/(\d{1,4})", value)
         if match is None:
             raise SpecError(f"gains of joint {joint} {value!r}: write P/I/D like 2/0/0, each 0 to 20")
         gains[joint] = (int(match[1]), int(match[2]), int(match[3]))
@@ -40,7 +40,7 @@ def parse_gains(text: str) -> dict[int, tuple[int, int, int]]:
 def _pairs(text: str, what: str) -> list[tuple[int, str]]:
     pairs: list[tuple[int, str]] = []
     for part in text.split(","):
-        match = re.fullmatch(r"\s*(\d+)\s*=\s*(.+?)\s*", part)
+        match = re.fullmatch(r"\s*(\d{1,4})\s*=\s*(\S(?:.*\S)?)\s*", part)
         if match is None:
             raise SpecError(f"{what} {text!r}: write joint=value pairs like 1=21.6,2=-10")
         if int(match[1]) in (joint for joint, _ in pairs):

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from daq.cli.context import console, invocation
+from daq.cli.context import JsonOption, console, invocation, print_json
 from daq.cli.robot import connected
 from daq.contracts.errors import DaqError
 from daq.contracts.limp import limp_line
@@ -27,6 +27,7 @@ def reset(
         bool,
         typer.Option("--here", help="First make the measured posture the set points: of limp joints, or to yield."),
     ] = False,
+    json: JsonOption = False,
 ) -> None:
     """End the freeze of a stop. Set points stay where the stop put them, or with --here become the present posture."""
     from firmware_protocol.commands import StatusFlag
@@ -35,7 +36,11 @@ def reset(
         from daq.cli.remote.robot import remote_robot
 
         with remote_robot(invocation(context)) as robot:
-            print(robot.reset(here=here).text)
+            text = robot.reset(here=here).text
+        if json:
+            print_json({"server": invocation(context).server, "here": here, "text": text})
+        else:
+            print(text)
         return
     with connected(invocation(context)) as controller:
         frozen = StatusFlag.FROZEN in controller.status().flags
@@ -47,10 +52,13 @@ def reset(
                 raise NotFrozenError(f"reset --here: {stopped.problem}; the set points are not known to be here")
         controller.release()
         limp = limp_line(controller.gains())
+    holds = "takes set points again" if limp else "the arm holds its posture and takes set points again"
+    text = f"released: {holds}" + ("; the set points are the posture measured now" if here else "")
+    if not frozen and not here:
+        text = "was not stopped"
+    if json:
+        print_json({"server": None, "here": here, "text": text})
+        return
     if limp:
         console().print(limp)
-    if not frozen and not here:
-        print("was not stopped")
-    else:
-        holds = "takes set points again" if limp else "the arm holds its posture and takes set points again"
-        print(f"released: {holds}" + ("; the set points are the posture measured now" if here else ""))
+    print(text)

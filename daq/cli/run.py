@@ -13,7 +13,8 @@ import typer
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from daq.cli.context import JsonOption, YesOption, invocation
+from daq.cli import completion
+from daq.cli.context import JsonOption, YesOption, invocation, print_json
 from daq.cli.quantities import parse_angle, parse_gains, parse_per_joint_angles
 from daq.contracts import experiment
 from daq.contracts.errors import SpecError
@@ -29,6 +30,8 @@ KINDS: dict[str, type[BaseModel]] = {
     "sine": experiment.Sine,
     "multisine": experiment.Multisine,
     "cubic": experiment.Cubic,
+    "via": experiment.Via,
+    "pick-and-place": experiment.PickAndPlace,
 }
 _IN_SHORT = {
     "ramp": "Equal increments, all joints arriving together.",
@@ -38,6 +41,8 @@ _IN_SHORT = {
     "sine": "A sine about the start posture.",
     "multisine": "Many sines at once, with seeded phases.",
     "cubic": "Cubic in time, at rest at both ends.",
+    "via": "Cubic segments through via points.",
+    "pick-and-place": "4-3-4: lifted off, over, and set down.",
 }
 _HELP = {
     "duration": "Seconds.",
@@ -51,10 +56,14 @@ _HELP = {
     "highest": "Highest frequency in Hz.",
     "tones": "Number of sines.",
     "seed": "Of the phases.",
+    "lift": "Metres of the lift-off and set-down points above the ends.",
+    "pick": "Seconds up to the lift-off point.",
+    "travel": "Seconds from the lift-off to the set-down point.",
+    "place": "Seconds down from the set-down point.",
 }
 _ANGLES = {"phase": "degrees", "speed": "degrees/s"}
 
-JointsOption = Annotated[str, typer.Option(help="Joints that move: 1-3, 1,3 or 2.")]
+JointsOption = Annotated[str, typer.Option(help="Joints that move: 1-3, 1,3 or 2.", autocompletion=completion.joints)]
 StartOption = Annotated[str | None, typer.Option(help="Start angles, such as 1=180,2=45 (degrees).")]
 GainsOption = Annotated[str | None, typer.Option(help="Gains P/I/D, such as 1=2/0/0,2=2/0/0 (each 0-20).")]
 SettleOption = Annotated[float, typer.Option(help="Seconds held before the motion, recorded.")]
@@ -92,6 +101,13 @@ def _option(name: str, field: FieldInfo) -> tuple[Any, Any]:
     default = field.get_default()
     if name == "amplitude":
         return Annotated[str, typer.Option(help="Degrees, or one a joint: 1=21.6,2=-10.")], f"{_degrees(default)}"
+    if name == "points":
+        text = "Degrees from the start, a point after the other: 10;20 or, one a joint, 1=10,2=5;1=20,2=0."
+        return Annotated[str, typer.Option(help=text)], inspect.Parameter.empty
+    if name == "times":
+        return Annotated[
+            str, typer.Option(help="Seconds at which the points are passed: 1,2.5.")
+        ], inspect.Parameter.empty
     if name in _ANGLES:
         return Annotated[str, typer.Option(help=f"In {_ANGLES[name]}.")], f"{_degrees(default)}"
     kind = field.annotation
@@ -109,6 +125,10 @@ def _trajectory(kind: type[BaseModel], values: dict[str, Any]) -> dict[str, Any]
     for name in kind.model_fields:
         if name == "amplitude":
             data[name] = parse_per_joint_angles(values[name], name)
+        elif name == "points":
+            data[name] = [parse_per_joint_angles(point, "point") for point in values[name].split(";")]
+        elif name == "times":
+            data[name] = [part.strip() for part in values[name].split(",")]
         elif name in _ANGLES:
             data[name] = parse_angle(values[name].removesuffix("/s"), name)
         elif name != "kind":
@@ -189,7 +209,9 @@ def from_file(
 @app.command("preset")
 def by_name(
     context: typer.Context,
-    name: Annotated[str, typer.Argument(help="Name of a preset; none lists them.")] = "",
+    name: Annotated[
+        str, typer.Argument(help="Name of a preset; none lists them.", autocompletion=completion.presets)
+    ] = "",
     folder: FolderOption = None,
     dry_run: DryRunOption = False,
     yes: YesOption = False,
@@ -199,6 +221,9 @@ def by_name(
     from daq.trajectories.presets import PRESETS, preset
 
     if not name:
+        if json:
+            print_json([{"name": known, "description": one.description} for known, one in PRESETS.items()])
+            return
         for known, one in PRESETS.items():
             print(f"{known:14s} {one.description}")
         return

@@ -13,7 +13,7 @@ import typer
 from daq.cli.consent import agreed, can_be_asked
 from daq.cli.context import Invocation, console, print_json
 from daq.cli.stop_keys import StopKeys
-from daq.contracts.errors import SafetyError
+from daq.contracts.errors import SafetyError, SpecError
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -68,6 +68,8 @@ def acquire(call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Pa
     from daq.acquisition.messages import Finished, Job
     from daq.transport import parse_port_url
 
+    if not str(folder).isprintable():
+        raise SpecError(f"folder {str(folder)!r}: a trace's folder has a name of printable characters")
     parse_port_url(call.port)  # a port that is none needs no process to say so
     job = Job(
         url=call.port,

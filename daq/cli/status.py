@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
 
 import typer
 
-from daq.cli.context import JsonOption, invocation, print_json
+from daq.cli.context import Invocation, JsonOption, invocation, print_json
 from daq.cli.robot import connected
 from daq.contracts.limp import limp_joints, limp_line
+
+if TYPE_CHECKING:
+    from daq.contracts.machine import Machine
+    from daq.contracts.status import StatusReport
+    from daq.driver import Controller
 
 app = typer.Typer(add_completion=False)
 
 
 @app.command()
 def status(context: typer.Context, json: JsonOption = False) -> None:
-    """Posture, state and link of the robot, read once."""
+    """Posture, state and link of the robot, read once; --json has the same fields here and at a server."""
     call = invocation(context)
     if call.server is not None:
         from daq.cli.remote.status import show_status
@@ -25,27 +31,57 @@ def status(context: typer.Context, json: JsonOption = False) -> None:
         return
     machine = call.settings.machine()
     with connected(call) as controller:
-        found = controller.status()
-        snapshot = controller.next_snapshot()
-        identity = controller.identity
-        gains = controller.gains()
-    joints = []
-    for joint, reading in snapshot.joints:
-        own = machine.calibration(joint)
-        angle, error = own.counts_to_rad(reading.position), own.rad_per_count * reading.error
-        joints.append(
-            {"joint": joint, "position": angle, "error": error, "set_point": own.posture_to_rad(reading.set_point)}
-        )
+        board, gains = controller.status(), controller.gains()
+        report = _report(call, machine, controller, limp_joints(gains))
     if json:
-        board = {"tick": found.tick, "flags": found.flags.name, "boots": found.boots, "missed": found.missed}
-        link = {"link": found.link, "counters": asdict(found.counters)}
-        print_json({"simulated": identity.simulated, **board, **link, "limp": limp_joints(gains), "joints": joints})
+        print_json(report.model_dump(mode="json"))
         return
-    kind = "mock" if identity.simulated else "REAL ARM"
-    state = ", ".join(flag.name.lower().replace("_", " ") for flag in found.flags if flag.name) or "no flags"
-    print(f"{kind}, tick {found.tick}, {state}; {found.missed} set points missed since power-up; link {found.link}")
-    for row in joints:
-        position, error, aim = (math.degrees(row[name]) for name in ("position", "error", "set_point"))
-        print(f"  joint {row['joint']}: {position:8.2f}°   set point {aim:8.2f}°   error {error:6.2f}°")
-    if limp_joints(gains):
+    state = ", ".join(flag.name.lower().replace("_", " ") for flag in board.flags if flag.name) or "no flags"
+    kind = "mock" if controller.identity.simulated else "REAL ARM"
+    print(f"{kind}, tick {board.tick}, {state}; {board.missed} set points missed since power-up; link {board.link}")
+    assert report.sample is not None
+    one = report.sample
+    for joint, *angles in zip(one.joints, one.position, one.set_point, one.error, strict=True):
+        position, aim, error = map(math.degrees, angles)
+        print(f"  joint {joint}: {position:8.2f}°   set point {aim:8.2f}°   error {error:6.2f}°")
+    if report.limp:
         print(limp_line(gains))
+
+
+def _report(call: Invocation, machine: Machine, controller: Controller, limp: list[int]) -> StatusReport:
+    """What the board says now, as a service would say it."""
+    from daq.contracts.service.robot import LinkStatus, RobotIdentity, Sample
+    from daq.contracts.status import StatusReport
+    from daq.runner.rows import RowMaker
+    from firmware_protocol.commands import StatusFlag
+
+    snapshot, now = controller.next_snapshot(), datetime.now(UTC)
+    joints = tuple(joint for joint, _ in snapshot.joints)
+    row = RowMaker(machine, joints, controller.period_s).row(snapshot)
+    identity, frozen = controller.identity, StatusFlag.FROZEN in snapshot.flags
+    return StatusReport(
+        robot=call.settings.robot.name,
+        machine=machine.name,
+        port=call.port,
+        connection="connected",
+        identity=RobotIdentity(
+            simulated=identity.simulated, protocol=identity.version, period=identity.period_s, boots=identity.boots
+        ),
+        arm="stopped" if frozen else "idle",
+        activity="none",
+        limp=tuple(limp),
+        sample=Sample(
+            tick=row.tick,
+            host_time=row.host_time,
+            utc=now.timestamp(),
+            age=0.0,
+            frozen=frozen,
+            joints=joints,
+            set_point=row.set_point,
+            position=row.position,
+            error=row.error,
+            drive=row.drive,
+        ),
+        link=LinkStatus(state=controller.status().link, counters=controller.counters.numbers(), age=0.0),
+        utc=now,
+    )

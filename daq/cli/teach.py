@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from daq.cli import teach_programs
+from daq.cli import completion, teach_programs
 from daq.cli.consent import agreed
 from daq.cli.context import Invocation, JsonOption, YesOption, console, invocation
 from daq.cli.quantities import parse_angle, parse_per_joint_angles
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from daq.teaching.program import Program
     from daq.teaching.program_plan import PlannedInstruction
 
+LONGEST_LEAD = 3600.0
+"""s for which an arm may be led in one go: somebody holds it."""
 Made = TypeVar("Made")
 
 app = typer.Typer(
@@ -202,7 +204,9 @@ def _perform(call: Invocation, program: Program, consent: bool) -> None:
 def lead(
     context: typer.Context,
     output: Annotated[Path, typer.Option("--output", "-o", help="Where the recorded path goes (.json).")],
-    joints: Annotated[str, typer.Option(help="Joints to be led: 1-3, 1,3 or 2.")] = "1-3",
+    joints: Annotated[
+        str, typer.Option(help="Joints to be led: 1-3, 1,3 or 2.", autocompletion=completion.joints)
+    ] = "1-3",
     seconds: Annotated[float | None, typer.Option(help="End by itself after so long; else with Enter.")] = None,
     yes: YesOption = False,
 ) -> None:
@@ -214,10 +218,15 @@ def lead(
     from daq.teaching import RecordedPath, lead_by_nose
     from daq.teaching.recording import save_path
 
+    if seconds is not None and not 0 < seconds <= LONGEST_LEAD:
+        raise SpecError(f"lead: --seconds {seconds:g}: allowed are above 0 to {LONGEST_LEAD:g}")
     if seconds is None and not sys.stdin.isatty():
         raise SpecError("lead: give --seconds, or a terminal in which Enter ends it")
+    if not output.name or output.is_dir():
+        raise SpecError(f"lead: {str(output)!r}: is no name for a file; nothing was begun")
     if not output.absolute().parent.is_dir():
         raise SpecError(f"lead: {output}: its folder does not exist; nothing was begun")
+    led = parse_joints(joints)
     call = invocation(context)
 
     def keep(path: RecordedPath) -> None:
@@ -227,7 +236,7 @@ def lead(
     if call.server is not None:
         from daq.cli.remote.teach import lead_at_server
 
-        lead_at_server(call, parse_joints(joints), seconds, keep, yes)
+        lead_at_server(call, led, seconds, keep, yes)
         return
     machine = call.settings.machine()
     with _owned(call, yes, lambda robot: _arm(robot, machine)) as (robot, arm):
@@ -239,7 +248,7 @@ def lead(
             return bool(select.select([sys.stdin], [], [], 0)[0])
 
         console().print("recording: lead the arm" + ("; Enter ends it" if seconds is None else f" for {seconds:g} s"))
-        lead_by_nose(arm, machine, machine.limits, parse_joints(joints), ended, keep)
+        lead_by_nose(arm, machine, machine.limits, led, ended, keep)
 
 
 @app.command()
@@ -256,12 +265,11 @@ def play(
     from pydantic import ValidationError
 
     from daq.cli.run_result import carry_out
+    from daq.contracts.documents import read_text
     from daq.teaching import RecordedPath, playback
 
     try:
-        path = RecordedPath.model_validate_json(file.read_text("utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise SpecError(f"path {file}: cannot be read: {error}") from error
+        path = RecordedPath.model_validate_json(read_text(file, f"path {file}"))
     except ValidationError as error:
         raise SpecError(f"path {file}: {error.errors()[0]['msg']}") from error
     spec = playback(path, rate, "playback")

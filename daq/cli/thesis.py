@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from daq.cli import completion
 from daq.cli.context import Invocation, JsonOption, console, invocation, print_json
 from daq.cli.model_input import ReportOption, read_traces
 
@@ -21,7 +22,10 @@ app = typer.Typer(add_completion=False)
 def thesis(
     context: typer.Context,
     trace: Annotated[
-        list[str] | None, typer.Option(help="Use this trace of the ramp instead of a new one. May be repeated.")
+        list[str] | None,
+        typer.Option(
+            help="Use this trace of the ramp instead of a new one. May be repeated.", autocompletion=completion.traces
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the mock's noise.")] = 1991,
     nelder_mead: Annotated[

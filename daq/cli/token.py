@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from daq.cli.context import Invocation, JsonOption, console, invocation, print_json
+from daq.contracts.documents import shown
+from daq.contracts.errors import SpecError
 
 if TYPE_CHECKING:
     from server.access.tokens import TokenStore
@@ -25,11 +27,9 @@ def add(
     ] = "viewer",
 ) -> None:
     """Make a token. It is shown this once; only its hash is kept."""
-    from daq.contracts.errors import SpecError
     from server.clock import SystemClock
 
-    if not 1 <= len(name) <= 64 or not name.isprintable():
-        raise SpecError(f"token {name!r}: a name has 1 to 64 printable characters")
+    _require_name(name)
     token = _tokens(invocation(context)).add(name, role, SystemClock().utc())
     console().print(f"token of {name} ({role}); it is not shown again:")
     print(token)
@@ -52,8 +52,14 @@ def revoke(context: typer.Context, name: NameArgument) -> None:
     """Revoke a token: it opens nothing any more, within two seconds."""
     from server.clock import SystemClock
 
+    _require_name(name)
     _tokens(invocation(context)).revoke(name, SystemClock().utc())
     print(f"token of {name} revoked")
+
+
+def _require_name(name: str) -> None:
+    if not 1 <= len(name) <= 64 or not name.isprintable():
+        raise SpecError(f"token {shown(name)}: a name has 1 to 64 printable characters")
 
 
 def _tokens(call: Invocation) -> TokenStore:

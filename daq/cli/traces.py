@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from daq.cli import completion
 from daq.cli.context import Invocation, JsonOption, console, invocation, print_json, print_table, printable
 from daq.contracts.errors import SpecError, TraceError
 
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
 app = typer.Typer(add_completion=False, help="List, show, plot, convert and verify traces.", no_args_is_help=True)
 
 TraceArgument = Annotated[
-    str, typer.Argument(help="A file, the beginning of a trace's number or name, or `last`.", show_default=True)
+    str,
+    typer.Argument(
+        help="A file, the beginning of a trace's number or name, or `last`.", autocompletion=completion.traces
+    ),
 ]
 FolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (default: the configured one).")]
 
@@ -165,12 +169,13 @@ def plot(
     trace: TraceArgument = "last",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="A .png, .svg, .pdf or .html file.")] = None,
     folder: FolderOption = None,
+    json: JsonOption = False,
 ) -> None:
     """Draw a trace: set point and position, error and drive of every joint."""
     from daq.traces.plot import plot_trace
 
     path, found = _read(context, trace, folder)
-    print(plot_trace(found, output or path.with_suffix(".png")))
+    _tell_file(path, plot_trace(found, output or path.with_suffix(".png")), as_json=json)
 
 
 @app.command("export")
@@ -181,12 +186,20 @@ def export(
         Path | None, typer.Option("--output", "-o", help="A .csv file; a .toml is put beside it.")
     ] = None,
     folder: FolderOption = None,
+    json: JsonOption = False,
 ) -> None:
     """Write a trace as plain CSV, with a TOML file for what columns cannot say."""
     from daq.cli.csv_output import write_csv
 
     path, found = _read(context, trace, folder)
-    print(write_csv(found, output or path.with_suffix(".csv")))
+    _tell_file(path, write_csv(found, output or path.with_suffix(".csv")), as_json=json)
+
+
+def _tell_file(made_from: Path, file: Path, *, as_json: bool) -> None:
+    if as_json:
+        print_json({"trace": made_from, "file": file})
+    else:
+        print(file)
 
 
 @app.command("import")
@@ -200,6 +213,7 @@ def import_(
         ),
     ],
     folder: FolderOption = None,
+    json: JsonOption = False,
 ) -> None:
     """Take in a trace of another rig or tool."""
     from daq.traces.csv_table import import_csv
@@ -210,7 +224,7 @@ def import_(
     if call.server is not None:
         from daq.cli.remote.traces import upload
 
-        upload(call, file)
+        upload(call, file, as_json=json)
         return
     place = _folder(call, folder)
     found = import_csv(file, call.trace_limits)
@@ -218,7 +232,11 @@ def import_(
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise TraceError(f"{place}: cannot be made: {error.strerror}") from error
-    print(write_trace(found, trace_path(place, found.record)))
+    made = write_trace(found, trace_path(place, found.record))
+    if json:
+        print_json({"trace": found.record.trace_id, "made_from": file, "file": made, "server": None})
+    else:
+        print(made)
 
 
 @app.command("verify")

@@ -169,7 +169,7 @@ def parse_url(text: str) -> str:
     """The address of a service, without a slash at its end. Raises SpecError."""
     try:
         url = httpx.URL(text)
-    except httpx.InvalidURL as error:
+    except (httpx.InvalidURL, UnicodeError) as error:
         raise SpecError(f"server {text!r}: {error}; write http://host:port") from error
     if url.scheme not in ("http", "https") or not url.host or url.query or url.fragment:
         raise SpecError(f"server {text!r}: is no address of a service; write http://host:port")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
 from firmware_protocol.errors import MemoryMapError
 from firmware_protocol.memory_map import MemoryMap, default_memory_map, parse_memory_map
@@ -13,9 +14,9 @@ def load_memory_map(path: Path | None) -> MemoryMap:
     """The memory map of a file, or the one that ships. Raises SpecError with one line."""
     if path is None:
         return default_memory_map()
+    text = read_text(path, f"memory map {path}")
+    parse_toml(text, str(path))  # bounds how long and how deep it may be
     try:
-        return parse_memory_map(path.read_text("utf-8"), str(path))
-    except (OSError, UnicodeDecodeError) as error:
-        raise SpecError(f"memory map {path}: cannot be read: {error}") from error
+        return parse_memory_map(text, str(path))
     except MemoryMapError as error:
         raise SpecError(str(error)) from error

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,6 +18,7 @@ from pydantic_settings import (
 
 from daq.config.limits import merged_limits
 from daq.config.service import ServiceSettings
+from daq.contracts.documents import parse_toml, read_text, shown
 from daq.contracts.errors import SpecError
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine, load_machine
@@ -119,21 +119,16 @@ def load_settings(explicit: Path | None = None) -> tuple[Settings, Path | None]:
     """
     asked_for = explicit is not None or "DAQ_CONFIG" in os.environ
     for path in config_files(explicit):
-        if path.is_file():
+        if os.path.isfile(path):  # Path.is_file raises for a name that is too long
             return _parse(path), path
         if asked_for:
-            raise SpecError(f"configuration {path}: {'is not a file' if path.exists() else 'no such file'}")
+            raise SpecError(f"configuration {path}: {'is not a file' if os.path.exists(path) else 'no such file'}")
     return _validated({}, "environment"), None
 
 
 def _parse(path: Path) -> Settings:
-    try:
-        data = tomllib.loads(path.read_text("utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise SpecError(f"configuration {path}: cannot be read: {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise SpecError(f"configuration {path}: not TOML: {error}") from error
-    return _validated(data, str(path))
+    what = f"configuration {path}"
+    return _validated(parse_toml(read_text(path, what), what), str(path))
 
 
 def _validated(data: dict[str, Any], origin: str) -> Settings:
@@ -142,6 +137,8 @@ def _validated(data: dict[str, Any], origin: str) -> Settings:
     except SettingsError as error:
         # An environment variable of a whole section must hold JSON; its name is in the error's text.
         raise SpecError(f"environment: {error}; write single keys, such as DAQ_ROBOT__PORT") from error
+    except RecursionError:
+        raise SpecError("environment: a section is nested too deeply; write keys, such as DAQ_ROBOT__PORT") from None
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
@@ -149,7 +146,7 @@ def _validated(data: dict[str, Any], origin: str) -> Settings:
         if first["type"] == "extra_forbidden":
             message = f"no such key; allowed here: {', '.join(_keys_at(first['loc'][:-1]))}"
         where = _variable_of(first["loc"]) or f"configuration {origin}"
-        value = "" if isinstance(first["input"], dict) else f" = {first['input']!r}"
+        value = "" if isinstance(first["input"], dict) else f" = {shown(first['input'])}"
         raise SpecError(f"{where}: {key}{value}: {message}") from error
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool, ValidationError, model_validator
 
+from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 
 JOINTS = 6
@@ -17,6 +18,12 @@ DEFAULT_AMPLITUDE = math.radians(21.6)
 """21.6°, that is 80 posture units (section 6.5 of the source)."""
 DEFAULT_RAMP_TIME = 0.65
 """Duration of the ramp in s (section 6.5)."""
+
+LONGEST_SHOWN = 60
+"""Characters of a wrong text that an error repeats whole."""
+
+MOST_POINTS = 1_000_000
+"""Points of a path: four hours of set points at 50 Hz are 720 000."""
 
 Duration = Annotated[FiniteFloat, Field(gt=0, le=3600)]
 Hold = Annotated[FiniteFloat, Field(ge=0, le=3600)]
@@ -86,7 +93,7 @@ class Multisine(_Part):
     lowest: Annotated[FiniteFloat, Field(gt=0, le=25)] = 0.1
     highest: Annotated[FiniteFloat, Field(gt=0, le=25)] = 2.0
     tones: Annotated[int, Field(ge=1, le=100)] = 10
-    seed: Annotated[int, Field(ge=0)] = 1
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -103,6 +110,41 @@ class Cubic(_Part):
     duration: Duration = 1.0
 
 
+class Via(_Part):
+    """Cubic segments through via points to the last one, at rest at both ends (section 3.7.1).
+
+    `points` are angles (rad) from the start, one for all joints or one a joint; `times` (s) from the start when each is
+    passed, the last being the end. Position, velocity and acceleration are continuous.
+    """
+
+    kind: Literal["via"] = "via"
+    points: Annotated[tuple[Amplitude, ...], Field(min_length=1, max_length=1000)]
+    times: Annotated[tuple[Duration, ...], Field(min_length=1, max_length=1000)]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if len(self.times) != len(self.points):
+            raise ValueError(f"{len(self.times)} times for {len(self.points)} points")
+        if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
+            raise ValueError("times must increase strictly")
+        return self
+
+
+class PickAndPlace(_Part):
+    """Straight up by `lift` m, over to `amplitude` from the start, straight down: a 4-3-4 trajectory (section 3.7.2).
+
+    The lift-off and set-down points are `lift` above the ends; in between joints move by polynomials of orders 4, 3 and
+    4 in `pick`, `travel` and `place` s. Position, velocity and acceleration are continuous, and both ends at rest.
+    """
+
+    kind: Literal["pick_and_place"] = "pick_and_place"
+    amplitude: Amplitude = DEFAULT_AMPLITUDE
+    lift: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.05
+    pick: Duration = 1.0
+    travel: Duration = 2.0
+    place: Duration = 1.0
+
+
 class Path(_Part):
     """A recorded or designed path: absolute angles (rad) of the experiment's joints at times (s), linear between.
 
@@ -110,8 +152,8 @@ class Path(_Part):
     """
 
     kind: Literal["path"] = "path"
-    times: Annotated[tuple[FiniteFloat, ...], Field(min_length=2)]
-    positions: Annotated[tuple[tuple[Angle, ...], ...], Field(min_length=2)]
+    times: Annotated[tuple[FiniteFloat, ...], Field(min_length=2, max_length=MOST_POINTS)]
+    positions: Annotated[tuple[tuple[Angle, ...], ...], Field(min_length=2, max_length=MOST_POINTS)]
     """One row a time, one column a joint."""
 
     @model_validator(mode="after")
@@ -131,7 +173,7 @@ class Pause(_Part):
 
 
 Simple = Annotated[
-    Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Pause, Field(discriminator="kind")
+    Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | Pause, Field(discriminator="kind")
 ]  # fmt: skip
 
 
@@ -150,7 +192,8 @@ class Sequence(_Part):
 
 
 Trajectory = Annotated[
-    Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Path | Pause | Sequence, Field(discriminator="kind")
+    Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | PickAndPlace | Path | Pause | Sequence,
+    Field(discriminator="kind"),
 ]  # fmt: skip
 
 
@@ -186,9 +229,11 @@ class ExperimentSpec(_Part):
         for move, joints in moves:
             if not set(joints) <= set(self.joints):
                 raise ValueError(f"a segment moves joints {list(joints)}, the experiment has {list(self.joints)}")
-            amplitude = getattr(move, "amplitude", None)
-            if isinstance(amplitude, dict) and set(amplitude) != set(joints):
-                raise ValueError(f"amplitude is given for joints {sorted(amplitude)}, the motion is on {list(joints)}")
+            given = move.points if isinstance(move, Via) else (getattr(move, "amplitude", None),)
+            for amplitude in given:
+                if isinstance(amplitude, dict) and set(amplitude) != set(joints):
+                    what = "a point" if isinstance(move, Via) else "amplitude"
+                    raise ValueError(f"{what} is given for joints {sorted(amplitude)}, the motion is on {list(joints)}")
         if isinstance(self.trajectory, Path) and len(self.trajectory.positions[0]) != len(self.joints):
             columns = len(self.trajectory.positions[0])
             raise ValueError(f"the path has {columns} columns for {len(self.joints)} joints")
@@ -219,8 +264,8 @@ def _one_line(error: ValidationError) -> str:
     bound = next((first.get("ctx", {})[key] for key in ("le", "ge") if key in first.get("ctx", {})), None)
     if bound is not None and math.isclose(abs(bound), 2 * math.pi) and isinstance(value, int | float):
         message, value = "must lie between -360° and 360°", f"{math.degrees(value):g}°"
-    elif not isinstance(value, str):
-        value = repr(value)
+    elif not isinstance(value, str) or len(value) > LONGEST_SHOWN:
+        value = shown(value)
     given = "" if isinstance(first["input"], dict | BaseModel) else f" (got {value})"
     return f"{': '.join(['.'.join(where)] * bool(where) + [message])}{given}"
 
@@ -229,7 +274,7 @@ def parse_joints(text: str) -> tuple[int, ...]:
     """Joint numbers from `1-3`, `1,3` or `1-2,5`. Raises SpecError for anything else."""
     joints: set[int] = set()
     for part in text.split(","):
-        match = re.fullmatch(r"\s*(\d+)\s*(?:-\s*(\d+)\s*)?", part)
+        match = re.fullmatch(r"\s*(\d{1,4})\s*(?:-\s*(\d{1,4})\s*)?", part)
         if match is None:
             raise SpecError(f"joints {text!r}: write 1-3, 1,3 or 2; joints are 1 to {JOINTS}")
         first = int(match[1])

@@ -6,7 +6,7 @@ Every number carries its unit and its source, and says where it is an assumption
 
 from __future__ import annotations
 
-import tomllib
+import os
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
 from daq.contracts.limits import Limits
 from daq.contracts.quantity import (
@@ -215,9 +216,7 @@ class Machine(_Part):
 def parse_machine(text: str, origin: str = "machine file") -> Machine:
     """A machine from TOML text; `origin` names the file in errors. Raises SpecError with one line."""
     try:
-        return Machine.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise SpecError(f"{origin}: not TOML: {error}") from error
+        return Machine.model_validate(parse_toml(text, origin))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part + 1 if isinstance(part, int) else part) for part in first["loc"]) or "machine"
@@ -229,11 +228,10 @@ def load_machine(name_or_path: str) -> Machine:
     if name_or_path in shipped_machines():
         return _shipped(name_or_path)
     path = Path(name_or_path)
-    try:
-        return parse_machine(path.read_text("utf-8"), str(path))
-    except (OSError, UnicodeDecodeError) as error:
+    if not os.path.lexists(path):
         known = ", ".join(shipped_machines())
-        raise SpecError(f"machine {name_or_path!r}: no such file, and not one of those that ship: {known}") from error
+        raise SpecError(f"machine {name_or_path!r:.200}: no such file, and not one of those that ship: {known}")
+    return parse_machine(read_text(path, f"machine file {path}"), str(path))
 
 
 def shipped_machines() -> tuple[str, ...]:

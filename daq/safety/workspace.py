@@ -9,9 +9,9 @@ import numpy as np
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Floats
-from daq.safety.kinematics import link_ends
 from daq.safety.violation import TOLERANCE, Violation
 from daq.trajectories import Plan
+from daq.trajectories.kinematics import link_ends
 
 FINEST_LOOK = math.radians(1.0)
 """Between set points that are further apart than this (rad, or m) it is looked at in between too."""

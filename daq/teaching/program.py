@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool, ValidationError
 
+from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import Angle, Duration, JointNumber
 from daq.teaching.files import write_whole
-from daq.teaching.recording import FASTEST_RATE, RecordedPath
+from daq.teaching.recording import FASTEST_RATE, SLOWEST_RATE, RecordedPath
 from daq.trajectories import MOVE_SPEED
 
 NAME = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}"
@@ -48,7 +48,7 @@ class PlayPath(_Part):
 
     kind: Literal["path"] = "path"
     path: RecordedPath
-    rate: Annotated[FiniteFloat, Field(gt=0, le=FASTEST_RATE)] = 1.0
+    rate: Annotated[FiniteFloat, Field(ge=SLOWEST_RATE, le=FASTEST_RATE)] = 1.0
 
 
 class Wait(_Part):
@@ -101,10 +101,8 @@ def parse_program(text: str, origin: str = "program") -> Program:
     """A program from JSON, or from TOML when `origin` ends in `.toml`. Raises SpecError with one line."""
     try:
         if origin.endswith(".toml"):
-            return Program.model_validate(tomllib.loads(text))
+            return Program.model_validate(parse_toml(text, origin))
         return Program.model_validate_json(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SpecError(f"{origin}: not TOML: {error}") from error
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part + 1 if isinstance(part, int) else part) for part in first["loc"]) or "program"
@@ -118,10 +116,7 @@ def program_text(program: Program) -> str:
 
 def load_program(path: Path) -> Program:
     """The program of a file. Raises SpecError with one line."""
-    try:
-        return parse_program(path.read_text("utf-8"), str(path))
-    except (OSError, UnicodeDecodeError) as error:
-        raise SpecError(f"{path}: cannot be read: {error}") from error
+    return parse_program(read_text(path, f"program {path}"), str(path))
 
 
 def save_program(program: Program, path: Path) -> None:

@@ -12,6 +12,8 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import Angle, ExperimentSpec, JointNumber, Path
 from daq.teaching.files import write_whole
 
+SLOWEST_RATE = 0.01
+"""Lowest factor by which a path may be played: a minute then takes more than an hour and a half."""
 FASTEST_RATE = 10.0
 """Highest factor by which a path may be played faster than it was led: limits decide earlier."""
 
@@ -72,10 +74,10 @@ def playback(path: RecordedPath, rate: float = 1.0, name: str | None = None) -> 
     """The experiment that plays a path `rate` times as fast as it was led: a slow move to its start, then the path.
 
     It is planned, checked, watched and recorded as any other; there is no limit of 60 s. Raises SpecError for a rate
-    that is not above 0 and at most FASTEST_RATE.
+    outside SLOWEST_RATE to FASTEST_RATE.
     """
-    if not 0 < rate <= FASTEST_RATE:
-        raise SpecError(f"rate of {rate}: must be above 0 and at most {FASTEST_RATE:g}")
+    if not SLOWEST_RATE <= rate <= FASTEST_RATE:
+        raise SpecError(f"rate of {rate}: allowed are {SLOWEST_RATE:g} to {FASTEST_RATE:g}")
     times = tuple(time / rate for time in path.times)
     return ExperimentSpec(trajectory=Path(times=times, positions=path.positions), joints=path.joints, name=name)
 

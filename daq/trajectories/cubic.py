@@ -6,7 +6,7 @@ import numpy as np
 
 from daq.contracts.experiment import Cubic
 from daq.contracts.trace import Floats
-from daq.trajectories.piece import Piece, sample_times, smooth_piece
+from daq.trajectories.piece import Piece, require_sampled, sample_times, smooth_piece
 from daq.trajectories.set_points import Mark
 
 PEAK_SPEED = 1.5
@@ -15,6 +15,7 @@ PEAK_SPEED = 1.5
 
 def cubic(move: Cubic, amplitudes: Floats, period: float) -> Piece:
     """Through amplitudes (k,) rad in `duration`, all joints together."""
+    require_sampled(move.duration, period, "cubic: duration")
     fraction = rest_to_rest(sample_times(move.duration, period) / move.duration)
     marks = (Mark(0, "ramp_start", "cubic starts"), Mark(len(fraction), "ramp_end", "cubic ends"))
     return smooth_piece(fraction[:, None] * amplitudes, marks)

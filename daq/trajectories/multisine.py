@@ -6,11 +6,14 @@ import math
 
 import numpy as np
 
+from daq.contracts.errors import SpecError
 from daq.contracts.experiment import Multisine
 from daq.contracts.trace import Floats
-from daq.trajectories.piece import Piece, sample_times, smooth_piece
+from daq.trajectories.piece import Piece, require_sampled, sample_times, smooth_piece
 from daq.trajectories.set_points import Mark
 
+LEAST_PART = 0.01
+"""Part of its period that the lowest sine must have in the duration: of less no change is seen."""
 FADE = 0.1
 """Fraction of the duration over which the sum is faded in, and out again, by half a cosine."""
 
@@ -21,6 +24,13 @@ def multisine(move: Multisine, joints: tuple[int, ...], amplitudes: Floats, peri
     Every joint has phases of its own, drawn from the seed and the joint's number, so that leaving a joint out does not
     change the others.
     """
+    require_sampled(move.duration, period, "multisine: duration")
+    require_sampled(1.0 / move.highest, period, f"multisine: period of the highest frequency, {move.highest:g} Hz", 2)
+    if move.lowest * move.duration < LEAST_PART:
+        raise SpecError(
+            f"multisine: lowest frequency of {move.lowest:g} Hz: less than a hundredth of its period fits into "
+            f"{move.duration:g} s: allowed are {LEAST_PART / move.duration:g} Hz and more"
+        )
     time = sample_times(move.duration, period)
     frequencies = np.linspace(move.lowest, move.highest, move.tones)
     offsets = np.empty((len(time), len(joints)))

@@ -40,8 +40,19 @@ def periods_in(duration: float, period: float) -> int:
     """Control periods until `duration` (s) is over, at least one. Raises SpecError when it is longer than LONGEST."""
     if duration > LONGEST:
         hours = duration / 3600
-        raise SpecError(f"experiment: it would take {hours:.1f} h, at most {LONGEST / 3600:.0f} h are allowed")
+        raise SpecError(f"experiment: it would take {hours:.3g} h, at most {LONGEST / 3600:.0f} h are allowed")
     return max(1, math.ceil(duration / period - TIME_TOLERANCE))
+
+
+def require_sampled(duration: float, period: float, what: str, least: int = 1) -> None:
+    """Raises SpecError for a time shorter than `least` control periods: set points cannot show it.
+
+    Two are the least of an oscillation (Nyquist); of anything else one, or it would be a step.
+    """
+    if duration < (least - TIME_TOLERANCE) * period:
+        shortest = f"{least * period * 1e3:g} ms" + (" (two control periods)" if least == 2 else " (a control period)")
+        raise SpecError(f"{what}: {duration:g} s is too short for a set point every {period * 1e3:g} ms: "
+                        f"allowed are {shortest} and more")  # fmt: skip
 
 
 def sample_times(duration: float, period: float) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence as Several
 from dataclasses import replace
 
@@ -9,11 +10,13 @@ import numpy as np
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import (
+    Amplitude,
     Cubic,
     ExperimentSpec,
     Multisine,
     Path,
     Pause,
+    PickAndPlace,
     Ramp,
     Segment,
     Sequence,
@@ -21,7 +24,7 @@ from daq.contracts.experiment import (
     SlowRamp,
     Staircase,
     Step,
-    Trajectory,
+    Via,
 )
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Floats
@@ -30,6 +33,7 @@ from daq.trajectories.move import move_piece
 from daq.trajectories.multisine import multisine
 from daq.trajectories.path import path
 from daq.trajectories.pause import pause
+from daq.trajectories.pick_and_place import pick_and_place
 from daq.trajectories.piece import Piece, smooth_piece
 from daq.trajectories.ramp import ramp
 from daq.trajectories.sequence import joined, spread
@@ -38,6 +42,10 @@ from daq.trajectories.sine import sine
 from daq.trajectories.slow_ramp import slow_ramp
 from daq.trajectories.staircase import staircase
 from daq.trajectories.step import step
+from daq.trajectories.via import via
+
+Relative = Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | Pause
+"""Motions that say where to go from where they begin, whatever the machine."""
 
 
 def start_angles(spec: ExperimentSpec, machine: Machine) -> tuple[float, ...]:
@@ -67,7 +75,12 @@ def plan(spec: ExperimentSpec, machine: Machine, start: Several[float]) -> Plan:
     begin = snapped(machine, start)
     columns = [joint - 1 for joint in spec.joints]
     unit = np.array([abs(machine.calibration(joint).rad_per_posture_unit) for joint in spec.joints])
-    motion = _piece(spec.trajectory, spec.joints, begin[columns], unit, period)
+    if isinstance(spec.trajectory, PickAndPlace):
+        reached = _angles(spec.trajectory.amplitude, spec.joints)
+        motion = pick_and_place(spec.trajectory, machine, spec.joints, begin, reached, period)
+    else:
+        motion = _piece(spec.trajectory, spec.joints, begin[columns], unit, period)
+    _require_motion(spec, motion, unit)
     whole = _with_repeats(spec, motion, period)
     whole = spread(whole, columns, len(begin))
     angles = np.concatenate([begin[None, :], begin + whole.offsets])
@@ -76,9 +89,20 @@ def plan(spec: ExperimentSpec, machine: Machine, start: Several[float]) -> Plan:
     return make_plan(machine, spec.joints, angles, jumps, (ends[0], *whole.marks, ends[1]))
 
 
+def _require_motion(spec: ExperimentSpec, motion: Piece, unit: Floats) -> None:
+    """Raises SpecError for amplitudes that no set point can show. A recorded path may be of an arm at rest."""
+    moved = np.abs(motion.offsets).max(axis=0, initial=0.0)
+    if isinstance(spec.trajectory, Path) or not moved.any() or (moved >= unit / 2).any():
+        return
+    raise SpecError(
+        f"amplitude: no joint would move by as much as half a set point ({math.degrees(unit.max() / 2):.3g}°): give a "
+        "larger one, or 0 to record the arm at rest"
+    )
+
+
 def _with_repeats(spec: ExperimentSpec, motion: Piece, period: float) -> Piece:
     count = len(spec.joints)
-    settle, hold = pause(spec.settle, count, period), pause(spec.hold, count, period)
+    settle, hold = pause(spec.settle, count, period, "settle"), pause(spec.hold, count, period, "hold")
     end = motion.offsets[-1] if len(motion.offsets) else np.zeros(count)
     back = move_piece(-end, period)
     pieces: list[Piece] = []
@@ -91,7 +115,9 @@ def _with_repeats(spec: ExperimentSpec, motion: Piece, period: float) -> Piece:
     return joined(pieces, count, period)
 
 
-def _piece(move: Trajectory, joints: tuple[int, ...], start: Floats, within: Floats, period: float) -> Piece:
+def _piece(
+    move: Relative | Path | Sequence, joints: tuple[int, ...], start: Floats, within: Floats, period: float
+) -> Piece:
     if isinstance(move, Path):
         return path(move, joints, start, within, period)
     if isinstance(move, Sequence):
@@ -105,13 +131,12 @@ def _segment_piece(segment: Segment, joints: tuple[int, ...], period: float) -> 
     return spread(_simple_piece(segment.move, own, period), columns, len(joints))
 
 
-def _simple_piece(
-    move: Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Pause, joints: tuple[int, ...], period: float
-) -> Piece:
+def _simple_piece(move: Relative, joints: tuple[int, ...], period: float) -> Piece:
     if isinstance(move, Pause):
         return pause(move.duration, len(joints), period)
-    given = move.amplitude
-    amplitudes = np.array([given[joint] if isinstance(given, dict) else given for joint in joints])
+    if isinstance(move, Via):
+        return _of_one_joint(via(move, np.stack([_angles(point, joints) for point in move.points]), period), joints)
+    amplitudes = _angles(move.amplitude, joints)
     match move:
         case Ramp():
             piece = ramp(move, amplitudes, period)
@@ -127,6 +152,16 @@ def _simple_piece(
             piece = multisine(move, joints, amplitudes, period)
         case Cubic():
             piece = cubic(move, amplitudes, period)
+    return _of_one_joint(piece, joints)
+
+
+def _angles(given: Amplitude, joints: tuple[int, ...]) -> Floats:
+    """(k,) rad, in the order of the joints."""
+    return np.array([given[joint] if isinstance(given, dict) else given for joint in joints])
+
+
+def _of_one_joint(piece: Piece, joints: tuple[int, ...]) -> Piece:
+    """The marks of one joint alone say so."""
     if len(joints) > 1:
         return piece
     return replace(piece, marks=tuple(replace(mark, joint=joints[0]) for mark in piece.marks))

@@ -8,7 +8,7 @@ import numpy as np
 
 from daq.contracts.experiment import Sine
 from daq.contracts.trace import Floats
-from daq.trajectories.piece import Piece, sample_times, smooth_piece
+from daq.trajectories.piece import Piece, require_sampled, sample_times, smooth_piece
 from daq.trajectories.set_points import Mark
 
 
@@ -18,6 +18,8 @@ def sine(move: Sine, amplitudes: Floats, period: float) -> Piece:
     A lag is a later start: a joint stands still until its own sine begins, and again after it, so that no set point
     jumps. With a negative phase the last joint of the list goes first.
     """
+    require_sampled(move.period, period, "sine: period", least=2)
+    require_sampled(move.cycles * move.period, period, "sine: cycles × period")
     lags = np.arange(len(amplitudes)) * move.phase / (2 * math.pi) * move.period
     lags -= lags.min()
     length = move.cycles * move.period

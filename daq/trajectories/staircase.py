@@ -6,7 +6,7 @@ import numpy as np
 
 from daq.contracts.experiment import Staircase
 from daq.contracts.trace import Floats
-from daq.trajectories.piece import Piece, periods_in
+from daq.trajectories.piece import Piece, periods_in, require_sampled
 from daq.trajectories.set_points import Mark
 
 
@@ -14,6 +14,8 @@ def staircase(move: Staircase, amplitudes: Floats, period: float) -> Piece:
     """`steps` steps through amplitudes (k,) rad, `dwell` s on each, the last one down ending where it began."""
     up = np.arange(1, move.steps + 1) / move.steps
     levels = np.concatenate([up, up[-2::-1], [0.0]]) if move.back else up
+    require_sampled(move.dwell, period, "staircase: dwell")
+    periods_in(len(levels) * move.dwell, period)  # too long is refused before it fills the memory
     dwell = periods_in(move.dwell, period)
     jumps = np.zeros(len(levels) * dwell, dtype=np.bool_)
     jumps[::dwell] = True

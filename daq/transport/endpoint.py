@@ -143,7 +143,7 @@ def _connect_tcp(port: TcpPort) -> ByteChannel:
         connection = socket.create_connection((port.host, port.port), CONNECT_TIMEOUT_S)
     except ConnectionRefusedError as error:
         raise TransportError(f"nothing listens at {where}: is the bridge, or the mock, running there?") from error
-    except OSError as error:
+    except (OSError, UnicodeError) as error:  # a host name that cannot be one is a UnicodeError
         raise TransportError(f"{where} cannot be reached: {error}") from error
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return DescriptorChannel(connection.fileno(), where, connection.close)

@@ -123,7 +123,7 @@ def _tcp(text: str, address: str, path: str, options: Mapping[str, str]) -> TcpP
     host, _, port = address.rpartition(":")
     if not host or path not in ("", "/"):
         raise PortUrlError(f"port {text!r}: needs a host and a port number, as in tcp://127.0.0.1:4000")
-    if not port.isdecimal() or not 1 <= int(port) <= 65535:
+    if not (port.isdecimal() and len(port) <= 5 and 1 <= int(port) <= 65535):
         raise PortUrlError(f"port {text!r}: port number {port!r}: allowed are 1 to 65535")
     return TcpPort(
         host.strip("[]"), int(port), _baud(text, options), _flag(text, "lock_step", options.get("lock_step"))
@@ -148,7 +148,7 @@ def _mock(text: str, options: list[tuple[str, str]]) -> MockPort:
 
 def _baud(text: str, options: Mapping[str, str]) -> int:
     baud = options.get("baud", str(DEFAULT_BAUD))
-    if not baud.isdecimal() or int(baud) not in BAUD_RATES:
+    if baud not in map(str, BAUD_RATES):
         allowed = ", ".join(str(rate) for rate in BAUD_RATES)
         raise PortUrlError(f"port {text!r}: baud {baud!r}: allowed are {allowed}")
     return int(baud)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from daq.contracts.documents import parse_json, read_text
 from daq.contracts.errors import SpecError
 from model.fitting.options import FitOptions
 from model.identifiability.report import IdentifiabilityReport, Verdict
@@ -101,20 +101,15 @@ class FitResult(_Part):
 def is_result(path: Path) -> bool:
     """Whether a file is a fit's result rather than a model alone, as far as can be told without reading it as one."""
     try:
-        data = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError):
+        data = parse_json(read_text(path, str(path)), str(path))
+    except SpecError:
         return False
     return isinstance(data, dict) and "identifiability" in data
 
 
 def load_result(path: Path) -> FitResult:
     """A saved fit. Raises SpecError for no such file, another kind of file, or one of a newer version."""
-    try:
-        data = json.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise SpecError(f"{path}: cannot be read: {error.strerror}") from error
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise SpecError(f"{path}: not JSON, so not the result of a fit") from error
+    data = parse_json(read_text(path, str(path)), str(path))
     version = data.get("format") if isinstance(data, dict) else None
     if isinstance(version, int) and version > RESULT_FORMAT:
         raise SpecError(f"{path}: format {version} is newer than this program reads ({RESULT_FORMAT}); update it")

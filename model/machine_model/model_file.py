@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from daq.contracts.documents import parse_json, read_text, shown
 from daq.contracts.errors import SpecError
 from model.machine_model.model import MODEL_FORMAT, Model
 
@@ -26,12 +26,7 @@ def load_model(path: Path) -> Model:
 
     Raises SpecError, in one line, for no such file, another kind of file, or a model of a newer version.
     """
-    try:
-        data = json.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise SpecError(f"model {path}: cannot be read: {error.strerror}") from error
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise SpecError(f"model {path}: is not JSON, so not a model") from error
+    data = parse_json(read_text(path, f"model {path}"), f"model {path}")
     if isinstance(data, dict) and isinstance(data.get("model"), dict):
         data = data["model"]
     if not isinstance(data, dict) or "machine" not in data:
@@ -47,7 +42,7 @@ def load_model(path: Path) -> Model:
 
 def _check_version(path: Path, version: Any) -> None:
     if not isinstance(version, int) or version < 1:
-        raise SpecError(f"model {path}: says no version (format {version!r})")
+        raise SpecError(f"model {path}: says no version (format {shown(version)})")
     if version > MODEL_FORMAT:
         raise SpecError(
             f"model {path}: has format {version}, this version of the program reads up to {MODEL_FORMAT}; update it"

@@ -79,6 +79,8 @@ class Engine:
             _ready.add(name)
 
 
+_announced: list[str] = []
+"""The run whose compilation this process has told of: other runs and other kinds of numbers follow without a line."""
 _ready: set[tuple[str, np.dtype[Any]]] = set()
 """Runs that this process has compiled or loaded."""
 
@@ -91,7 +93,8 @@ class _Announcement(Listener):
 
     def on_start(self, event: Any) -> None:
         """A line when the run itself is compiled, none for what it calls."""
-        if event.data["dispatcher"] is self._run:
+        if event.data["dispatcher"] is self._run and not _announced:
+            _announced.append(self._run.__name__)
             sys.stderr.write("Compiling the simulation for this machine, once: some 20 s\n")
             sys.stderr.flush()
 

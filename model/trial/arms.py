@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from hashlib import sha256
 
+from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 
 KINDS: dict[str, int] = {"clean": 1, "single": 2, "open-set": 3, "pair": 4, "shared": 5, "wrong-priors": 6}
@@ -13,23 +14,31 @@ LOADS: dict[str, int] = {"nominal": 0, "light": 1, "heavy": 2}
 """Announced loads and their digit."""
 LOAD_CYCLE = ("nominal", "nominal", "nominal", "light", "heavy")
 """Loads in turn, by number."""
+LARGEST_NUMBER = 10**15
+"""Largest number of an arm: those that a commit draws have 48 bits."""
+MOST_NUMBERS = 100_000
+"""Arms of one trial: a case takes a minute, so this is months."""
 _FIRST_DRAWN = 10**6
 """Numbers below are for tuning and tests."""
 
 
 def parse_numbers(text: str) -> list[int]:
     """Numbers of arms from `FIRST:LAST` (both included) or `1,2,5`. Raises SpecError."""
+    refusal = f"seeds {shown(text)}: write FIRST:LAST or numbers with commas, from 0 to {LARGEST_NUMBER}"
     try:
-        if ":" in text:
-            first, last = (int(part) for part in text.split(":"))
-            numbers = list(range(first, last + 1))
-        else:
-            numbers = [int(part) for part in text.split(",")]
+        first, *others = (int(part) for part in text.split(":" if ":" in text else ","))
     except ValueError:
-        numbers = []
-    if not numbers or min(numbers) < 0:
-        raise SpecError(f"seeds {text!r}: write FIRST:LAST or numbers with commas, from 0 on")
-    return numbers
+        raise SpecError(refusal) from None
+    named = (first, *others)
+    if min(named) < 0 or max(named) > LARGEST_NUMBER:
+        raise SpecError(refusal)
+    if ":" not in text:
+        return list(named)
+    if len(named) != 2 or first > named[1]:
+        raise SpecError(refusal)
+    if (count := named[1] - first + 1) > MOST_NUMBERS:
+        raise SpecError(f"seeds {shown(text)}: {count} arms; at most {MOST_NUMBERS} are taken at once")
+    return list(range(first, named[1] + 1))
 
 
 def parse_choice(text: str, allowed: Iterable[str], what: str) -> tuple[str, ...]:

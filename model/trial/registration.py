@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
+from daq.contracts.documents import parse_toml
 from daq.contracts.errors import SpecError
 from model.trial.arms import KINDS, LOAD_CYCLE, LOADS, drawn_arms
 from model.trial.truth import DETECTABLE
@@ -98,9 +98,7 @@ class Registration(_Part):
 def parse_registration(text: str, origin: str) -> Registration:
     """A registration from TOML. Raises SpecError with one line."""
     try:
-        return Registration.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise SpecError(f"{origin}: no TOML: {error}") from error
+        return Registration.model_validate(parse_toml(text, origin))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])

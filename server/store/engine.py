@@ -13,12 +13,11 @@ from typing import Any
 
 from alembic import command
 from alembic.config import Config
-from sqlalchemy import Engine, create_engine, event, text
-from sqlalchemy.engine import make_url
+from sqlalchemy import Engine, event, text
 from sqlalchemy.exc import DatabaseError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 
-from daq.contracts.errors import DaqError
+from server.store.address import StoreError, open_engine, parse_address
 from server.store.damage import require_sound
 from server.store.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
 
@@ -28,24 +27,24 @@ MAPPED = 256 << 20
 """Bytes of the file that are read in place: a search through 100 000 traces takes a fifth less."""
 
 
-class StoreError(DaqError):
-    """The database cannot be opened or brought up to date."""
-
-    exit_code = 2
+__all__ = ["Store", "StoreError", "migrations"]
 
 
 class Store:
     """One database. Sessions may be had from any thread; one writes at a time."""
 
     def __init__(self, url: str) -> None:
-        parsed = make_url(url)
+        parsed = parse_address(url)
         if parsed.get_backend_name() == "sqlite" and parsed.database:
-            Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+            try:
+                Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise StoreError(f"database {parsed.database}: its folder cannot be made: {error.strerror}") from error
             with suppress(OSError):  # SQLite says it better
                 # For nobody else to read, and what SQLite puts beside it likewise: the hashes of tokens are in it.
                 os.close(os.open(parsed.database, os.O_CREAT | os.O_RDWR, 0o600))
         self.url = url
-        self.engine: Engine = create_engine(url)
+        self.engine: Engine = open_engine(url)
         if parsed.get_backend_name() == "sqlite":
             event.listen(self.engine, "connect", _safe_and_shared)
             event.listen(self.engine, "begin", _begin)
@@ -68,11 +67,11 @@ class Store:
                 connection.commit()
         except OperationalError as error:
             line = line_of(error)
-            raise StoreError(f"database {self.url}: cannot be opened: {line}; {advice_of(line)}") from error
+            raise StoreError(f"database {self.engine.url}: cannot be opened: {line}; {advice_of(line)}") from error
         except DatabaseError as error:
-            raise StoreError(f"database {self.url}: {line_of(error)}; {BRING_BACK}") from error
+            raise StoreError(f"database {self.engine.url}: {line_of(error)}; {BRING_BACK}") from error
         except Exception as error:
-            line = f"database {self.url}: its tables cannot be brought up to date: {one_line(error)}"
+            line = f"database {self.engine.url}: its tables cannot be brought up to date: {one_line(error)}"
             raise StoreError(f"{line}; {BRING_BACK}") from error
 
     @contextmanager

@@ -7,9 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from sqlalchemy.engine import make_url
-
 from daq.contracts.errors import DaqError
+from server.store.address import parse_address
 
 
 class InUseError(DaqError):
@@ -19,8 +18,8 @@ class InUseError(DaqError):
 
 
 def sqlite_file(url: str) -> Path | None:
-    """The file of a SQLite database; None for any other, and for one in memory."""
-    parsed = make_url(url)
+    """The file of a SQLite database; None for any other, and for one in memory. Raises StoreError."""
+    parsed = parse_address(url)
     return Path(parsed.database) if parsed.get_backend_name() == "sqlite" and parsed.database else None
 
 

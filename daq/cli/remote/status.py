@@ -7,6 +7,7 @@ import math
 from daq.cli.context import Invocation, print_json
 from daq.cli.remote.robot import remote_robot
 from daq.contracts.limp import limp_line
+from daq.contracts.status import report_of
 
 
 def show_status(call: Invocation, as_json: bool) -> None:
@@ -15,7 +16,8 @@ def show_status(call: Invocation, as_json: bool) -> None:
         found = robot.status()
         gains = robot.gains().gains if found.limp else {}
     if as_json:
-        print_json(found.model_dump(mode="json"))
+        assert call.server is not None
+        print_json(report_of(found, call.server).model_dump(mode="json"))
         return
     if found.identity is None:
         print(f"{found.robot}: {found.connection}{': ' if found.connection_problem else ''}{found.connection_problem}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from daq.cli.context import Invocation, console
+from daq.cli.context import Invocation, console, print_json
 from daq.cli.remote.robot import remote_robot
 from daq.contracts.errors import TraceError
 from daq.contracts.service.traces import CatalogueEntry
@@ -33,11 +33,14 @@ def fetched_trace(call: Invocation, folder: Path, wanted: str) -> Path:
     return path
 
 
-def upload(call: Invocation, file: Path) -> None:
+def upload(call: Invocation, file: Path, *, as_json: bool) -> None:
     """Sends a trace of another rig or tool."""
     with remote_robot(call) as robot:
         entry = robot.traces.upload(file)
-    print(f"{entry.id}: {entry.file} at {call.server}")
+    if as_json:
+        print_json({"trace": entry.id, "made_from": file, "file": entry.file, "server": call.server})
+    else:
+        print(f"{entry.id}: {entry.file} at {call.server}")
 
 
 def _summary(entry: CatalogueEntry) -> TraceSummary:

@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from daq.contracts.documents import parse_json, read_text, shown
 from daq.contracts.errors import SpecError
 
 Stage = Literal["detect", "record", "diagnose", "score"]
@@ -50,8 +51,11 @@ class TrialFolder:
         shard: str,
     ) -> TrialFolder:  # fmt: skip
         """The folder, made when it is new. Raises SpecError when it holds another trial."""
-        for part in ("traces", "answers"):
-            (path / part).mkdir(parents=True, exist_ok=True)
+        try:
+            for part in ("traces", "answers"):
+                (path / part).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise SpecError(f"{path}: cannot be made: {error.strerror}") from error
         asked = Asked(experiment=experiment, acquire=acquire, registration=registration, key=secrets.token_hex(16))
         file = path / _CAMPAIGN
         # Of shards that begin at once, one writes it.
@@ -87,11 +91,13 @@ class TrialFolder:
         for stage in STAGES:
             self._rows[stage] = {}
             for file in sorted(self.path.glob(f"{stage}*.jsonl")):
-                for line in file.read_text("utf-8").splitlines():
+                for line in read_text(file, str(file)).splitlines():
                     try:
-                        row = json.loads(line)
-                    except json.JSONDecodeError:
+                        row = parse_json(line, str(file))
+                    except SpecError:
                         continue  # the line that a crash cut short: its case is done again
+                    if not isinstance(row, dict) or not isinstance(row.get("seed"), int):
+                        raise SpecError(f"{file}: a line is no case of a trial: {shown(row)}")
                     self._rows[stage][row["seed"]] = row
 
     def row(self, stage: Stage, seed: int) -> dict[str, Any] | None:
@@ -122,6 +128,6 @@ class TrialFolder:
 
 def _read_asked(file: Path) -> Asked:
     try:
-        return Asked.model_validate_json(file.read_text("utf-8"))
+        return Asked.model_validate_json(read_text(file, str(file)))
     except ValidationError as error:
         raise SpecError(f"{file}: not a trial's: {error.errors()[0]['msg']}") from error

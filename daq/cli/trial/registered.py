@@ -9,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import daq
+from daq.contracts.documents import read_text
 from daq.contracts.errors import SpecError
 from model.trial.registration import Registration, parse_registration
 
@@ -96,11 +97,7 @@ def read_registration(path: Path, run: str) -> tuple[Registration, str]:
     Raises SpecError unless it is committed as it stands, it registers all code and libraries that decide the outcome
     as they are, and no table of this run is kept beside it yet.
     """
-    try:
-        text = path.read_text("utf-8")
-    except OSError as error:
-        raise SpecError(f"registration {path}: cannot be read: {error.strerror}") from error
-    registration = parse_registration(text, str(path))
+    registration = parse_registration(read_text(path, f"registration {path}"), str(path))
     table = published_table(path, run)
     if table.exists():
         raise SpecError(f"{table}: this run has been made; another one needs a registration of its own, with new seeds")

@@ -18,8 +18,8 @@ REST = np.array(MA2000.rest_posture)
 
 
 def _moves() -> st.SearchStrategy[dict[str, object]]:
-    amplitude = st.floats(-0.5, 0.5)
-    short = st.floats(0.001, 2.0)
+    amplitude = st.floats(-0.5, 0.5).filter(lambda angle: angle == 0 or abs(angle) > 0.01)
+    short = st.floats(PERIOD, 2.0)
     return st.one_of(
         st.fixed_dictionaries({"kind": st.just("ramp"), "amplitude": amplitude, "duration": short}),
         st.fixed_dictionaries({"kind": st.just("step"), "amplitude": amplitude}),
@@ -31,10 +31,10 @@ def _moves() -> st.SearchStrategy[dict[str, object]]:
              "reversals": st.integers(0, 3)}
         ),
         st.fixed_dictionaries(
-            {"kind": st.just("sine"), "amplitude": amplitude, "period": st.floats(0.1, 2), "cycles": st.floats(0.1, 3),
+            {"kind": st.just("sine"), "amplitude": amplitude, "period": st.floats(0.1, 2), "cycles": st.floats(0.25, 3),
              "phase": st.floats(-6, 6)}
         ),
-        st.fixed_dictionaries({"kind": st.just("multisine"), "amplitude": amplitude, "duration": short}),
+        st.fixed_dictionaries({"kind": st.just("multisine"), "amplitude": amplitude, "duration": st.floats(0.2, 2.0)}),
         st.fixed_dictionaries({"kind": st.just("cubic"), "amplitude": amplitude, "duration": short}),
         st.fixed_dictionaries({"kind": st.just("pause"), "duration": short}),
     )  # fmt: skip
@@ -50,8 +50,8 @@ def specs(draw: st.DrawFn) -> ExperimentSpec:
             "trajectory": trajectory,
             "joints": joints,
             "start": draw(st.dictionaries(st.sampled_from(joints), st.floats(0.8, 1.5))),
-            "settle": draw(st.floats(0, 1)),
-            "hold": draw(st.floats(0, 1)),
+            "settle": draw(st.just(0) | st.floats(PERIOD, 1)),
+            "hold": draw(st.just(0) | st.floats(PERIOD, 1)),
             "repeats": draw(st.integers(1, 3)),
         }
     )

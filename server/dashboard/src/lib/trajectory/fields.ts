@@ -62,9 +62,15 @@ const WORDS: Readonly<Record<string, readonly [label: string, unit: string, scal
   highest: ['Highest frequency', 'Hz', 1],
   tones: ['Tones', '', 1],
   seed: ['Seed of the phases', '', 1],
+  lift: ['Height of lift-off and set-down', 'm', 1],
+  pick: ['Time up to lift-off', 's', 1],
+  travel: ['Time over', 's', 1],
+  place: ['Time down to set-down', 's', 1],
 };
 
-const WITHOUT_FORM = new Set(['path', 'sequence']);
+/** Kinds with a list of points or of pieces have no form. */
+const hasList = (properties: readonly (readonly [string, Schema])[]): boolean =>
+  properties.some(([, property]) => property.type === 'array');
 
 /** Every kind of trajectory that the specification knows, in its order. */
 export function kindsOf(schema: Schema): TrajectoryKind[] {
@@ -83,7 +89,7 @@ function kindOf(kind: string, schema: Schema): TrajectoryKind {
     kind,
     label: sentence(kind.replaceAll('_', ' ')),
     description: plain(schema.description ?? ''),
-    fields: WITHOUT_FORM.has(kind) ? [] : properties.map(([name, property]) => fieldOf(name, property)),
+    fields: hasList(properties) ? [] : properties.map(([name, property]) => fieldOf(name, property)),
   };
 }
 

@@ -22,6 +22,10 @@ function moveInWords(move: Move): string {
     const times = move.times as readonly number[];
     return `path of ${times.length} points in ${short(times.at(-1) ?? 0)} s`;
   }
+  if (move.kind === 'via') {
+    const times = move.times as readonly number[];
+    return `via ${times.length} points in ${short(times.at(-1) ?? 0)} s`;
+  }
   const amplitude = move.amplitude === undefined ? '' : ` ${amplitudeInWords(move.amplitude)}`;
   const time = typeof move.duration === 'number' ? ` ${amplitude ? 'in ' : ''}${short(move.duration)} s` : '';
   const speed = typeof move.speed === 'number' ? ` at ${short(move.speed * DEGREES)} °/s` : '';

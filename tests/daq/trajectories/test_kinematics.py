@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq.safety.kinematics import link_ends
+from daq.trajectories.kinematics import link_ends
 from tests.daq.safety.arms import MA2000
 
 A2, A3 = 0.285755, 0.16841

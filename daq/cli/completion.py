@@ -1,0 +1,57 @@
+"""What a shell offers after the tab key. Asked anew at every key, so nothing heavy is imported here."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import typer
+
+PRESETS = (
+    "ramp", "diagnostic", "diagnostic-a", "diagnostic-b", "diagnostic-c", "diagnostic-d", "diagnostic-e", "held-out",
+)  # fmt: skip
+"""Names of `daq.trajectories.presets`, which would load numpy; a test keeps the two alike."""
+JOINTS = ("1-3", "1", "2", "3", "4", "5", "6", "1-2", "2-3", "1-6")
+SUFFIXES = (".mcap", ".csv")
+CONFIGURATION = "daq.toml"
+
+
+def presets(incomplete: str) -> list[str]:
+    """Names of presets."""
+    return [name for name in PRESETS if name.startswith(incomplete)]
+
+
+def joints(incomplete: str) -> list[str]:
+    """Joints as they are typed most."""
+    return [text for text in JOINTS if text.startswith(incomplete)]
+
+
+def effects(incomplete: str) -> list[str]:
+    """The effect after the last comma: every name that everyone shares."""
+    from daq.contracts.effects import effect_names
+
+    before, comma, begun = incomplete.rpartition(",")
+    wanted = begun.replace("-", "_")
+    return [f"{before}{comma}{name}" for name in effect_names() if name.startswith(wanted)]
+
+
+def traces(ctx: typer.Context, incomplete: str) -> Iterator[str]:
+    """`last`, the newest traces of the folder first, by their files, and what lies where the word points to."""
+    if "last".startswith(incomplete):
+        yield "last"
+    folder = Path(ctx.params.get("folder") or _configured_folder())
+    found = {str(path): None for path in sorted(folder.glob("*.mcap"), reverse=True)}
+    here = Path(incomplete).parent if incomplete else Path()
+    found |= {str(path): None for path in sorted(here.glob("*")) if path.suffix in SUFFIXES}
+    yield from (name for name in found if name.startswith(incomplete))
+
+
+def _configured_folder() -> str:
+    """The folder that ./daq.toml names; the settings themselves would take a third of a second to read."""
+    try:
+        section = tomllib.loads(Path(os.environ.get("DAQ_CONFIG", CONFIGURATION)).read_text("utf-8"))["traces"]
+        return str(Path(section["folder"]).expanduser())
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return "traces"

@@ -1,0 +1,39 @@
+"""Settings written as the TOML file that says the same."""
+
+from __future__ import annotations
+
+import json
+from types import NoneType
+from typing import Any
+
+from daq.config.settings import Settings
+
+
+def settings_text(settings: Settings) -> str:
+    """A daq.toml that loads to these settings; what is not set stands in it as a comment, for TOML has no null."""
+    data = settings.model_dump(mode="json")
+    lines = _lines("", {key: value for key, value in data.items() if not isinstance(value, dict)})
+    for name, table in data.items():
+        if isinstance(table, dict):
+            lines += ["", *_lines(name, table)]
+    return "\n".join(lines).lstrip("\n") + "\n"
+
+
+def _lines(name: str, table: dict[str, Any]) -> list[str]:
+    """A table's own keys, then the tables in it."""
+    lines = [f"[{name}]"] if name else []
+    lines += [f"# {key} is not set" for key, value in table.items() if value is None]
+    lines += [f"{key} = {_value(value)}" for key, value in table.items() if not isinstance(value, dict | NoneType)]
+    for key, value in table.items():
+        if isinstance(value, dict):
+            lines += ["", *_lines(f"{name}.{key}", value)]
+    return lines
+
+
+def _value(value: Any) -> str:
+    """A value as TOML. Strings, numbers and booleans are written as in JSON, but for DEL, which TOML wants escaped."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key} = {_value(one)}' for key, one in value.items() if one is not None)}}}"
+    return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")

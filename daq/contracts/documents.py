@@ -1,0 +1,109 @@
+"""Text files that people write, read with a bound on size and nesting: JSON and TOML as plain data, in one place."""
+
+from __future__ import annotations
+
+import json
+import re
+import reprlib
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from daq.contracts.errors import SpecError
+
+LARGEST = 64 << 20
+"""Bytes of the largest file that is read: a path recorded for an hour has about 20 MB."""
+DEEPEST = 64
+"""Levels of nesting that are taken. No file here needs 10; parsers, validators and `repr` recurse once a level."""
+MOST_KEY_PARTS = 64
+"""Parts of a dotted TOML key (`a.b.c`) that are taken: reading one costs the square of their number."""
+
+_LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:[\w\"'-]+[ \t]*\.[ \t]*){{{MOST_KEY_PARTS}}}", re.MULTILINE)
+"""Only where a key can begin, so that looking for one takes time in proportion to the text."""
+
+_short = reprlib.Repr()
+_short.maxstring = _short.maxother = _short.maxlong = 60
+_short.maxlevel = 2
+
+
+def shown(value: object) -> str:
+    """A value for an error's line, cut short where it is long or deeply nested."""
+    return " ".join(_short.repr(value).split())
+
+
+def read_text(path: Path, what: str) -> str:
+    """The text of a file that `what` names in errors.
+
+    Raises SpecError in one line when it cannot be read, has more than LARGEST bytes, or is not UTF-8.
+    """
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(LARGEST + 1)
+    except OSError as error:
+        raise SpecError(f"{what}: cannot be read: {error.strerror or error}") from error
+    except ValueError as error:  # a name with a NUL in it
+        raise SpecError(f"{what}: cannot be read: {error}") from error
+    if len(content) > LARGEST:
+        raise SpecError(f"{what}: cannot be read: it is larger than {LARGEST >> 20} MiB")
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise SpecError(
+            f"{what}: cannot be read: it is not UTF-8 text (byte {content[error.start]:#04x} at {error.start})"
+        ) from error
+
+
+def parse_json(text: str, what: str) -> Any:
+    """Plain data from JSON. Raises SpecError in one line for what is no JSON, or is nested deeper than DEEPEST."""
+    try:
+        data = json.loads(text)
+    except RecursionError:
+        raise _too_deep(what) from None
+    except ValueError as error:  # also a whole number of thousands of digits
+        raise SpecError(f"{what}: not JSON: {_plain(error)}") from error
+    return _bounded(data, what)
+
+
+def parse_toml(text: str, what: str) -> dict[str, Any]:
+    """Plain data from TOML. Raises SpecError in one line for what is no TOML, or is nested deeper than DEEPEST."""
+    if _LONG_KEY.search(text):
+        raise SpecError(f"{what}: not TOML that is taken: a key has more than {MOST_KEY_PARTS} parts")
+    try:
+        data = tomllib.loads(text)
+    except RecursionError:
+        raise _too_deep(what) from None
+    except ValueError as error:
+        raise SpecError(f"{what}: not TOML: {_plain(error)}") from error
+    _bounded(data, what)
+    return data
+
+
+def read_document(path: Path, what: str) -> Any:
+    """Plain data of a .toml file, or of a JSON file of any other name. Raises SpecError in one line."""
+    text = read_text(path, what)
+    return parse_toml(text, what) if path.suffix == ".toml" else parse_json(text, what)
+
+
+def _plain(error: ValueError) -> str:
+    text = str(error)
+    return "a whole number has thousands of digits" if "integer string conversion" in text else text
+
+
+def _too_deep(what: str) -> SpecError:
+    return SpecError(f"{what}: it is nested more than {DEEPEST} levels deep")
+
+
+def _bounded(data: Any, what: str) -> Any:
+    """The data itself. Level by level, not by recursion."""
+    level = [data]
+    for _ in range(DEEPEST + 1):
+        level = [
+            part
+            for value in level
+            if isinstance(value, dict | list)
+            for part in (value.values() if isinstance(value, dict) else value)
+            if isinstance(part, dict | list)
+        ]
+        if not level:
+            return data
+    raise _too_deep(what)

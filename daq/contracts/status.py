@@ -1,0 +1,49 @@
+"""What `daq status --json` prints, whether this process has the robot or a service has it."""
+
+from __future__ import annotations
+
+from pydantic import AwareDatetime
+
+from daq.contracts.service.base import Wire
+from daq.contracts.service.queue import Control, QueueStatus
+from daq.contracts.service.robot import (
+    Activity,
+    ArmState,
+    ConnectionState,
+    LinkStatus,
+    RobotIdentity,
+    RobotStatus,
+    Sample,
+)
+
+
+class StatusReport(Wire):
+    """One robot at one moment: the fields of the service's `RobotStatus`, by the same names.
+
+    `server` is the service that has the robot, None where the command itself looked; there is no queue then, and nobody
+    who could hold its control.
+    """
+
+    server: str | None = None
+    robot: str
+    machine: str
+    port: str
+    connection: ConnectionState
+    connection_problem: str = ""
+    identity: RobotIdentity | None = None
+    arm: ArmState
+    cause: str = ""
+    activity: Activity
+    experiment: str | None = None
+    limp: tuple[int, ...] = ()
+    sample: Sample | None = None
+    link: LinkStatus
+    control: Control | None = None
+    queue: QueueStatus | None = None
+    utc: AwareDatetime
+
+
+def report_of(status: RobotStatus, server: str) -> StatusReport:
+    """The report of what a service says; what a newer service says more is left out."""
+    fields = {name: getattr(status, name) for name in StatusReport.model_fields if name != "server"}
+    return StatusReport(server=server, **fields)

@@ -1,0 +1,58 @@
+"""The address of a database as the configuration gives it, looked at before anything is opened."""
+
+from __future__ import annotations
+
+from sqlalchemy import Engine, create_engine
+from sqlalchemy.engine import URL, make_url
+from sqlalchemy.exc import ArgumentError, NoSuchModuleError
+
+from daq.contracts.documents import shown
+from daq.contracts.errors import DaqError
+
+EXAMPLES = "sqlite:////srv/arm/service.sqlite or postgresql+psycopg://daq@localhost/daq"
+PACKAGES = {"psycopg": "psycopg[binary]", "psycopg2": "psycopg2-binary", "MySQLdb": "mysqlclient"}
+"""Package of a driver's module, where it has another name."""
+
+
+class StoreError(DaqError):
+    """The database cannot be opened or brought up to date."""
+
+    exit_code = 2
+
+
+def parse_address(url: str) -> URL:
+    """The parts of a database's address. Raises StoreError for what is none, and for a kind that nobody knows.
+
+    No error repeats a password.
+    """
+    try:
+        parsed = make_url(url)
+        parsed.get_dialect()
+    except (ArgumentError, NoSuchModuleError, ValueError) as error:
+        known = shown(url.rpartition("@")[2])
+        raise StoreError(f"server.database {known}: is no address of a database; write {EXAMPLES}") from error
+    except ModuleNotFoundError as error:
+        raise _no_driver(parsed, error) from error
+    return parsed
+
+
+def open_engine(url: str) -> Engine:
+    """The engine of a database; it connects when it is first used. Raises StoreError, also where a driver is missing:
+    it says which package to install."""
+    parsed = parse_address(url)
+    try:
+        return create_engine(parsed)
+    except ModuleNotFoundError as error:
+        raise _no_driver(parsed, error) from error
+    except (ArgumentError, TypeError, ValueError) as error:
+        line = f"server.database {parsed.render_as_string()}: cannot be used: {error}"
+        raise StoreError(line) from error
+
+
+def _no_driver(parsed: URL, error: ModuleNotFoundError) -> StoreError:
+    module = error.name or parsed.drivername
+    package = PACKAGES.get(module, module)
+    return StoreError(
+        f"server.database {parsed.render_as_string()}: its driver {module} is not installed: "
+        f"`pip install '{package}'` where daq is installed"
+    )

@@ -1,0 +1,185 @@
+"""Via points and 4-3-4 trajectories (section 3.7 of the source), against conditions solved on their own."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline, PPoly
+
+from daq.contracts.errors import SpecError
+from daq.contracts.trace import Floats
+from daq.safety import check_plan
+from daq.trajectories.kinematics import link_ends
+from daq.trajectories.pick_and_place import evaluate, last_link, polynomials
+from tests.daq.trajectories.machines import MA2000, PERIOD, UNIT, motion, planned
+
+BENT = {2: math.radians(60), 3: math.radians(-90)}
+OVER = {1: math.radians(40), 2: math.radians(5), 3: math.radians(10)}
+
+
+def cubic_segments(knots: Floats, positions: Floats) -> PPoly:
+    """Segments of (3.52) from the conditions (3.46) to (3.51), with a continuous acceleration: all coefficients of all
+    segments in one system of equations, in each segment's own time."""
+    count = len(knots) - 1
+    rows, wanted = [], []
+
+    def derivative(segment: int, at: float, order: int) -> Floats:
+        row = np.zeros(4 * count)
+        for power in range(order, 4):
+            row[4 * segment + power] = math.perm(power, order) * at ** (power - order)
+        return row
+
+    for segment in range(count):
+        length = knots[segment + 1] - knots[segment]
+        rows += [derivative(segment, 0.0, 0), derivative(segment, length, 0)]
+        wanted += [positions[segment], positions[segment + 1]]
+        if segment + 1 < count:
+            for order in (1, 2):
+                rows.append(derivative(segment, length, order) - derivative(segment + 1, 0.0, order))
+                wanted.append(0.0)
+    rows += [derivative(0, 0.0, 1), derivative(count - 1, knots[-1] - knots[-2], 1)]
+    wanted += [0.0, 0.0]
+    found = np.linalg.lstsq(np.stack(rows), np.array(wanted), rcond=None)[0]
+    return PPoly(found.reshape(count, 4).T[::-1], knots)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(-0.5, 0.5), st.floats(0.1, 2)), min_size=1, max_size=5).filter(
+        lambda points: max(abs(angle) for angle, _ in points) > 0.05
+    )
+)
+def test_via_points_are_the_segments_of_the_source(points: list[tuple[float, float]]) -> None:
+    times = np.cumsum([length for _, length in points])
+    angles = [angle for angle, _ in points]
+    made = motion(joints=(1,), trajectory={"kind": "via", "points": angles, "times": times.tolist()})
+    expected = cubic_segments(np.array([0.0, *times]), np.array([0.0, *angles]))
+    time = np.minimum(made.time, times[-1])
+    assert made.angles[:, 0] - made.angles[0, 0] == pytest.approx(expected(time), abs=1e-9)
+    assert made.angles[-1, 0] - made.angles[0, 0] == pytest.approx(angles[-1], abs=1e-12)
+
+
+def test_every_joint_passes_its_points_at_their_times_and_the_marks_say_so() -> None:
+    points = [{1: 0.2, 2: 0.1}, {1: 0.3, 2: -0.1}, {1: 0.1, 2: 0.0}]
+    made = motion(joints=(1, 2), trajectory={"kind": "via", "points": points, "times": [1.0, 1.6, 3.0]})
+    moved = made.angles - made.angles[0]
+    for time, point in zip((1.0, 1.6, 3.0), points, strict=True):
+        assert moved[round(time / PERIOD), :2] == pytest.approx([point[1], point[2]], abs=1e-12)
+    assert [(m.index, m.message) for m in made.marks if m.kind == "note"] == [
+        (50, "via point 1 of 2"), (80, "via point 2 of 2"),
+    ]  # fmt: skip
+
+
+def test_via_points_go_into_sequences_and_are_checked_like_all_motions() -> None:
+    move = {"kind": "via", "points": [0.2, 0.1], "times": [1.0, 2.0]}
+    sequence = {"kind": "sequence", "segments": [{"move": move, "joints": [2]}, {"move": move, "joints": [2]}]}
+    made = motion(joints=(1, 2), trajectory=sequence)
+    assert made.angles[-1, :2] - made.angles[0, :2] == pytest.approx([0, 0.2])
+    quick = motion(joints=(1,), trajectory={"kind": "via", "points": [1.0], "times": [0.3]})
+    assert [one.rule for one in check_plan(quick, MA2000, MA2000.limits)] == ["speed"]
+
+
+@pytest.mark.parametrize(
+    ("trajectory", "expected"),
+    [
+        ({"points": [0.1], "times": [1, 2]}, "2 times for 1 points"),
+        ({"points": [0.1, 0.2], "times": [2, 1]}, "times must increase strictly"),
+        ({"points": [{3: 0.1}], "times": [1]}, r"a point is given for joints \[3\], the motion is on \[1\]"),
+    ],
+)
+def test_via_points_that_do_not_fit(trajectory: dict[str, object], expected: str) -> None:
+    with pytest.raises(ValueError, match=expected):
+        planned(joints=(1,), trajectory={"kind": "via"} | trajectory)
+
+
+def test_via_points_nearer_than_a_control_period_are_refused() -> None:
+    with pytest.raises(SpecError, match=r"via: time to point 2: .* is too short"):
+        planned(joints=(1,), trajectory={"kind": "via", "points": [0.1, 0.2], "times": [1, 1.001]})
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(st.floats(-1, 1), min_size=4, max_size=4), st.lists(st.floats(0.05, 20), min_size=3, max_size=3)
+)  # fmt: skip
+def test_the_4_3_4_meets_its_fourteen_conditions(knots: list[float], durations: list[float]) -> None:
+    times = np.array(durations)
+    pieces = polynomials(np.array(knots)[:, None], times)
+    assert [len(one) for one in pieces] == [5, 4, 5]
+    ends = np.concatenate([[0.0], np.cumsum(times)])
+    scale = 1 + max(abs(k) for k in knots) / times.min() ** 2
+    for piece in range(3):
+        coefficients = pieces[piece][:, 0]
+        for at, knot in ((0, piece), (1, piece + 1)):
+            assert np.polynomial.polynomial.polyval(at, coefficients) == pytest.approx(knots[knot], abs=1e-9)
+    for order in (1, 2):
+        rates = [np.polynomial.polynomial.polyder(one[:, 0], order) for one in pieces]
+        value = [
+            [np.polynomial.polynomial.polyval(at, rate) / length**order for at in (0, 1)]
+            for rate, length in zip(rates, times, strict=True)
+        ]
+        assert [value[0][0], value[2][1]] == pytest.approx([0, 0], abs=1e-8 * scale)
+        assert [value[0][1], value[1][1]] == pytest.approx([value[1][0], value[2][0]], abs=1e-8 * scale)
+    assert evaluate(pieces, times, ends)[:, 0] == pytest.approx(knots, abs=1e-9)
+
+
+def test_a_4_3_4_of_equal_parts_agrees_with_the_spline_that_has_its_rates() -> None:
+    """Its cubic is the one cubic between its own speeds; scipy builds that from them."""
+    times = np.array([1.0, 2.0, 1.0])
+    pieces = polynomials(np.array([[0.0], [0.2], [0.9], [0.7]]), times)
+    knots = np.array([1.0, 3.0])
+    speeds = evaluate(pieces, times, knots - np.array([1e-12, 0.0]), 1)[:, 0]
+    between = CubicSpline(knots, [0.2, 0.9], bc_type=((1, speeds[0]), (1, speeds[1])))
+    time = np.linspace(1.0, 3.0, 41)
+    assert evaluate(pieces, times, time[:-1])[:, 0] == pytest.approx(between(time[:-1]), abs=1e-9)
+    assert evaluate(pieces, times, time[:-1], 2)[:, 0] == pytest.approx(between(time[:-1], 2), abs=1e-8)
+
+
+def pick_and_place(**own: object) -> dict[str, object]:
+    return {"kind": "pick_and_place", "amplitude": OVER, "pick": 1.0, "travel": 2.0, "place": 1.0} | own
+
+
+def test_the_arms_end_passes_straight_above_both_places() -> None:
+    made = motion(start=BENT, trajectory=pick_and_place(lift=0.05))
+    ends = link_ends(MA2000, made.angles)[:, -1]
+    for lifted, place in ((50, 0), (150, -1)):
+        assert ends[lifted] - ends[place] == pytest.approx([0, 0, 0.05], abs=1e-5)
+    assert made.angles[-1, :3] - made.angles[0, :3] == pytest.approx(list(OVER.values()), abs=1e-12)
+    assert (ends[:, 2] >= min(ends[0, 2], ends[-1, 2]) - 1e-3).all()
+    assert check_plan(made, MA2000, MA2000.limits) == []
+    assert [(m.index, m.message) for m in made.marks if m.kind == "note"] == [
+        (50, "lift-off point"), (150, "set-down point"),
+    ]  # fmt: skip
+
+
+def test_it_begins_and_ends_at_rest_without_a_jerk() -> None:
+    made = motion(start=BENT, trajectory=pick_and_place())
+    speed = np.diff(made.angles, axis=0) / PERIOD
+    acceleration = np.diff(speed, axis=0) / PERIOD
+    assert np.abs(speed[[0, -1]]).max() < 0.01 * np.abs(speed).max()
+    assert np.abs(np.diff(acceleration, axis=0)).max() < 0.2 * np.abs(acceleration).max()
+
+
+def test_a_lift_of_less_than_a_quarter_of_the_last_link_is_refused() -> None:
+    assert last_link(MA2000) == pytest.approx(0.16841)
+    with pytest.raises(SpecError, match=r"lift of 0.042 m: allowed are 0.0421 m and more"):
+        motion(start=BENT, trajectory=pick_and_place(lift=0.042))
+
+
+@pytest.mark.parametrize(
+    "fields", [{"start": {3: 0.0}}, {"start": BENT, "joints": (1,)}, {"start": BENT, "joints": (2,)}], ids=repr
+)
+def test_a_lift_that_these_joints_cannot_make_is_refused(fields: dict[str, object]) -> None:
+    with pytest.raises(SpecError, match=r"cannot lift the arm's end straight up by 0.05 m"):
+        motion(trajectory={"kind": "pick_and_place", "amplitude": 20 * UNIT}, **fields)
+
+
+def test_repeats_go_back_slowly_and_lift_again() -> None:
+    made = motion(start=BENT, trajectory=pick_and_place(), repeats=2)
+    ends = link_ends(MA2000, made.angles)[:, -1, 2]
+    lifted = [mark.index for mark in made.marks if mark.message == "lift-off point"]
+    assert len(lifted) == 2
+    assert ends[lifted[1]] == pytest.approx(ends[lifted[0]], abs=1e-4)
