@@ -37,6 +37,16 @@ def swinging_trace(plant: Model, seconds: float = 6.0, seed: int = 0) -> Trace:
     return _run(plant, np.array(START) + np.radians(20) * np.stack(waves, axis=1), seed)
 
 
+def multisine_trace(plant: Model, seconds: float = 12.0, seed: int = 0) -> Trace:
+    """Six tones a joint between 0.1 and 0.8 Hz, of 20°, 14° and 20°; other phases with every seed."""
+    time = np.maximum(PERIOD * np.arange(round(seconds / PERIOD)) - 0.2, 0)
+    phases = np.random.default_rng([seed, 1]).uniform(0, 2 * np.pi, (6, 3))
+    tones = np.linspace(0.1, 0.8, 6)
+    waves = sum(np.sin(2 * np.pi * f * time[:, None] + p) - np.sin(p) for f, p in zip(tones, phases, strict=True))
+    scale = np.radians((20.0, 14.0, 20.0)) / np.abs(waves).max(axis=0)
+    return _run(plant, np.array(START) + scale * waves, seed)
+
+
 def _run(plant: Model, set_points: np.ndarray, seed: int) -> Trace:
     count = len(set_points)
     record = TraceRecord(
