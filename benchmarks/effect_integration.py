@@ -31,8 +31,8 @@ def main() -> int:
     print("|---|---|---|---|---|---|")
     for case in CASES:
         for joint in (1,) if library()[case.effect].whole_machine else (1, 2, 3):
-            if only and case.effect not in only:
-                continue
+            if (only and case.effect not in only) or (case.effect, joint) == ("centre_of_mass", 1):
+                continue  # along the waist's own axis a centre of mass has no arm
             model = case.model(bench.base, joint)
             size, errors, differences = bench.measure(model, (STEP_OF_FITS, STEP, step_of_derivatives(model)))
             found = (errors[STEP_OF_FITS], errors[STEP], differences[step_of_derivatives(model)])

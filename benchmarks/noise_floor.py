@@ -24,9 +24,9 @@ from model.validation.noise_floor import noise_floor
 from tests.model.validation.synthetic import arm, multisine_trace, ramp_trace, swinging_trace
 
 MOTIONS: dict[str, Callable[[Model, int], Trace]] = {
-    "ramp step, 1.6 s": lambda model, seed: ramp_trace(model, seed=seed),
-    "two sines a joint, 6 s": lambda model, seed: swinging_trace(model, seed=seed),
-    "multisine 0.1 to 0.8 Hz, 12 s": lambda model, seed: multisine_trace(model, seed=seed),
+    "ramp step, 1.6 s": lambda model, seed: ramp_trace(model, seed=seed, held=True),
+    "two sines a joint, 6 s": lambda model, seed: swinging_trace(model, seed=seed, held=True),
+    "multisine 0.1 to 0.8 Hz, 12 s": lambda model, seed: multisine_trace(model, seed=seed, held=True),
 }
 FIRST_SEED = 5000
 

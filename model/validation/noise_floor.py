@@ -30,8 +30,8 @@ FEWEST, MOST, SECONDS, SEED = 12, 40, 80.0, 1991
 
 
 def noise_floor(model: Model, trace: Trace, observation: Observation) -> tuple[Floats, bool]:
-    """Root mean square (n,) of each joint's acceleration residual where the model is right, rad/s² (m/s²): the median over
-    records that it makes.
+    """Root mean square (n,) of each joint's acceleration residual where the model is right, rad/s² (m/s²): the median
+    over records that it makes.
 
     Returns also whether it was simulated. Where it cannot be, or on a joint that does not move in the simulation: the
     readings' noise alone, as `observation` has it.
