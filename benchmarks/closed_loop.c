@@ -23,13 +23,33 @@ static inline double motor_damping(const double *j, double rise) {
 static inline double steady_current(const double *j, double rise, double volts, double speed) {
   return (volts - j[BACK_EMF] * (1.0 + j[BACK_EMF_ERROR]) * j[GEAR] * speed) / (j[RESISTANCE] * (1.0 + rise));
 }
-static inline double current_after(const double *j, double rise, double now, double steady, double t) {
-  return steady + (now - steady) * exp(-j[RESISTANCE] * (1.0 + rise) / j[INDUCTANCE] * t);
+static inline void winding_functions(double x, double *f) {
+  if (x < 0.05) {
+    f[2] = 1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x * (1.0 / 720.0 - x / 5040.0)));
+    f[1] = 0.5 - x * f[2];
+    f[0] = 1.0 - x * f[1];
+  } else {
+    f[0] = (1.0 - exp(-x)) / x;
+    f[1] = (1.0 - f[0]) / x;
+    f[2] = (0.5 - f[1]) / x;
+  }
 }
-
-static inline double mean_current(const double *j, double rise, double now, double steady, double h) {
-  const double turns = j[RESISTANCE] * (1.0 + rise) / j[INDUCTANCE] * h;
-  return steady + (now - steady) * (1.0 - exp(-turns)) / turns;
+static inline double stage_current(const double *j, const double *s, double volts, double begun, double speed, int stage, double h) {
+  const double x = j[RESISTANCE] * (1.0 + s[RISE]) / j[INDUCTANCE] * h, half = exp(-0.5 * x);
+  const double before = steady_current(j, s[RISE], volts, begun), settled = steady_current(j, s[RISE], volts, speed);
+  const double excess = s[CURRENT] - before, change = before - settled;
+  double f[3];
+  winding_functions(x, f);
+  if (stage == 0) return settled + excess * (6.0 * f[1] - 2.0 * half);
+  if (stage == 3) return settled + excess * (6.0 * (f[0] - f[1]) - 2.0 * half) + change * (6.0 * f[1] - 12.0 * f[2]);
+  return settled + excess * half + change * 6.0 * f[2];
+}
+static inline double current_after(const double *j, const double *s, double volts, double begun, double speed, double h) {
+  const double x = j[RESISTANCE] * (1.0 + s[RISE]) / j[INDUCTANCE] * h;
+  const double before = steady_current(j, s[RISE], volts, begun), settled = steady_current(j, s[RISE], volts, speed);
+  double f[3];
+  winding_functions(x, f);
+  return settled + (s[CURRENT] - before) * (1.0 - x * f[0]) + (before - settled) * f[0];
 }
 
 static double sensed_angle(double q, const double *j) {
@@ -56,16 +76,16 @@ static double extra_torque(const double *j, long flags, double t, double q, doub
   return torque;
 }
 
-static double special(const double *j, long flags, double t, double h, double q, double v, double z, const double *s, double volts) {
+static double special(const double *j, long flags, int stage, double t, double h, double q, double v, double begun, double z,
+                      const double *s, double volts) {
   const double steady = steady_current(j, s[RISE], volts, v);
-  const double now = flags & HAS_INDUCTANCE ? mean_current(j, s[RISE], s[CURRENT], steady, h) : steady;
-  const double k = j[GEAR] * j[TORQUE_CONSTANT];
-  return k * (now - steady) + extra_torque(j, flags, t, q, v, z, s[STUCK], k * now);
+  const double now = flags & HAS_INDUCTANCE ? stage_current(j, s, volts, begun, v, stage, h) : steady;
+  const double k = j[GEAR] * j[TORQUE_CONSTANT], through = k * now - j[GEAR] * j[GEAR] * j[VISCOUS] * v;
+  return k * (now - steady) + extra_torque(j, flags, t, q, v, z, s[STUCK], through);
 }
 
-static void after_step(double *s, const double *j, long flags, double level, double volts, double h) {
-  if (flags & HAS_INDUCTANCE)
-    s[CURRENT] = current_after(j, s[RISE], s[CURRENT], steady_current(j, s[RISE], volts, s[SPEED]), h);
+static void after_step(double *s, const double *j, long flags, double level, double change, double volts, double h) {
+  if (flags & HAS_INDUCTANCE) s[CURRENT] = current_after(j, s, volts, s[SPEED] - change, s[SPEED], h);
   if (flags & HAS_STICTION) {
     if (s[STUCK] > 0.5) {
       if (fabs(s[DEFLECTION]) >= 1.0) s[STUCK] = 0;
@@ -117,7 +137,7 @@ static void advance(double s[N][STATE], const double *volts, double start, doubl
       }
       if (is_special)
         for (int j = 0; j < N; j++)
-          torque[j] += special(p[j], flags[j], start + step * h + reach, h, q[j] + dq[j], u[j], y[j], s[j], volts[j]);
+          torque[j] += special(p[j], flags[j], stage, start + step * h + reach, h, q[j] + dq[j], u[j], v[j], y[j], s[j], volts[j]);
       if (tilted) {
         double b[3];
         horizontal_gravity_torques(q[0] + dq[0] + p[0][THETA], t2, t3, body, b);
@@ -136,11 +156,18 @@ static void advance(double s[N][STATE], const double *volts, double start, doubl
     if (is_special)
       for (int j = 0; j < N; j++) {
         s[j][DEFLECTION] = z[j]; s[j][SPEED] = v[j];
-        after_step(s[j], p[j], flags[j], level[j], volts[j], h);
+        after_step(s[j], p[j], flags[j], level[j], h / 6.0 * vs[j], volts[j], h);
         z[j] = s[j][DEFLECTION];
       }
   }
   for (int j = 0; j < N; j++) { s[j][POSITION] = q[j]; s[j][SPEED] = v[j]; s[j][DEFLECTION] = z[j]; }
+}
+
+static double warmed(double rise, double hot, double volts, double begun, double ended, double mean, double t, const double *j) {
+  const double i = steady_current(j, hot, volts, mean);
+  const double change = steady_current(j, hot, volts, ended) - steady_current(j, hot, volts, begun);
+  const double kept = exp(-t / j[COOLING_TIME]);
+  return rise * kept + j[HEATING] * (i * i + change * change / 12.0) * j[COOLING_TIME] * (1.0 - kept);
 }
 
 static double board_pid(double error, const double *g, const double *j, long quantise, double *memory) {
@@ -195,7 +222,17 @@ void run(long periods, const double *set_points, const double *noise, const doub
       const double until = i < N ? times[order[i]] : shared[PERIOD];
       if (until != done) {
         const long wanted = (long)ceil((until - done) / longest - 1e-9);
-        advance(s, volts, k * shared[PERIOD] + done, until - done, wanted > 1 ? wanted : 1, p, body, flags);
+        const double t = until - done;
+        double begun[N][3];
+        for (int j = 0; j < N; j++) {
+          const double v = s[j][SPEED], rise = s[j][RISE];
+          begun[j][0] = s[j][POSITION]; begun[j][1] = v; begun[j][2] = rise;
+          if (p[j][HEATING] != 0) s[j][RISE] = warmed(rise, rise, volts[j], v, v, v, 0.5 * t, p[j]);
+        }
+        advance(s, volts, k * shared[PERIOD] + done, t, wanted > 1 ? wanted : 1, p, body, flags);
+        for (int j = 0; j < N; j++)
+          if (p[j][HEATING] != 0)
+            s[j][RISE] = warmed(begun[j][2], s[j][RISE], volts[j], begun[j][1], s[j][SPEED], (s[j][POSITION] - begun[j][0]) / t, t, p[j]);
       }
       done = until;
       if (i < N) {
@@ -203,12 +240,6 @@ void run(long periods, const double *set_points, const double *noise, const doub
         volts[j] = clamped(outside(queue[(k - late[j] + QUEUE) % QUEUE][j], p[j][DEAD_ZONE]), p[j][SUPPLY]);
       }
     }
-    for (int j = 0; j < N; j++)
-      if (p[j][HEATING] != 0) {
-        const double i = steady_current(p[j], s[j][RISE], volts[j], s[j][SPEED]);
-        const double kept = exp(-shared[PERIOD] / p[j][COOLING_TIME]);
-        s[j][RISE] = s[j][RISE] * kept + p[j][HEATING] * i * i * p[j][COOLING_TIME] * (1.0 - kept);
-      }
   }
 }
 

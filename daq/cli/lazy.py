@@ -28,6 +28,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "mock": ("daq.cli.mock", "Start a mock controller that others can connect to."),
     "fit": ("daq.cli.fit", "A model's parameters from traces."),
     "validate": ("daq.cli.validate", "What must move for a model to explain traces."),
+    "sensitivity": ("daq.cli.sensitivity", "Which parameter moves which joint's response, and when."),
     "simulate": ("daq.cli.simulate", "What a model does where a trace was recorded."),
     "compare": ("daq.cli.compare", "Several models beside the same traces."),
     "diagnose": ("daq.cli.diagnose", "Name the effect that a model lacks, add it, show the gap shrink."),
@@ -37,9 +38,10 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("daq.cli.demo", "The ramp step on the mock, from command to plot."),
 }
 
-HERE = frozenset(
-    {"ports", "serve", "token", "backup", "restore", "config", "mock", "simulate", "design", "thesis", "blind", "demo"}
-)
+HERE = frozenset({
+    "ports", "serve", "token", "backup", "restore", "config", "mock", "simulate", "sensitivity", "design", "thesis",
+    "blind", "demo",
+})  # fmt: skip
 """Subcommands that are about this computer alone: `--server` is refused, DAQ_SERVER does not concern them."""
 
 

@@ -44,7 +44,7 @@ def thesis(
     from model.thesis.reproduction import reproduce_thesis
     from model.thesis.text import as_text
 
-    traces = read_traces(invocation(context), folder, trace) if trace else [_recorded(seed, folder)]
+    traces = read_traces(invocation(context), folder, trace) if trace else [recorded_ramp(seed, folder)]
     with shown_progress("reproducing") as tell:
         found = reproduce_thesis(
             traces, ("nelder_mead", "least_squares") if nelder_mead else ("least_squares",), progress=tell
@@ -60,8 +60,8 @@ def thesis(
         console().print(f"report: {write_report(thesis_report(found), report)}")
 
 
-def _recorded(seed: int, folder: Path | None) -> Trace:
-    """The ramp of section 6.5 on a mock of its own."""
+def recorded_ramp(seed: int, folder: Path | None = None) -> Trace:
+    """The ramp of section 6.5 on a mock of its own, in lock-step: the same seed gives the same record."""
     from daq.cli.run_result import acquire_whole
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import load_machine

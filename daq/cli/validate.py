@@ -151,8 +151,8 @@ def _print_in_time(one: TimeDomain, machine: Machine) -> None:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in j.against if c.significant][:3]
         unit = f"{joint_unit(machine, j.joint)}/s²"
         print(
-            f"  joint {j.joint}: acceleration residual rms {j.rms:.3g} {unit} (noise {j.noise:.3g})"
-            + (f", goes with {', '.join(strongest)}" if strongest else "")
+            f"  joint {j.joint}: acceleration residual rms {j.rms:.3g} {unit}, {j.in_floors:.2g} × the noise floor"
+            f" ({j.noise:.3g})" + (f", goes with {', '.join(strongest)}" if strongest else "")
         )
     for note in one.notes:
         print(f"  {note}")

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
-from model.simulation.simulate import sensitivities
+from model.simulation.simulate import Options, sensitivities
 from model.validation.expected_deviation import Convention, expected_deviation
 
 
@@ -19,7 +19,7 @@ class _Part(BaseModel):
 
 
 class SensitivityCurve(_Part):
-    """Change of each joint's reading (rad) along a run when one parameter changes by its expected deviation.
+    """Change of each joint's reading (rad, m) along a run when one parameter changes by its expected deviation.
 
     `by_joint` has one series a modelled joint; `rms` is over all of them.
     """
@@ -29,6 +29,17 @@ class SensitivityCurve(_Part):
     expected: float
     by_joint: tuple[tuple[float, ...], ...]
     rms: float
+
+    @property
+    def peaks(self) -> tuple[int, ...]:
+        """Index of each joint's largest magnitude in its series."""
+        return tuple(max(range(len(series)), key=lambda k: abs(series[k])) for series in self.by_joint)
+
+    @property
+    def moves_most(self) -> int:
+        """Index of the joint whose reading it moves most."""
+        largest = [abs(series[k]) for series, k in zip(self.by_joint, self.peaks, strict=True)]
+        return largest.index(max(largest))
 
 
 class SensitivityCurves(_Part):
@@ -42,15 +53,16 @@ class SensitivityCurves(_Part):
 
 
 def sensitivity_curves(
-    model: Model, trace: Trace, names: Sequence[str], convention: Convention = "source"
+    model: Model, trace: Trace, names: Sequence[str], convention: Convention = "source", options: Options | None = None
 ) -> SensitivityCurves:
     """Exact first-order effect of the named parameters on the readings of a run that repeats the trace.
 
-    Raises SpecError for no or an unknown parameter.
+    The loop is closed unless `options` say otherwise: what the controller makes up for does not show.
+    Raises SpecError for no or an unknown parameter, or one without an expected deviation; TraceError as `simulate`.
     """
     if not names:
         raise SpecError("no parameters: name at least one")
-    found = sensitivities(model, trace, names)
+    found = sensitivities(model, trace, names, options)
     curves = []
     for name, derivative in zip(names, found.reading, strict=True):
         parameter = model.parameter(name)

@@ -19,10 +19,20 @@ def motor_volts(command: complex, joint: NDArray[Any]) -> Any:
 
 
 @internal
-def warmed(rise: complex, volts: complex, speed: complex, period: complex, joint: NDArray[Any]) -> Any:
-    """Relative rise of the winding's resistance one period later: heated by i², cooled with a time constant."""
-    current = (volts - joint[at.BACK_EMF] * (1.0 + joint[at.BACK_EMF_ERROR]) * joint[at.GEAR] * speed) / (
-        joint[at.RESISTANCE] * (1.0 + rise)
-    )
-    kept = np.exp(-period / joint[at.COOLING_TIME])
-    return rise * kept + joint[at.HEATING] * current * current * joint[at.COOLING_TIME] * (1.0 - kept)
+def warmed(
+    rise: complex, hot: complex, volts: complex, begun: complex, ended: complex, mean: complex, duration: complex,
+    joint: NDArray[Any],
+) -> Any:  # fmt: skip
+    """Relative rise of the winding's resistance after `duration` s at constant volts: heated by i², cooled with a time
+    constant.
+
+    i is the settled current for the joint's speeds at the beginning, at the end and on average, through a winding whose
+    rise is `hot` meanwhile. The mean of i² is the square of its mean and the variance of a current that changes evenly.
+    """
+    resistance = joint[at.RESISTANCE] * (1.0 + hot)
+    back_emf = joint[at.BACK_EMF] * (1.0 + joint[at.BACK_EMF_ERROR]) * joint[at.GEAR]
+    current = (volts - back_emf * mean) / resistance
+    change = back_emf * (ended - begun) / resistance
+    kept = np.exp(-duration / joint[at.COOLING_TIME])
+    heat = joint[at.HEATING] * (current * current + change * change / 12.0)
+    return rise * kept + heat * joint[at.COOLING_TIME] * (1.0 - kept)

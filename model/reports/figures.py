@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,6 +60,18 @@ def drawn(draw: Callable[[Figure], None], height: float, width: float = WIDTH) -
     for colour, name in _THEMED.items():
         text = text.replace(f": {colour}", f": var(--{name})")
     return text.replace("font-family", "data-font")
+
+
+def saved(draw: Callable[[Figure], None], height: float, path: Path, kind: str, width: float = WIDTH) -> None:
+    """The same as a file of that kind (png, svg, pdf), on white. Raises OSError."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        draw(figure)
+        dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+        figure.savefig(path, format=kind, dpi=200, facecolor="white", metadata=dates.get(kind))
 
 
 def thinned(time: Floats, *signals: Floats, most: int = 1500) -> tuple[Floats, ...]:

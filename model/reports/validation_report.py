@@ -204,8 +204,10 @@ def _residual_picture(one: TimeDomain, machine: Machine) -> Picture:
         for j in one.joints
         if (strong := [c for c in j.against if c.significant][:3])
     ]
+    floors = "; ".join(f"joint {j.joint}: rms {j.rms:.3g}, {j.in_floors:.2g} × the noise floor" for j in one.joints)
     tail = f" It goes with: {'; '.join(told)}." if told else ""
-    return Picture(drawn(draw, 1.9), f"Acceleration that the model does not expect; the band is twice its noise.{tail}")
+    caption = f"Acceleration that the model does not expect; the band is twice its noise floor. {floors}.{tail}"
+    return Picture(drawn(draw, 1.9), caption)
 
 
 def _variation_picture(one: TimeDomain, shown: Sequence[Variation]) -> Picture:

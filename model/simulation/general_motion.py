@@ -64,8 +64,9 @@ def advance(
                 motor = motor_gain(joint, state[j, RISE]) * volts[j] - motor_damping(joint, state[j, RISE]) * turning
                 link = -z * work[LEVEL, j]
                 if flags[j] != 0:
+                    begun = state[j, ROTOR_SPEED] if gives else state[j, SPEED]
                     link += special_torque(
-                        joint, flags[j], now, h, work[Q, j], work[V, j], turning, z, state[j], volts[j]
+                        joint, flags[j], stage, now, h, work[Q, j], work[V, j], turning, begun, z, state[j], volts[j]
                     )
                 if flags[j] & at.HAS_USER_EFFECT:
                     link += own_torque(own[j], joint, work[Q, j], work[V, j], volts[j], work[LOAD, j], now)
@@ -80,8 +81,10 @@ def advance(
         _end(state, work, h / 6.0, joints)
         for j in range(n):
             if flags[j] != 0:
-                turning = state[j, ROTOR_SPEED] if flags[j] & at.HAS_FLEXIBILITY else state[j, SPEED]
-                after_step(state[j], joints[j], flags[j], work[LEVEL, j], turning, volts[j], h)
+                gives = flags[j] & at.HAS_FLEXIBILITY != 0
+                turning = state[j, ROTOR_SPEED] if gives else state[j, SPEED]
+                change = h / 6.0 * (work[SUM_B, j] if gives else work[SUM_A, j])
+                after_step(state[j], joints[j], flags[j], work[LEVEL, j], turning, change, volts[j], h)
 
 
 @internal

@@ -43,7 +43,16 @@ from model.simulation.joint_torques import (
     motor_gain,
     steady_current,
 )
-from model.simulation.period import QUEUE, extra_flags, sample, step_count, switching_times, warm_up
+from model.simulation.period import (
+    BEGUN,
+    QUEUE,
+    begin_stretch,
+    end_stretch,
+    extra_flags,
+    sample,
+    step_count,
+    switching_times,
+)
 from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, entry
 
 Array = NDArray[Any]
@@ -96,6 +105,7 @@ def batch(
     volts = np.zeros(n, dtype=parts.dtype)
     order = np.zeros(n, dtype=np.int64)
     times = np.zeros(n, dtype=parts.dtype)
+    begun = np.zeros((BEGUN, n), dtype=parts.dtype)
     work = np.zeros((general_motion.WORK, n), dtype=parts.dtype)
     for r in range(first, last):
         t = which[r]
@@ -127,6 +137,7 @@ def batch(
                 until = times[order[i]] if i < n else period
                 if until != done:
                     steps = step_count(until - done, step)
+                    begin_stretch(state, volts, until - done, joints, modes, begun)
                     advance_of(
                         kind,
                         own,
@@ -141,11 +152,11 @@ def batch(
                         settings[t],
                         work,
                     )
+                    end_stretch(state, volts, until - done, joints, modes, begun)
                 done = until
                 if i < n:
                     j = order[i]
                     volts[j] = motor_volts(queue[(k - late[j]) % QUEUE, j], joints[j])
-            warm_up(state, volts, shared, joints)
 
 
 @internal
@@ -160,6 +171,8 @@ def at_rest(
         state[j, CURRENT] = steady_current(joints[j], 0.0 * volts[j], volts[j], initial[j, 1])
         pull = motor_gain(joints[j], 0.0 * volts[j]) * volts[j]
         level = work[general_motion.LEVEL, j]
+        if flags[j] & at.HAS_STICTION:
+            level += joints[j, at.BREAKAWAY]
         if level.real > 0.0 and initial[j, 1].real == 0.0:
             state[j, DEFLECTION] = clamped((pull - weights[j]) / level, 1.0 + 0.0 * pull)
         if flags[j] & at.HAS_FLEXIBILITY:

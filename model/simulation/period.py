@@ -12,7 +12,7 @@ from model.drives.controller import LAST_READING, board_pid, cascade, sampled_pi
 from model.drives.sensor import reading
 from model.dynamics.compilation import internal
 from model.machine_model import layout as at
-from model.simulation.joint_torques import POSITION, RISE, SPEED
+from model.simulation.joint_torques import POSITION, RISE, ROTOR_POSITION, ROTOR_SPEED, SPEED
 
 QUEUE = 16
 """Commands kept: the drive may act up to 14 periods late."""
@@ -98,12 +98,42 @@ def step_count(duration: complex, step: float) -> int:
     return max(1, int(np.ceil(duration.real / step - 1e-9)))
 
 
+# What a stretch of constant volts begins with, of each motor.
+BEGUN_POSITION, BEGUN_SPEED, BEGUN_RISE = range(3)
+BEGUN = 3
+
+
 @internal
-def warm_up(state: NDArray[Any], volts: NDArray[Any], shared: NDArray[Any], joints: NDArray[Any]) -> None:
-    """Resistance of each winding after one more period."""
+def begin_stretch(
+    state: NDArray[Any], volts: NDArray[Any], duration: complex, joints: NDArray[Any], flags: NDArray[Any],
+    begun: NDArray[Any],
+) -> None:  # fmt: skip
+    """Remembers in `begun` (BEGUN, n) where each motor is; gives windings the resistance of the stretch's middle."""
     for j in range(joints.shape[0]):
         if joints[j, at.HEATING] != 0.0:
-            state[j, RISE] = warmed(state[j, RISE], volts[j], state[j, SPEED], shared[at.PERIOD], joints[j])
+            gives = flags[j] & at.HAS_FLEXIBILITY != 0
+            speed = state[j, ROTOR_SPEED] if gives else state[j, SPEED]
+            rise = state[j, RISE]
+            begun[BEGUN_POSITION, j] = state[j, ROTOR_POSITION] if gives else state[j, POSITION]
+            begun[BEGUN_SPEED, j], begun[BEGUN_RISE, j] = speed, rise
+            state[j, RISE] = warmed(rise, rise, volts[j], speed, speed, speed, 0.5 * duration, joints[j])
+
+
+@internal
+def end_stretch(
+    state: NDArray[Any], volts: NDArray[Any], duration: complex, joints: NDArray[Any], flags: NDArray[Any],
+    begun: NDArray[Any],
+) -> None:  # fmt: skip
+    """Resistance of each winding after the stretch, from the motion that it had."""
+    for j in range(joints.shape[0]):
+        if joints[j, at.HEATING] != 0.0:
+            gives = flags[j] & at.HAS_FLEXIBILITY != 0
+            ended = state[j, ROTOR_SPEED] if gives else state[j, SPEED]
+            moved = (state[j, ROTOR_POSITION] if gives else state[j, POSITION]) - begun[BEGUN_POSITION, j]
+            state[j, RISE] = warmed(
+                begun[BEGUN_RISE, j], state[j, RISE], volts[j], begun[BEGUN_SPEED, j], ended, moved / duration,
+                duration, joints[j],
+            )  # fmt: skip
 
 
 @internal

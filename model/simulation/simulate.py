@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 POSTURE_UNITS = 1000
 
 LONGEST_STEP = 1e-3
-"""s; with it the arm's motion is right to a thousandth of an ADC count (benchmarks/simulation.py)."""
+"""s; with it readings are right to some 0.005 counts, contacts apart (docs/modelling.md has each effect)."""
 
 
 @dataclass(frozen=True)

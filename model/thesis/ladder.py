@@ -45,6 +45,8 @@ LARGEST_FRICTION_ARM = 0.5
 BACK_EMF_DEVIATION = DATA_SHEET_BACK_EMF_2 * gaussian_share("source")
 """V·s/rad, τ′ of K_b2 at its data-sheet value."""
 CURVE_POINTS = 25
+RECOVERED = 0.25
+"""Relative error within which a fitted parameter counts as that of the plant."""
 
 PLAIN = FitOptions(
     use_priors=False,
@@ -252,6 +254,19 @@ def ladder_checks(steps: Sequence[LadderStep]) -> tuple[Check, ...]:
             ours=f"joint {worst_first}",
             published="joint 2",
         ),
+    )
+
+
+def not_recovered(ladder: Ladder) -> str:
+    """In a sentence: which parameters of the last model come out far from table 7.9, with which the plant was made."""
+    last = ladder.steps[-1]
+    truth = last.published_values
+    off = [s for s, v in last.values.items() if abs(v / truth[s] - 1) > RECOVERED]
+    told = ", ".join(f"{s} {last.values[s]:.3g} for {truth[s]:.3g}" for s in off)
+    return (
+        f"{ladder.method}: one ramp does not tell the {len(last.values)} parameters of the last model. It fits to "
+        f"{last.error:.2g} rad², and of the values of table 7.9, which the mock's plant has, "
+        + (f"{len(off)} come out more than {RECOVERED:.0%} off: {told}." if off else "all come out.")
     )
 
 

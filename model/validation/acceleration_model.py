@@ -65,15 +65,17 @@ def expected_accelerations(model: Model, motion: MeasuredMotion, names: Sequence
     return np.ascontiguousarray(plain), derivatives
 
 
-def damping_rates(model: Model, motion: MeasuredMotion) -> Floats:
-    """How fast accelerations answer to speed (n,), 1/s: −∂f/∂q̇ of each joint, its mean along the motion."""
-    rates = np.empty(model.joint_count)
-    for j in range(model.joint_count):
+def speed_answers(model: Model, motion: MeasuredMotion) -> Floats:
+    """How strongly accelerations answer to speeds (n, n), 1/s: rms of ∂f_i/∂q̇_j along the motion."""
+    n = model.joint_count
+    answers = np.empty((n, n))
+    for j in range(n):
         speed = motion.speed.astype(np.complex128)
         speed[:, j] += 1j * DUAL_STEP
         stepped = MeasuredMotion(**{**vars(motion), "speed": speed})
-        rates[j] = -(_accelerations(model, stepped, model.vector.astype(np.complex128)).imag[:, j] / DUAL_STEP).mean()
-    return rates
+        slopes = _accelerations(model, stepped, model.vector.astype(np.complex128)).imag / DUAL_STEP
+        answers[:, j] = np.sqrt((slopes**2).mean(axis=0))
+    return answers
 
 
 def _accelerations(model: Model, motion: MeasuredMotion, vector: NDArray[Any]) -> NDArray[Any]:

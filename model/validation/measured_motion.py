@@ -10,11 +10,12 @@ from scipy.interpolate import CubicSpline
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
+from model.dynamics.compilation import compiled
 from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
 from model.validation import differentiation as d
-from model.validation.acceleration_model import MeasuredMotion, damping_rates
+from model.validation.acceleration_model import MeasuredMotion, speed_answers
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -33,8 +34,10 @@ SHORTEST = 12
 class Observation:
     """A trace as the time-domain form uses it.
 
-    motion: smoothed. acceleration: (k, n) rad/s², with the same smoothing. noise: (n,) standard deviation of the
-    difference between measured and expected acceleration. usable: (k, n) where a joint moves and nothing is missing.
+    motion: smoothed. acceleration: (k, n) rad/s², with the same smoothing. usable: (k, n) where a joint moves and
+    nothing is missing. noise: (n,) standard deviation that noise and rounding of the readings give the difference of
+    measured and expected acceleration: through second differences, and through the expected one's answer to the
+    speeds of all joints.
     """
 
     motion: MeasuredMotion
@@ -69,7 +72,8 @@ def observe(model: Model, trace: Trace, smoothing: float | None = None) -> Obser
     friction = d.smoothed(_friction_deflection(model, measured), width)
     motion = MeasuredMotion(inputs.time, position, speed, friction, inputs.drive, inputs.period, width)
     gain = d.noise_gain(width, inputs.period)
-    noise = deviation * np.hypot(gain.acceleration, damping_rates(model, motion) * gain.speed)
+    through_speed = speed_answers(model, motion) @ np.diag(deviation * gain.speed)
+    noise = np.hypot(deviation * gain.acceleration, np.linalg.norm(through_speed, axis=1))
     reach = int(np.ceil(2 * width)) + 2
     complete = ~_spread(~present, reach)
     complete[:reach] = complete[len(complete) - reach :] = False
@@ -100,12 +104,19 @@ def _friction_deflection(model: Model, measured: Floats) -> Floats:
     count = len(measured)
     between = CubicSpline(np.arange(count), measured)(np.arange((count - 1) * FINE + 1) / FINE)
     contact = np.zeros_like(between)
-    for k in range(1, len(between)):
-        contact[k] = np.clip(contact[k - 1] + (between[k] - between[k - 1]) / presliding, -1.0, 1.0)
+    _follow(np.diff(between, axis=0) / presliding, contact)
     weights = FINE - np.abs(np.arange(-FINE, FINE + 1))
     padded = np.pad(contact, ((FINE, FINE), (0, 0)), mode="edge")
     averaged = np.stack([np.convolve(column, weights / weights.sum(), mode="valid") for column in padded.T], axis=1)
     return np.asarray(averaged[::FINE])
+
+
+@compiled
+def _follow(moves: Floats, contact: Floats) -> None:
+    """Prandtl's contact: each row is the one before, moved on within ±1."""
+    for k in range(moves.shape[0]):
+        for j in range(moves.shape[1]):
+            contact[k + 1, j] = min(max(contact[k, j] + moves[k, j], -1.0), 1.0)
 
 
 def _spread(mask: Mask, reach: int) -> Mask:

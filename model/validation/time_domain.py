@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from model.machine_model.model import Model
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.expected_deviation import Convention, expected_deviation
 from model.validation.measured_motion import Observation, observe
+from model.validation.noise_floor import noise_floor
 from model.validation.regressors import correlations, regressors
 from model.validation.variation import JointResidual, TimeDomain, Variation
 
@@ -22,6 +23,9 @@ Floats = NDArray[np.float64]
 
 SIGNIFICANT = 2.0
 """Standard deviations of noise beyond which a variation counts as real."""
+
+
+READINGS_ALONE = "the noise floor is that of the readings alone: the model cannot be simulated along this record"
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,7 @@ def vary_in_time(
     """How the named parameters would have to vary with time for the model to explain a trace.
 
     At each sample J_a α = q̈ − f is solved for the least α in units of expected deviations, as far as noise allows
-    (a Bayes estimate: α ~ N(0, τ′²), noise of the readings through differentiation). Rounding of the drive, motion
+    (a Bayes estimate: α ~ N(0, τ′²), and the noise floor of `noise_floor`). Rounding of the drive, motion
     between samples and the delay are accounted for; a rotor's current, heat and sensors' errors are not varied.
 
     Raises:
@@ -51,6 +55,10 @@ def vary_in_time(
     if not names:
         raise SpecError("no parameters: name at least one")
     observation = observe(model, trace, smoothing)
+    progress(0.1, "noise floor")
+    floor, simulated = noise_floor(model, trace, observation)
+    observation = replace(observation, noise=floor)
+    stop_if(cancel)
     progress(0.3, "exact Jacobians along the motion")
     expected, jacobian = expected_accelerations(model, observation.motion, names)
     stop_if(cancel)
@@ -68,7 +76,7 @@ def vary_in_time(
             _variation(model, name, k, solution, residual, jacobian, observation, deviations[k], known)
             for k, name in enumerate(names)
         ),
-        notes=tuple(_notes(names, solution, observation)),
+        notes=tuple(_notes(names, solution, observation, simulated=simulated)),
     )  # fmt: skip
     progress(1.0, "time-domain form: done")
     return result
@@ -134,8 +142,9 @@ def _optional(values: Floats, present: NDArray[np.bool_]) -> tuple[float | None,
     return tuple(float(v) if p else None for v, p in zip(values, present, strict=True))
 
 
-def _notes(names: Sequence[str], solution: _Solution, observation: Observation) -> list[str]:
-    notes = [f"{name}: does not act on the accelerations of this record" for k, name in enumerate(names)
+def _notes(names: Sequence[str], solution: _Solution, observation: Observation, *, simulated: bool) -> list[str]:
+    notes = [] if simulated else [READINGS_ALONE]
+    notes += [f"{name}: does not act on the accelerations of this record" for k, name in enumerate(names)
              if not solution.active[:, k].any()]  # fmt: skip
     if len(names) > solution.alpha.shape[1] or len(names) > observation.acceleration.shape[1]:
         joints = observation.acceleration.shape[1]

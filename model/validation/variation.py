@@ -31,7 +31,7 @@ class Correlation(_Part):
 class Variation(_Part):
     """α(t) of one parameter, all parameters moving together as little as explains the motion.
 
-    `values` and `noise` (the standard deviation that noise of the readings gives α) are in `unit` at the result's
+    `values` and `noise` (the standard deviation that the noise floor gives α) are in `unit` at the result's
     times; None where no joint that the parameter acts on moves. `deviation` is the rms of α (4.23), corrected for
     noise, `expected` is τ′, `mean` is what a constant change would be. `significant` is the share of times at which
     α lies beyond noise. `alone_constant` and `alone_varying` are the shares of the residual's energy (beyond noise)
@@ -58,13 +58,21 @@ class Variation(_Part):
 
 
 class JointResidual(_Part):
-    """Measured less expected acceleration of a joint (rad/s²; None where it does not move) and what it goes with."""
+    """Measured less expected acceleration of a joint (rad/s²; None where it does not move) and what it goes with.
+
+    `noise` is its noise floor: the root mean square that is left of records which the model itself has made.
+    """
 
     joint: int
     values: tuple[float | None, ...]
     noise: float
     rms: float
     against: tuple[Correlation, ...]
+
+    @property
+    def in_floors(self) -> float:
+        """Root mean square of the residual over the noise floor: about 1 where the model is right."""
+        return self.rms / self.noise
 
 
 class TimeDomain(_Part):

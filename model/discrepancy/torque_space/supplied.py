@@ -17,10 +17,9 @@ from model.simulation.joint_torques import (
     CURRENT,
     RISE,
     STATE,
-    current_after,
     extra_torque,
-    mean_current,
     steady_current,
+    winding_functions,
 )
 from model.simulation.own_torque import own_torque
 from model.simulation.period import extra_flags
@@ -93,12 +92,18 @@ def supplied_torque(
 
 @internal
 def _motor_torque(joint: NDArray[Any], flags: int, state: NDArray[Any], volts: float, speed: float, h: float) -> Any:
-    """Torque of a motor at its joint; warms its winding, and advances its current where that lags."""
+    """Torque of a motor at its joint; warms its winding, and advances its current where that lags.
+
+    The settled current of a sample is held for the interval before it, and the interval's mean current is given: of a
+    settled current that rises evenly it lags behind by the winding's time constant.
+    """
     if joint[at.HEATING] != 0.0:
-        state[RISE] = warmed(state[RISE], volts, speed, h, joint)
+        state[RISE] = warmed(state[RISE], state[RISE], volts, speed, speed, speed, h, joint)
     current = steady_current(joint, state[RISE], volts, speed)
     if flags & at.HAS_INDUCTANCE:
-        steady = current
-        current = mean_current(joint, state[RISE], state[CURRENT], steady, h)
-        state[CURRENT] = current_after(joint, state[RISE], state[CURRENT], steady, h)
+        turns = joint[at.RESISTANCE] * (1.0 + state[RISE]) / joint[at.INDUCTANCE] * h
+        share, _, _ = winding_functions(turns)
+        excess = state[CURRENT] - current
+        state[CURRENT] = current + excess * (1.0 - turns * share)
+        current += excess * share
     return joint[at.GEAR] * joint[at.TORQUE_CONSTANT] * current

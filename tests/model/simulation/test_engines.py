@@ -53,7 +53,7 @@ def test_flexible_closed_form_and_recursive_runs_agree(model: Model) -> None:
     assert np.abs(fast.position - simulate(model, inputs, Options(quantise=False)).position).max() > COUNT
 
 
-def test_steps_of_one_millisecond_are_right_to_a_thousandth_of_a_count(model: Model) -> None:
+def test_steps_of_one_millisecond_follow_the_arm_as_its_machine_file_has_it(model: Model) -> None:
     inputs = ramp_inputs(model.machine)
     exact = simulate(model, inputs, Options(quantise=False, step=1e-3 / 16)).position
     error = np.abs(simulate(model, inputs, Options(quantise=False)).position - exact).max()

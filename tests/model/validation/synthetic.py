@@ -14,6 +14,8 @@ from model.simulation.simulate import Options, simulate
 
 PERIOD = 0.02
 START = (np.pi, np.pi / 4, 0.0)
+REST_BEFORE = 40
+"""Periods."""
 
 
 def arm() -> Model:
@@ -21,23 +23,38 @@ def arm() -> Model:
     return base_model(load_machine("ma2000"))
 
 
-def ramp_trace(plant: Model, seconds: float = 1.6, seed: int = 0) -> Trace:
-    """The experiment's ramp (section 6.5) run by `plant`, with the sensors' noise."""
+def ramp_trace(plant: Model, seconds: float = 1.6, seed: int = 0, *, held: bool = False) -> Trace:
+    """The experiment's ramp (section 6.5) run by `plant`, with the sensors' noise.
+
+    `held`: it begins with the arm held by its drive, as a real one does; else with no drive, and it sinks at first.
+    """
     time = PERIOD * np.arange(round(seconds / PERIOD))
     rise = np.radians(21.6) * np.clip((time - 0.2) / 0.65, 0, 1)
-    return _run(plant, np.array(START) + rise[:, None], seed)
+    return _run(plant, np.array(START) + rise[:, None], seed, held)
 
 
-def swinging_trace(plant: Model, seconds: float = 6.0, seed: int = 0) -> Trace:
-    """Two sines a joint, out of step."""
+def swinging_trace(plant: Model, seconds: float = 6.0, seed: int = 0, *, held: bool = False) -> Trace:
+    """Two sines a joint, out of step; `held` as above."""
     time = np.maximum(PERIOD * np.arange(round(seconds / PERIOD)) - 0.2, 0)
     waves = [
         np.sin(2 * np.pi * (0.4 + 0.13 * j) * time) + 0.5 * np.sin(2 * np.pi * (1.1 + 0.2 * j) * time) for j in range(3)
     ]
-    return _run(plant, np.array(START) + np.radians(20) * np.stack(waves, axis=1), seed)
+    return _run(plant, np.array(START) + np.radians(20) * np.stack(waves, axis=1), seed, held)
 
 
-def _run(plant: Model, set_points: np.ndarray, seed: int) -> Trace:
+def multisine_trace(plant: Model, seconds: float = 12.0, seed: int = 0, *, held: bool = False) -> Trace:
+    """Six tones a joint between 0.1 and 0.8 Hz, of 20°, 14° and 20°; other phases with every seed; `held` as above."""
+    time = np.maximum(PERIOD * np.arange(round(seconds / PERIOD)) - 0.2, 0)
+    phases = np.random.default_rng([seed, 1]).uniform(0, 2 * np.pi, (6, 3))
+    tones = np.linspace(0.1, 0.8, 6)
+    waves = sum(np.sin(2 * np.pi * f * time[:, None] + p) - np.sin(p) for f, p in zip(tones, phases, strict=True))
+    scale = np.radians((20.0, 14.0, 20.0)) / np.abs(waves).max(axis=0)
+    return _run(plant, np.array(START) + scale * waves, seed, held)
+
+
+def _run(plant: Model, set_points: np.ndarray, seed: int, held: bool) -> Trace:
+    before = REST_BEFORE if held else 0
+    set_points = np.concatenate([np.repeat(set_points[:1], before, axis=0), set_points])
     count = len(set_points)
     record = TraceRecord(
         trace_id=f"synthetic-{seed}", created=datetime(2026, 1, 1, tzinfo=UTC), software="test", source="imported",
@@ -49,4 +66,8 @@ def _run(plant: Model, set_points: np.ndarray, seed: int) -> Trace:
     )  # fmt: skip
     noise = 0.3 * np.random.default_rng(seed).standard_normal((count, 3))
     run = simulate(plant, trace, Options(noise=noise))
-    return replace(trace, position=run.reading, drive=run.drive)
+    kept = slice(before, None)
+    return replace(
+        trace, time=trace.time[kept], tick=np.arange(count)[kept], set_point=set_points[kept],
+        position=run.reading[kept], drive=run.drive[kept],
+    )  # fmt: skip

@@ -2744,6 +2744,8 @@ export interface components {
         /**
          * JointResidual
          * @description Measured less expected acceleration of a joint (rad/s²; None where it does not move) and what it goes with.
+         *
+         *     `noise` is its noise floor: the root mean square that is left of records which the model itself has made.
          */
         JointResidual: {
             /** Joint */
@@ -4826,7 +4828,7 @@ export interface components {
          * Variation
          * @description α(t) of one parameter, all parameters moving together as little as explains the motion.
          *
-         *     `values` and `noise` (the standard deviation that noise of the readings gives α) are in `unit` at the result's
+         *     `values` and `noise` (the standard deviation that the noise floor gives α) are in `unit` at the result's
          *     times; None where no joint that the parameter acts on moves. `deviation` is the rms of α (4.23), corrected for
          *     noise, `expected` is τ′, `mean` is what a constant change would be. `significant` is the share of times at which
          *     α lies beyond noise. `alone_constant` and `alone_varying` are the shares of the residual's energy (beyond noise)

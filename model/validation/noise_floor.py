@@ -1,0 +1,65 @@
+"""What the time-domain form leaves of a record that the model's own law has made: its noise floor, rad/s².
+
+Three things come together there, and only the first follows from a formula. (1) Noise and rounding of the readings go
+through differentiation and through the model's answer to speed (`measured_motion.observe`). (2) Between two samples the
+drive steps and the speed is not what samples show. (3) Where a motion turns, friction turns with it, and one count of
+noise decides when. So the model takes the arm's place: the record's set points, noise drawn anew, readings rounded, and
+what the very same differentiation leaves of that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import DaqError
+from daq.contracts.machine import NoController
+from daq.contracts.trace import Trace
+from model.machine_model.model import Model
+from model.simulation.inputs import inputs_of
+from model.simulation.simulate import Options, simulate
+from model.validation.acceleration_model import expected_accelerations
+from model.validation.measured_motion import Observation, observe
+
+Floats = NDArray[np.float64]
+
+FEWEST, MOST, SECONDS, SEED = 12, 40, 80.0, 1991
+"""Replicas of a record: enough for so many seconds, since friction turns but a few times in a short one."""
+
+
+def noise_floor(model: Model, trace: Trace, observation: Observation) -> tuple[Floats, bool]:
+    """Root mean square (n,) of each joint's acceleration residual where the model is right, rad/s² (m/s²): the median
+    over records that it makes.
+
+    Returns also whether it was simulated. Where it cannot be, or on a joint that does not move in the simulation: the
+    readings' noise alone, as `observation` has it.
+    """
+    smoothing = observation.motion.width * observation.motion.period
+    rng = np.random.default_rng(SEED)
+    replicas = int(np.clip(SECONDS / (trace.time[-1] - trace.time[0]), FEWEST, MOST))
+    sizes = np.zeros((replicas, model.joint_count))
+    try:
+        for replica in sizes:
+            own = observe(model, _made_by(model, trace, rng), smoothing)
+            left = np.where(own.usable, own.acceleration - expected_accelerations(model, own.motion, ())[0], 0.0)
+            replica[:] = np.sqrt((left**2).sum(axis=0) / np.maximum(own.usable.sum(axis=0), 1))
+    except DaqError:
+        return observation.noise, False
+    median = np.median(sizes, axis=0)
+    return np.where(median > 0, median, observation.noise), True
+
+
+def _made_by(model: Model, trace: Trace, rng: np.random.Generator) -> Trace:
+    """The record that the model would have left: closed loop where there are set points, else from the drive."""
+    machine = model.machine
+    closed = trace.set_point is not None and not isinstance(machine.controller, NoController)
+    sensors = [machine.joint(j).sensor for j in machine.modelled_joints]
+    deviation = np.array([0.0 if s is None or s.noise is None else s.noise.value for s in sensors])
+    noise = deviation * rng.standard_normal((len(inputs_of(trace, machine)), len(sensors)))
+    run = simulate(model, trace, Options(loop="closed" if closed else "open", noise=noise))
+    columns = [trace.column(j) for j in machine.modelled_joints]
+    position, drive = trace.position.copy(), np.asarray(trace.drive).copy()
+    position[:, columns], drive[:, columns] = run.at_samples(run.reading), run.at_samples(run.drive)
+    return replace(trace, position=position, drive=drive)

@@ -1,0 +1,22 @@
+"""What `daq thesis` computes with its default options, but for the hill climbing, which takes a minute."""
+
+from __future__ import annotations
+
+import pytest
+
+from daq.cli.thesis import recorded_ramp
+from daq.contracts.trace import Trace
+from model.thesis.reproduction import Reproduction, reproduce_thesis
+
+DEFAULT_SEED = 1991
+
+
+@pytest.fixture(scope="session")
+def ramp() -> Trace:
+    """The record that the command makes."""
+    return recorded_ramp(DEFAULT_SEED)
+
+
+@pytest.fixture(scope="session")
+def result(ramp: Trace) -> Reproduction:
+    return reproduce_thesis([ramp], ("least_squares",))
