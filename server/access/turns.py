@@ -58,6 +58,6 @@ class Turn:
 
 def _is_plain_question(scope: Scope) -> bool:
     """One that is answered from what is there: no change, no stop, and none that waits for news."""
-    if scope["method"] not in ("GET", "HEAD") or b"wait=" in scope["query_string"]:
+    if scope["method"] not in ("GET", "HEAD") or b"wait=" in scope.get("query_string", b""):
         return False
     return ASKS_THE_ROBOT.fullmatch(scope["path"]) is None
