@@ -2,11 +2,11 @@
 
     python -m benchmarks run_kills [--moments 100] [--seed 1991]
 
-Each of four ways to end a run meets that many runs, each on a mock of its own in lock-step: the same run gives the same
-samples to the last bit, whatever the computer does. Afterwards nothing may be left running, the port must be free, the
-arm must be frozen or hold (frozen where the record had begun, unless the acquisition process itself was killed), and
-every trace, salvaged where need be, must be the undisturbed run's up to the stop; what was recorded after that is held
-against the mock's own record.
+Each of four ways to end a run meets that many runs, half of them while they are recorded, each on a mock of its own in
+lock-step: the same run gives the same samples to the last bit, whatever the computer does. Afterwards nothing may be
+left running, the port must be free, the arm must be frozen or hold (frozen where the record had begun, unless the
+acquisition process itself was killed), and every trace, salvaged where need be, must be the undisturbed run's up to the
+stop; what was recorded after that is held against the mock's own record.
 """
 
 from __future__ import annotations
@@ -88,11 +88,12 @@ class Findings:
 
 @dataclass(frozen=True)
 class Undisturbed:
-    """A run that nobody ended: its trace, and the s that it took from the start of each process."""
+    """A run that nobody ended: its trace, and the s that it took from the start of each process and of the record."""
 
     trace: Trace
     command: float
     acquisition: float
+    record: float
 
 
 @dataclass
@@ -144,11 +145,13 @@ def undisturbed() -> Undisturbed:
         run = here.start()
         until_acquiring(run)
         acquiring = time.monotonic()
+        once_recording(here)
+        recording = time.monotonic()
         if run.wait(10 * ENDS_WITHIN) != 0:
             raise RuntimeError(f"the undisturbed run ended with {run.returncode}")
         ended = time.monotonic()
         (path,) = here.traces()
-        return Undisturbed(read_trace(path), ended - begun, ended - acquiring)
+        return Undisturbed(read_trace(path), ended - begun, ended - acquiring, ended - recording)
 
 
 def until_acquiring(run: subprocess.Popen[bytes]) -> int:
@@ -164,6 +167,16 @@ def until_acquiring(run: subprocess.Popen[bytes]) -> int:
 def after(share: float, way: Way, whole: Undisturbed) -> Callable[[Desk], None]:
     """Waits for a share (0 to 1) of what the undisturbed run took from the start of the process that is met."""
     return lambda _desk: time.sleep(share * (whole.acquisition if way.acquisition else whole.command))
+
+
+def within_the_record(share: float, whole: Undisturbed) -> Callable[[Desk], None]:
+    """Waits until there is a record, and then for a share (0 to 1) of what the undisturbed run took to make it."""
+
+    def wait(here: Desk) -> None:
+        once_recording(here)
+        time.sleep(share * whole.record)
+
+    return wait
 
 
 def once_recording(here: Desk) -> None:
@@ -309,7 +322,9 @@ def measure(moments: int, seed: int) -> tuple[Findings, dict[str, int]]:
     for number in range(moments):
         for way in WAYS:
             share = random.uniform(0.0, 1.0)
-            end_one(way, after(share, way, whole), f"{way.name} at {share:.3f}", whole, machine, findings)
+            moment = within_the_record(share, whole) if number % 2 else after(share, way, whole)
+            of_what = "the record" if number % 2 else "the run"
+            end_one(way, moment, f"{way.name} at {share:.3f} of {of_what}", whole, machine, findings)
             ended[way.name] += 1
         print(f"  moment {number + 1} of {moments}: {len(findings.wrong)} wrong", file=sys.stderr, flush=True)
     return findings, dict(ended)

@@ -35,6 +35,9 @@ WARM_UP = 3.0
 """s until all clients ask."""
 PATIENCE = 30.0
 """s for one stop; it counts as not answered then."""
+OWN_DOOR, LISTENER = "the service's own door", "the stop listener"
+ALONE = 100
+"""Stops at each door without load."""
 OWN_TARGET, LISTENER_TARGET = 3.0, 1.0
 """s: what `daq.client` waits for one door; and that an operator at the page does not press again."""
 
@@ -100,21 +103,47 @@ def stop(host: str, port: int) -> float | None:
     return None
 
 
-def measure(service: RunningService, stops: int) -> tuple[dict[str, list[float | None]], float]:
-    """Times at each door (s), and how many questions were answered a second meanwhile."""
-    where, random = urlsplit(service.url), dice(1991)
+Times = dict[str, list[float | None]]
+"""Of stops at each door, s; None for one that was not answered."""
+
+
+def at_both_doors(url: str, stops: int, pause: float) -> Times:
+    """So many stops at each, up to `pause` s after one another."""
+    where, random = urlsplit(url), dice(1991)
     assert where.hostname is not None
     assert where.port is not None
-    doors = {"the service's own door": where.port, "the stop listener": stop_port_after(where.port)}
-    found: dict[str, list[float | None]] = {name: [] for name in doors}
+    doors = {OWN_DOOR: where.port, LISTENER: stop_port_after(where.port)}
+    found: Times = {name: [] for name in doors}
+    for _ in range(stops):
+        for name, port in doors.items():
+            time.sleep(random.uniform(0.0, pause))
+            found[name].append(stop(where.hostname, port))
+    return found
+
+
+def measure(service: RunningService, stops: int) -> tuple[Times, Times, float]:
+    """Times without load and under it, and how many questions were answered a second meanwhile."""
+    alone = at_both_doors(service.url, ALONE, 0.05)
     with load(service.url) as answered:
         before, begun = answered.value, time.monotonic()
-        for _ in range(stops):
-            for name, port in doors.items():
-                time.sleep(random.uniform(0.0, 0.5))
-                found[name].append(stop(where.hostname, port))
+        loaded = at_both_doors(service.url, stops, 0.5)
         rate = (answered.value - before) / (time.monotonic() - begun)
-    return found, rate
+    return alone, loaded, rate
+
+
+def figures_of(alone: Times, loaded: Times, rate: float) -> list[Figure]:
+    """The table."""
+    figures = []
+    for name, times in alone.items():
+        known = [PATIENCE if one is None else one for one in times]
+        value = f"p50 {1e3 * quantile(known, 0.5):.1f} ms, p99 {1e3 * quantile(known, 0.99):.1f} ms"
+        figures.append(Figure(f"stop to its confirmed answer at {name}, without load", value, beside=f"{len(times)}"))
+    for name, target in ((OWN_DOOR, OWN_TARGET), (LISTENER, LISTENER_TARGET)):
+        known = [PATIENCE if one is None else one for one in loaded[name]]
+        silent = sum(one is None for one in loaded[name])
+        beside = f"p50 {quantile(known, 0.5):.3f} s, {silent} of {len(known)} not answered"
+        figures.append(at_most(f"the same at {name} under load, slowest", max(known), target, "s", beside))
+    return [*figures, Figure("questions answered meanwhile", f"{rate:.0f} a second")]
 
 
 def main() -> int:
@@ -126,14 +155,8 @@ def main() -> int:
     stops = 5 if given.quick else given.stops
     with tempfile.TemporaryDirectory() as folder, started_service(Path(folder), PORT) as service:
         service.ask("POST", "/connect")
-        found, rate = measure(service, stops)
+        figures = figures_of(*measure(service, stops))
         service.ask("POST", "/disconnect")
-    figures = []
-    for (name, times), target in zip(found.items(), (OWN_TARGET, LISTENER_TARGET), strict=True):
-        known = [PATIENCE if one is None else one for one in times]
-        beside = f"p50 {quantile(known, 0.5):.3f} s, {sum(one is None for one in times)} of {len(times)} not answered"
-        figures.append(at_most(f"stop to its confirmed answer at {name}, slowest", max(known), target, "s", beside))
-    figures.append(Figure("questions answered meanwhile", f"{rate:.0f} a second"))
     title = f"Stops while {CLIENTS} clients ask and {PROGRAMS} programs compute"
     return show(title, f"python -m benchmarks stop_under_load --stops {stops}", figures)
 
