@@ -12,7 +12,7 @@ MIB = 1 << 20
 class TraceLimits(BaseModel):
     """What a reader of traces accepts at most; section `[traces.limits]` of the configuration.
 
-    The defaults hold ten hours of three joints at 50 Hz, and a chunk twenty times as large as the largest that a
+    The defaults hold nine hours of six joints at 50 Hz, and a chunk twenty times as large as the largest that a
     recording writes.
     """
 
@@ -26,6 +26,7 @@ class TraceLimits(BaseModel):
     """Size of all chunks of a file once they are uncompressed."""
     records: Annotated[int, Field(ge=1)] = 20_000_000
     """Records of a file, its messages among them. One sample takes a message a joint and one more."""
+    events: Annotated[int, Field(ge=0)] = 1_000_000
     attachments: Annotated[int, Field(ge=0)] = 100
     attachment_bytes: Annotated[int, Field(ge=0)] = 64 * MIB
     """Size of all attachments of a file."""

@@ -91,8 +91,10 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
     a missing or unknown column, text, NaN, time that does not increase, rows of unequal length.
     """
     path = Path(path)
-    data, beside_data = _read(path, limits), _read_beside(toml_path(path), limits)
-    beside = _beside(toml_path(path), beside_data)
+    data = _read(path, limits.file_bytes, "file_bytes")
+    toml = toml_path(path)
+    beside_data = _read(toml, limits.metadata_bytes, "metadata_bytes") if toml.exists() else None
+    beside = _beside(toml, beside_data)
     header, table = _read_table(path, data, limits)
     joints = _joints(path, header, beside)
     _check_bounds(path, header, table)
@@ -159,7 +161,7 @@ def _joints(path: Path, header: list[str], beside: Beside) -> tuple[int, ...]:
 def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str], Floats]:
     """Header and numbers (rows, columns), all finite. Raises TraceError."""
     try:
-        rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""))
+        rows = csv.reader(io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig", newline=""))
         header = [name.strip() for name in next(rows, [])]
         _check_header(path, header)
         return header, _numbers(path, header, rows, limits)
@@ -239,16 +241,12 @@ def _refuse_value(path: Path, number: int, header: list[str], row: list[str]) ->
             raise TraceError(f"{path}: row {number}, column {name!r}: {text!r} is not a finite number")
 
 
-def _read(path: Path, limits: TraceLimits) -> bytes:
+def _read(path: Path, most: int, limit: str) -> bytes:
     try:
         with disk.open_regular(path) as stream:
-            return disk.read_at_most(stream, limits.file_bytes, str(path))
+            return disk.read_at_most(stream, most, str(path), limit)
     except OSError as error:
         raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
-
-
-def _read_beside(path: Path, limits: TraceLimits) -> bytes | None:
-    return _read(path, limits) if path.exists() else None
 
 
 def _beside(path: Path, data: bytes | None) -> Beside:

@@ -12,7 +12,7 @@ from daq.contracts.errors import TraceError
 from daq.contracts.trace import TraceEvent
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import layout
-from daq.traces.scan import UNREADABLE, Scan, payloads
+from daq.traces.scan import UNREADABLE, Scan, payloads, require
 
 Samples = NDArray[Any]
 """Of one joint, (n,) of `layout.JOINT_SAMPLE_DTYPE`."""
@@ -66,6 +66,7 @@ class _Decoder:
     def __init__(self, found: Scan, joints: tuple[int, ...], limits: TraceLimits) -> None:
         self._known = frozenset(found.channels)
         self._records_left = limits.records - found.records
+        self._event_count, self._most_events = 0, limits.events
         channels = _channels(found)
         self._joints = [channels.get(f"{layout.JOINT_TOPIC}{joint}") for joint in joints]
         self._events = channels.get(layout.EVENTS_TOPIC)
@@ -81,6 +82,8 @@ class _Decoder:
             raise ValueError(f"channel {min(seen - self._known)} is not defined")
         samples = tuple(_samples(parts[channel] if channel is not None else []) for channel in self._joints)
         events = parts[self._events] if self._events is not None else []
+        self._event_count += len(events)
+        require(self._event_count, self._most_events, "there are more than {} events", "events")
         return Decoded(samples, tuple(layout.event_of(message) for message in events))
 
 

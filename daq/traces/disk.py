@@ -29,11 +29,11 @@ def size_of(stream: IO[bytes]) -> int:
     return os.fstat(stream.fileno()).st_size
 
 
-def read_at_most(stream: IO[bytes], most: int, origin: str) -> bytes:
+def read_at_most(stream: IO[bytes], most: int, origin: str, limit: str = "file_bytes") -> bytes:
     """All of a file. Raises TraceError when it has more than `most` bytes, without reading them; OSError."""
     size = size_of(stream)
     if size > most:
-        raise TraceError(f"{origin}: has {size} bytes; up to {most} are read (traces.limits.file_bytes)")
+        raise TraceError(f"{origin}: has {size} bytes; up to {most} are read (traces.limits.{limit})")
     return stream.read(size)  # of what it has now: a read of `most` bytes would make room for as many
 
 
