@@ -79,7 +79,8 @@ def metadata(name: str, fields: dict[str, str]) -> bytes:
 
 def fields_of(body: bytes) -> tuple[str, dict[str, str]]:
     """Name and fields of a metadata record."""
-    texts, position, size = [], 0, 0
+    texts: list[str] = []
+    position = size = 0
     while position < len(body):
         (size,) = struct.unpack_from("<I", body, position)
         position += 4

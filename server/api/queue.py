@@ -21,7 +21,7 @@ async def get_queue(one: RobotPart, _: Viewer) -> QueueStatus:
 
 
 @router.get("/queue/experiments", tags=["queue"])
-def list_queue(one: RobotPart, found: ServicesPart, _: Viewer, _turn: Turn) -> tuple[Experiment, ...]:
+def list_queue(one: RobotPart, found: ServicesPart, _: Viewer) -> tuple[Experiment, ...]:
     """What waits, in the order in which it will be run."""
     return tuple(found.experiments.in_order(one.robot.name))
 

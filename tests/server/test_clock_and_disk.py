@@ -153,3 +153,21 @@ def test_a_look_into_the_folder_while_a_trace_is_uploaded_takes_nothing_away(
     answer = api.post("traces", content=table, headers={"Content-Type": "text/csv"})
     assert answer.status_code == 201, answer.text
     assert api.get(f"traces/{answer.json()['id']}/data.mcap").status_code == 200
+
+
+def test_a_clock_that_leaps_ahead_makes_no_run_of_those_that_it_leaves_out(
+    api: httpx.Client, clock: WrongClock
+) -> None:
+    api.post("queue/pause")
+    schedule = api.post("schedules", json={"spec": SHORT, "every": 3600}).json()["id"]
+    while not _listed(api, f"experiments?schedule={schedule}"):
+        pass
+    before = datetime.fromisoformat(api.get(f"schedules/{schedule}").json()["next"])
+    clock.ahead = timedelta(days=3650)
+    api.post("queue/pause")  # which wakes the queue
+    while (now := datetime.fromisoformat(api.get(f"schedules/{schedule}").json()["next"])) == before:
+        pass
+    assert timedelta(0) < now - clock.utc() <= timedelta(hours=1)
+    assert (now - before) % timedelta(hours=1) == timedelta(0)
+    assert len(_listed(api, f"experiments?schedule={schedule}")) == 1
+    assert api.post("control", json={}).json()["remaining"] > 0

@@ -101,6 +101,15 @@ def test_a_file_that_cannot_be_read_is_one_line(content: bytes) -> None:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("nearly", ["1", '"yes"', '"on"', "1.0", '"True"'])
+def test_whether_an_arm_may_move_unattended_is_true_or_false(nearly: str) -> None:
+    Path("daq.toml").write_text(f"[server]\nunattended = {nearly}\n", "utf-8")
+    with pytest.raises(SpecError, match=r"server\.unattended = .*: must be true or false"):
+        load_settings()
+    Path("daq.toml").write_text("[server]\nunattended = true\n", "utf-8")
+    assert load_settings()[0].server.unattended is True
+
+
 def test_a_file_that_was_asked_for_must_be_there() -> None:
     with pytest.raises(SpecError, match=r"missing\.toml: no such file"):
         load_settings(Path("missing.toml"))
