@@ -13,6 +13,7 @@ from daq.contracts.service.experiments import Experiment, ExperimentRequest, Exp
 from daq.contracts.service.queue import QueueStatus
 from server.owner.messages import Answer, ArmReport, HaltRun, RunExperiment
 from server.problems import ProblemError, conflict
+from server.queue.attendance import Attendance
 from server.queue.due_runs import DueRuns
 from server.queue.endings import Ending, ending_of
 from server.queue.notices import Notices
@@ -24,8 +25,6 @@ from server.store.queues import QueueState
 
 LOOK_EVERY = 1.0
 """s between two looks for what has become due: the wall clock may be set meanwhile."""
-ATTENDANCE = 60.0
-"""s for which an operator's word to be there holds: an assumption."""
 log = logging.getLogger("server.queue")
 
 
@@ -58,7 +57,7 @@ class QueueDesk:
         self._changed = threading.Event()
         self._closing = False
         self._consent = False
-        self._attended_until: float | None = None
+        self._attendance = Attendance(parts.clock)
         self._running: Running | None = None
         self._waiting_for = ""
         self.notices = Notices()
@@ -125,14 +124,14 @@ class QueueDesk:
             self._parts.queues.set(self._parts.robot.name, state)  # first: what is not written stays paused
             self._state, self._written = state, True
             self._consent = self._consent or moves_real_arm
-            self._attended_until = self._parts.clock.monotonic() + ATTENDANCE
+            self._attendance.say()
         self._parts.told("queue", "resumed", actor=by)
         self.wake()
 
     def attend(self) -> None:
         """An operator says to be there, for a minute more. No lock: the event loop calls this, and may not wait."""
         self._notice_absence()  # one who comes back too late does not make up for it
-        self._attended_until = self._parts.clock.monotonic() + ATTENDANCE
+        self._attendance.say()
         self.wake()
 
     def hear(self, arm: ArmReport) -> None:
@@ -180,13 +179,10 @@ class QueueDesk:
 
     def status(self) -> QueueStatus:
         """Now. Waits for nothing, neither for a disk nor for whoever holds the queue: the event loop asks this."""
-        running, waiting_for, until = self._running, self._waiting_for, self._attended_until
-        state = self._state
+        running, waiting_for, state, left = self._running, self._waiting_for, self._state, self._attendance.left
         if not state.paused and (held := self.notices.reason):  # it is held from this moment on, and written down soon
             state = QueueState(True, held, self._parts.clock.utc())
-        left = None if until is None else until - self._parts.clock.monotonic()
-        needs_attendance = left is not None and left > 0 and self._needs_attendance()
-        attended = self._parts.clock.utc() + timedelta(seconds=left) if needs_attendance and left is not None else None
+        attended = self._parts.clock.utc() + timedelta(seconds=left) if left and self._needs_attendance() else None
         return QueueStatus(
             paused=state.paused,
             reason=state.reason,
@@ -311,7 +307,7 @@ class QueueDesk:
         robot = self._parts.robot
         if robot.arm is not None:
             self.notices.arm_reported(robot.arm)  # what this decision is made from has been noticed before it
-        attended = self._attended() or not self._needs_attendance()
+        attended = self._attendance.left > 0 or not self._needs_attendance()
         missing = what_is_missing(Circumstances(robot.identity, robot.arm, robot.problem, self._consent, attended))
         if missing is not None and missing.pause:
             self.pause(missing.pause)
@@ -319,14 +315,8 @@ class QueueDesk:
 
     def _notice_absence(self) -> None:
         """An operator who had said to be there, and says so no more, holds the queue: also while nothing waits."""
-        until = self._attended_until
-        if until is not None and not self._attended():
-            self._attended_until = None
-            if self._needs_attendance():
-                self.notices.operator_left()
-
-    def _attended(self) -> bool:
-        return self._attended_until is not None and self._parts.clock.monotonic() < self._attended_until
+        if self._attendance.has_lapsed() and self._needs_attendance():
+            self.notices.operator_left()
 
     def _carry_out(self, experiment: Experiment) -> None:
         """From its begin to its end, whatever fails meanwhile: then a person looks before the next one."""
@@ -408,7 +398,7 @@ class QueueDesk:
             try:
                 return answer.result(LOOK_EVERY)
             except TimeoutError:
-                if self._needs_attendance() and not self._attended():
+                if self._needs_attendance() and not self._attendance.left:
                     running = self._running
                     if running is not None and running.cancelled_by is None:
                         running.cancelled_by = "the service: no operator confirmed to be present"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.queue.desk import ATTENDANCE
+from server.queue.attendance import ATTENDANCE
 from server.robot.control import LEASE_TIME
 from tests.server.queue_bench import CALM, REAL, Bench
 
