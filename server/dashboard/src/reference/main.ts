@@ -12,7 +12,6 @@ theme.start((shown) => document.documentElement.classList.toggle('dark-mode', sh
 SwaggerUI({
   dom_id: '#reference',
   url: '/api/v1/openapi.json',
-  deepLinking: true,
   docExpansion: 'list',
   defaultModelsExpandDepth: 0,
   filter: true,

@@ -7,7 +7,6 @@ declare module 'swagger-ui-dist/swagger-ui-es-bundle.js' {
   interface Options {
     dom_id: string;
     url: string;
-    deepLinking: boolean;
     docExpansion: 'list' | 'full' | 'none';
     defaultModelsExpandDepth: number;
     filter: boolean;
