@@ -221,7 +221,7 @@ def test_a_program_that_is_refused_moves_nothing(daq: Daq) -> None:
 def test_control_that_another_client_has_is_told(daq: Daq, service: Service) -> None:
     lease = service.robot.post("/control", json={}).json()["lease"]
     try:
-        daq("teach", "step", "--by", "2=-3").complains(4, "has the control")
+        daq("teach", "step", "--by", "2=-3").complains(4, "has control of the robot")
     finally:
         service.robot.delete("/control", headers={"Control-Lease": lease})
 
