@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from daq.cli import completion
+from daq.cli import completion, teach_edit
 from daq.cli.consent import agreed
 from daq.cli.context import Invocation, JsonOption, YesOption, console, invocation
 from daq.cli.quantities import parse_angle, parse_per_joint_angles
@@ -34,6 +34,7 @@ app = typer.Typer(
     help="Jog, lead by the nose, steps, and playing back. Needs a configured robot, or --port.",
     no_args_is_help=True,
 )
+app.add_typer(teach_edit.app, name="edit")
 
 
 @contextmanager
