@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from daq.cli import completion, teach_programs
+from daq.cli import completion, teach_edit, teach_programs
 from daq.cli.consent import agreed
 from daq.cli.context import Invocation, JsonOption, YesOption, console, invocation
 from daq.cli.quantities import parse_angle, parse_per_joint_angles
@@ -35,6 +35,7 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 app.add_typer(teach_programs.app, name="programs")
+app.add_typer(teach_edit.app, name="edit")
 
 
 @contextmanager

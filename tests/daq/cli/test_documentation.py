@@ -43,7 +43,7 @@ COMMANDS = commands()
 
 
 def command_of(words: list[str]) -> tuple[str, ...]:
-    return next(tuple(words[:n]) for n in (2, 1) if tuple(words[:n]) in COMMANDS)
+    return next(tuple(words[:n]) for n in (3, 2, 1) if tuple(words[:n]) in COMMANDS)
 
 
 def test_every_command_has_an_example() -> None:

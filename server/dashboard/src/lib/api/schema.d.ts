@@ -2029,7 +2029,7 @@ export interface components {
              *       "duration": 0.65
              *     }
              */
-            trajectory?: components["schemas"]["Ramp"] | components["schemas"]["Step"] | components["schemas"]["Staircase"] | components["schemas"]["SlowRamp"] | components["schemas"]["Sine"] | components["schemas"]["Multisine"] | components["schemas"]["Cubic"] | components["schemas"]["Path"] | components["schemas"]["Pause"] | components["schemas"]["Sequence"];
+            trajectory?: components["schemas"]["Ramp"] | components["schemas"]["Step"] | components["schemas"]["Staircase"] | components["schemas"]["SlowRamp"] | components["schemas"]["Sine"] | components["schemas"]["Multisine"] | components["schemas"]["Cubic"] | components["schemas"]["Via"] | components["schemas"]["PickAndPlace"] | components["schemas"]["Path"] | components["schemas"]["Pause"] | components["schemas"]["Sequence"];
             /**
              * Joints
              * @default [
@@ -3493,6 +3493,47 @@ export interface components {
             trace?: number;
         };
         /**
+         * PickAndPlace
+         * @description Straight up by `lift` m, over to `amplitude` from the start, straight down: a 4-3-4 trajectory (section 3.7.2).
+         *
+         *     The lift-off and set-down points are `lift` above the ends; in between joints move by polynomials of orders 4, 3 and
+         *     4 in `pick`, `travel` and `place` s. Position, velocity and acceleration are continuous, and both ends at rest.
+         */
+        PickAndPlace: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "pick_and_place";
+            /**
+             * Amplitude
+             * @default 0.3769911184307752
+             */
+            amplitude?: number | {
+                [key: string]: number;
+            };
+            /**
+             * Lift
+             * @default 0.05
+             */
+            lift?: number;
+            /**
+             * Pick
+             * @default 1
+             */
+            pick?: number;
+            /**
+             * Travel
+             * @default 2
+             */
+            travel?: number;
+            /**
+             * Place
+             * @default 1
+             */
+            place?: number;
+        };
+        /**
          * PlainGain
          * @description A drive whose force or torque is proportional to its recorded input: N·m or N per unit of drive.
          */
@@ -4161,7 +4202,7 @@ export interface components {
          */
         Segment: {
             /** Move */
-            move: components["schemas"]["Ramp"] | components["schemas"]["Step"] | components["schemas"]["Staircase"] | components["schemas"]["SlowRamp"] | components["schemas"]["Sine"] | components["schemas"]["Multisine"] | components["schemas"]["Cubic"] | components["schemas"]["Pause"];
+            move: components["schemas"]["Ramp"] | components["schemas"]["Step"] | components["schemas"]["Staircase"] | components["schemas"]["SlowRamp"] | components["schemas"]["Sine"] | components["schemas"]["Multisine"] | components["schemas"]["Cubic"] | components["schemas"]["Via"] | components["schemas"]["Pause"];
             /** Joints */
             joints?: number[] | null;
         };
@@ -4859,6 +4900,26 @@ export interface components {
             alone_varying: number;
             /** Against */
             against: components["schemas"]["Correlation"][];
+        };
+        /**
+         * Via
+         * @description Cubic segments through via points to the last one, at rest at both ends (section 3.7.1).
+         *
+         *     `points` are angles (rad) from the start, one for all joints or one a joint; `times` (s) from the start when each is
+         *     passed, the last being the end. Position, velocity and acceleration are continuous.
+         */
+        Via: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "via";
+            /** Points */
+            points: (number | {
+                [key: string]: number;
+            })[];
+            /** Times */
+            times: number[];
         };
         /**
          * Wait

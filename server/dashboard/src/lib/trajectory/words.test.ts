@@ -11,6 +11,7 @@ describe('a trajectory in words', () => {
     expect(inWords({ kind: 'slow_ramp', amplitude: degrees(-5), speed: degrees(4) })).toEqual([
       'slow ramp −5° at 4 °/s',
     ]);
+    expect(inWords({ kind: 'via', times: [1, 2], points: [0.1, 0.2] })).toEqual(['via 2 points in 2 s']);
     expect(inWords({ kind: 'path', times: [0, 1, 2.5], positions: [[0], [1], [2]] })).toEqual([
       'path of 3 points in 2.5 s',
     ]);
