@@ -57,11 +57,12 @@ class UploadedTrace(_Message):
 
 class Answer(_Message):
     """`problem`: what is wrong with what was sent, in one line; empty where nothing is. `exhausted`: it is nothing but
-    too much. `fault`: a traceback, where the line is that of an error that nobody has foreseen. `spent`: this process
-    has grown, and is not to be used again."""
+    too much. `no_room`: nothing is wrong but that the disk is full. `fault`: a traceback, where the line is that of an
+    error that nobody has foreseen. `spent`: this process has grown, and is not to be used again."""
 
     problem: str = ""
     exhausted: bool = False
+    no_room: bool = False
     fault: str = ""
     spent: bool = False
     data: dict[str, Any] = Field(default_factory=dict)

@@ -15,6 +15,7 @@ from daq.contracts.errors import DaqError
 from server.bounded.messages import ORDER, Answer, Limits, ReadUpload
 from server.bounded.motion import worked_out
 from server.bounded.upload import read_upload
+from server.problems import NO_ROOM
 
 NICENESS = 10
 GROWN = 256 << 20
@@ -50,7 +51,7 @@ def answered(line: str, limits: Limits) -> Answer:
         done = read_upload(order) if isinstance(order, ReadUpload) else worked_out(order)
         return Answer(data=done.model_dump(mode="json"), spent=_has_grown())
     except DaqError as error:
-        return Answer(problem=_short(str(error)), spent=_has_grown())
+        return Answer(problem=_short(str(error)), no_room=_is_of_the_disk(error), spent=_has_grown())
     except MemoryError:
         line = f"needs more than the {limits.memory >> 20} MB of memory that there are for it"
         return Answer(problem=line, exhausted=True, spent=True)
@@ -59,6 +60,15 @@ def answered(line: str, limits: Limits) -> Answer:
     except Exception as error:  # noqa: BLE001 - whatever a file makes of its reader is what is wrong with the file
         line = f"cannot be read: {type(error).__name__}: {error}"
         return Answer(problem=_short(line), fault=traceback.format_exc()[-4000:], spent=True)
+
+
+def _is_of_the_disk(error: BaseException | None) -> bool:
+    """Whether nothing more can be written, at the end of what caused an error."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in NO_ROOM:
+            return True
+        error = error.__cause__
+    return False
 
 
 def _listen(orders: queue.SimpleQueue[str]) -> None:

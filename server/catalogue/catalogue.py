@@ -63,13 +63,13 @@ class Catalogue:
             if target.exists():
                 advice = "it is the same trace: nothing needs to be done"
                 raise conflict("trace-exists", f"{target.name} is there already", advice)
-            disk.rename(source, target)
             taken = False
             try:
+                disk.rename(source, target)
                 taken = self._insert(target, summary)
             finally:
                 if not taken:
-                    target.unlink()
+                    target.unlink(missing_ok=True)
             return taken
 
     def remove(self, identity: str) -> Path:

@@ -66,6 +66,8 @@ def _read(path: Path, one: RobotServices, found: Services) -> UploadedTrace:
         raise _too_much(str(error)) from error
     if answer.exhausted:
         raise _too_much(answer.problem)
+    if answer.no_room:
+        raise ProblemError(507, "no-room", f"upload: {answer.problem}", "make room on the disk of the traces")
     if answer.problem:
         raise ProblemError(422, "not-a-trace", f"upload: {answer.problem}", ADVICE)
     made = UploadedTrace.model_validate(answer.data)

@@ -138,7 +138,7 @@ def _handler(gate: StopGate, stops: Mapping[str, Stop], told: Told) -> type[Base
         def setup(self) -> None:
             """As the base's; no more is read than a request may have."""
             super().setup()
-            self.rfile = io.BufferedReader(_Bounded(self.rfile, LARGEST_REQUEST))  # type: ignore[assignment]
+            self.rfile = io.BufferedReader(_Bounded(self.rfile, LARGEST_REQUEST))
 
         def do_POST(self) -> None:
             """The stop."""

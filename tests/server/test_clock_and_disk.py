@@ -14,9 +14,10 @@ import httpx
 import pytest
 from sqlalchemy.exc import OperationalError
 
-from daq.contracts.trace import Trace
-from daq.traces.store import write_trace
+from server.bounded.messages import UploadedTrace
+from server.catalogue import upload
 from server.catalogue.catalogue import Catalogue
+from server.services import RobotServices, Services
 from server.store.events import EventStore
 from tests.server.inside import WrongClock, service_inside
 
@@ -135,20 +136,20 @@ def test_a_look_into_the_folder_while_a_trace_is_uploaded_takes_nothing_away(
     api: httpx.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     catalogues: list[Catalogue] = []
-    path_of = Catalogue.path_of
+    path_of, read = Catalogue.path_of, upload._read
 
     def known(self: Catalogue, identity: str) -> Path:
         catalogues.append(self)
         return path_of(self, identity)
 
-    def then_looked(trace: Trace, path: Path) -> Path:
-        write_trace(trace, path)
+    def then_looked(path: Path, one: RobotServices, found: Services) -> UploadedTrace:
+        made = read(path, one, found)
         catalogues[0].bring_up_to_date()
-        return path
+        return made
 
     monkeypatch.setattr(Catalogue, "path_of", known)
     api.get("traces/none/data.mcap")
-    monkeypatch.setattr("server.catalogue.upload.write_trace", then_looked)
+    monkeypatch.setattr("server.catalogue.upload._read", then_looked)
     table = "time,position_1\n" + "\n".join(f"{0.02 * n:.2f},{0.001 * n}" for n in range(50))
     answer = api.post("traces", content=table, headers={"Content-Type": "text/csv"})
     assert answer.status_code == 201, answer.text

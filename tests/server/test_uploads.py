@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.hostile_files import bomb, hostile_tables, hostile_traces, sound_trace
+from benchmarks.hostile_files import bomb, hostile_tables, hostile_traces, sound_trace, table
 from server.bounded.messages import Limits, ReadUpload
 from server.bounded.process import answered
 from server.bounded.workers import ExhaustedError, Workers
@@ -79,6 +79,16 @@ def test_a_reader_that_is_killed_is_told_and_another_takes_its_place(workers: Wo
     os.waitid(os.P_PID, idle, os.WEXITED | os.WNOWAIT)
     assert not workers.ask(_order(tmp_path, SOUND)).problem
     assert workers.idle_processes() != (idle,)
+
+
+def test_a_disk_without_room_is_not_the_files_fault(workers: Workers, tmp_path: Path) -> None:
+    order = _order(tmp_path, table(), "upload.csv")
+    assert not workers.ask(order).problem
+    (number,) = workers.idle_processes()
+    resource.prlimit(number, resource.RLIMIT_FSIZE, (100, resource.RLIM_INFINITY))
+    for made in tmp_path.glob("*.mcap"):
+        made.unlink()
+    assert workers.ask(order).no_room
 
 
 def test_nobody_waits_for_a_reader_once_the_service_ends(tmp_path: Path) -> None:
