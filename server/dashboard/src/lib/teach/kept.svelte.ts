@@ -84,6 +84,8 @@ export class KeptPrograms {
     this.isSending = true;
     try {
       await this.tried(() => this.sendUntilKept());
+      // Deleted by somebody else: the next try keeps it as a new one.
+      if (this.problem?.status === 404) this.open = null;
     } finally {
       this.isSending = false;
     }

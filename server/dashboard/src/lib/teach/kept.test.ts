@@ -82,6 +82,20 @@ describe('programs that the service keeps', () => {
     expect([programs.isKept, programs.problem]).toEqual([true, null]);
   });
 
+  it('are kept as new ones where somebody else has deleted them', async () => {
+    const found = service();
+    const programs = new KeptPrograms('arm', found.requests);
+    await programs.start();
+    await programs.change([wait(1)]);
+    found.refusal = new Problem(404, 'not-found', 'there is no program');
+    await programs.change([wait(1), wait(2)]);
+    expect([programs.isKept, programs.open]).toEqual([false, null]);
+    found.refusal = null;
+    await programs.keep();
+    expect(found.sent.at(-1)).toBe('taught null 2');
+    expect(programs.isKept).toBe(true);
+  });
+
   it('begin under a name that is free, and are gone once deleted', async () => {
     const found = service();
     const programs = new KeptPrograms('arm', found.requests);
