@@ -51,6 +51,7 @@ from model.simulation.period import (
     extra_flags,
     sample,
     step_count,
+    stretch_pieces,
     switching_times,
 )
 from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, entry
@@ -136,23 +137,16 @@ def batch(
             for i in range(n + 1):
                 until = times[order[i]] if i < n else period
                 if until != done:
-                    steps = step_count(until - done, step)
-                    begin_stretch(state, volts, until - done, joints, modes, begun)
-                    advance_of(
-                        kind,
-                        own,
-                        state,
-                        volts,
-                        k * period + done,
-                        until - done,
-                        steps,
-                        joints,
-                        body,
-                        modes,
-                        settings[t],
-                        work,
-                    )
-                    end_stretch(state, volts, until - done, joints, modes, begun)
+                    pieces = stretch_pieces(until - done, joints)
+                    duration = (until - done) / pieces
+                    steps = step_count(duration, step)
+                    for piece in range(pieces):
+                        begin_stretch(state, volts, duration, joints, modes, begun)
+                        start = k * period + done + piece * duration
+                        advance_of(
+                            kind, own, state, volts, start, duration, steps, joints, body, modes, settings[t], work
+                        )  # fmt: skip
+                        end_stretch(state, volts, duration, joints, modes, begun)
                 done = until
                 if i < n:
                     j = order[i]
