@@ -221,11 +221,11 @@ void run(long periods, const double *set_points, const double *noise, const doub
     for (int i = 0; i <= N; i++) {
       const double until = i < N ? times[order[i]] : shared[PERIOD];
       if (until != done) {
+        const long wanted = (long)fmax(1, ceil((until - done) / longest - 1e-9));
         long pieces = 1;
         for (int j = 0; j < N; j++)
-          if (p[j][HEATING] != 0) pieces = (long)fmax(1, ceil((until - done) / 4e-3 - 1e-9));
+          if (p[j][HEATING] != 0) pieces = wanted;
         const double t = (until - done) / pieces;
-        const long wanted = (long)ceil(t / longest - 1e-9);
         for (long piece = 0; piece < pieces; piece++) {
           double begun[N][3];
           for (int j = 0; j < N; j++) {
@@ -233,7 +233,7 @@ void run(long periods, const double *set_points, const double *noise, const doub
             begun[j][0] = s[j][POSITION]; begun[j][1] = v; begun[j][2] = rise;
             if (p[j][HEATING] != 0) s[j][RISE] = warmed(rise, rise, volts[j], v, v, v, 0.5 * t, p[j]);
           }
-          advance(s, volts, k * shared[PERIOD] + done + piece * t, t, wanted > 1 ? wanted : 1, p, body, flags);
+          advance(s, volts, k * shared[PERIOD] + done + piece * t, t, wanted / pieces, p, body, flags);
           for (int j = 0; j < N; j++)
             if (p[j][HEATING] != 0)
               s[j][RISE] = warmed(begun[j][2], s[j][RISE], volts[j], begun[j][1], s[j][SPEED], (s[j][POSITION] - begun[j][0]) / t, t, p[j]);

@@ -51,8 +51,8 @@ from model.simulation.period import (
     extra_flags,
     sample,
     step_count,
-    stretch_pieces,
     switching_times,
+    warms,
 )
 from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, entry
 
@@ -137,14 +137,15 @@ def batch(
             for i in range(n + 1):
                 until = times[order[i]] if i < n else period
                 if until != done:
-                    pieces = stretch_pieces(until - done, joints)
+                    steps = step_count(until - done, step)
+                    pieces = steps if warms(joints) else 1
                     duration = (until - done) / pieces
-                    steps = step_count(duration, step)
                     for piece in range(pieces):
                         begin_stretch(state, volts, duration, joints, modes, begun)
                         start = k * period + done + piece * duration
                         advance_of(
-                            kind, own, state, volts, start, duration, steps, joints, body, modes, settings[t], work
+                            kind, own, state, volts, start, duration, steps // pieces, joints, body, modes,
+                            settings[t], work,
                         )  # fmt: skip
                         end_stretch(state, volts, duration, joints, modes, begun)
                 done = until

@@ -101,17 +101,15 @@ def step_count(duration: complex, step: float) -> int:
 # What a stretch of constant volts begins with, of each motor.
 BEGUN_POSITION, BEGUN_SPEED, BEGUN_RISE = range(3)
 BEGUN = 3
-HEATED_PIECE = 4e-3
-"""s; longest time for which a winding that warms keeps one resistance; a current dies down in some 15 ms."""
 
 
 @internal
-def stretch_pieces(duration: complex, joints: NDArray[Any]) -> int:
-    """Equal pieces of a stretch of constant volts, in each of which every winding has one resistance."""
+def warms(joints: NDArray[Any]) -> bool:
+    """Whether any winding warms: then each step of integration has its own resistance, and the steps stay the same."""
+    found = False
     for j in range(joints.shape[0]):
-        if joints[j, at.HEATING] != 0.0:
-            return step_count(duration, HEATED_PIECE)
-    return 1
+        found = found or joints[j, at.HEATING] != 0.0
+    return found
 
 
 @internal
