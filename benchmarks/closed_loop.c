@@ -221,18 +221,23 @@ void run(long periods, const double *set_points, const double *noise, const doub
     for (int i = 0; i <= N; i++) {
       const double until = i < N ? times[order[i]] : shared[PERIOD];
       if (until != done) {
-        const long wanted = (long)ceil((until - done) / longest - 1e-9);
-        const double t = until - done;
-        double begun[N][3];
-        for (int j = 0; j < N; j++) {
-          const double v = s[j][SPEED], rise = s[j][RISE];
-          begun[j][0] = s[j][POSITION]; begun[j][1] = v; begun[j][2] = rise;
-          if (p[j][HEATING] != 0) s[j][RISE] = warmed(rise, rise, volts[j], v, v, v, 0.5 * t, p[j]);
-        }
-        advance(s, volts, k * shared[PERIOD] + done, t, wanted > 1 ? wanted : 1, p, body, flags);
+        const long wanted = (long)fmax(1, ceil((until - done) / longest - 1e-9));
+        long pieces = 1;
         for (int j = 0; j < N; j++)
-          if (p[j][HEATING] != 0)
-            s[j][RISE] = warmed(begun[j][2], s[j][RISE], volts[j], begun[j][1], s[j][SPEED], (s[j][POSITION] - begun[j][0]) / t, t, p[j]);
+          if (p[j][HEATING] != 0) pieces = wanted;
+        const double t = (until - done) / pieces;
+        for (long piece = 0; piece < pieces; piece++) {
+          double begun[N][3];
+          for (int j = 0; j < N; j++) {
+            const double v = s[j][SPEED], rise = s[j][RISE];
+            begun[j][0] = s[j][POSITION]; begun[j][1] = v; begun[j][2] = rise;
+            if (p[j][HEATING] != 0) s[j][RISE] = warmed(rise, rise, volts[j], v, v, v, 0.5 * t, p[j]);
+          }
+          advance(s, volts, k * shared[PERIOD] + done + piece * t, t, wanted / pieces, p, body, flags);
+          for (int j = 0; j < N; j++)
+            if (p[j][HEATING] != 0)
+              s[j][RISE] = warmed(begun[j][2], s[j][RISE], volts[j], begun[j][1], s[j][SPEED], (s[j][POSITION] - begun[j][0]) / t, t, p[j]);
+        }
       }
       done = until;
       if (i < N) {

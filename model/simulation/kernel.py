@@ -52,6 +52,7 @@ from model.simulation.period import (
     sample,
     step_count,
     switching_times,
+    warms,
 )
 from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, entry
 
@@ -137,22 +138,16 @@ def batch(
                 until = times[order[i]] if i < n else period
                 if until != done:
                     steps = step_count(until - done, step)
-                    begin_stretch(state, volts, until - done, joints, modes, begun)
-                    advance_of(
-                        kind,
-                        own,
-                        state,
-                        volts,
-                        k * period + done,
-                        until - done,
-                        steps,
-                        joints,
-                        body,
-                        modes,
-                        settings[t],
-                        work,
-                    )
-                    end_stretch(state, volts, until - done, joints, modes, begun)
+                    pieces = steps if warms(joints) else 1
+                    duration = (until - done) / pieces
+                    for piece in range(pieces):
+                        begin_stretch(state, volts, duration, joints, modes, begun)
+                        start = k * period + done + piece * duration
+                        advance_of(
+                            kind, own, state, volts, start, duration, steps // pieces, joints, body, modes,
+                            settings[t], work,
+                        )  # fmt: skip
+                        end_stretch(state, volts, duration, joints, modes, begun)
                 done = until
                 if i < n:
                     j = order[i]

@@ -104,6 +104,15 @@ BEGUN = 3
 
 
 @internal
+def warms(joints: NDArray[Any]) -> bool:
+    """Whether any winding warms: then each step of integration has its own resistance, and the steps stay the same."""
+    found = False
+    for j in range(joints.shape[0]):
+        found = found or joints[j, at.HEATING] != 0.0
+    return found
+
+
+@internal
 def begin_stretch(
     state: NDArray[Any], volts: NDArray[Any], duration: complex, joints: NDArray[Any], flags: NDArray[Any],
     begun: NDArray[Any],
