@@ -145,14 +145,17 @@ def _check_followed(model: Model, trace: Trace) -> None:
     if most is None:
         return
     error = np.abs(simulate(model, trace, Options(quantise=False)).error)
+    period, wanted = trace.record.period, trace.set_point
+    assert period is not None  # of an imagined trace
+    assert wanted is not None
     for column, joint in enumerate(model.machine.modelled_joints):
         sensor = model.machine.joint(joint).sensor
         if sensor is None:
             continue
         speed = model.machine.limits.joint(joint).speed
-        smooth = FOLLOWING_SHARE / 2 * most if speed is None else speed * trace.record.period / resolution(sensor)
+        smooth = FOLLOWING_SHARE / 2 * most if speed is None else speed * period / resolution(sensor)
         counts = error[:, column] / resolution(sensor)
-        change = np.abs(np.diff(trace.set_point[:, column], prepend=trace.set_point[0, column])) / resolution(sensor)
+        change = np.abs(np.diff(wanted[:, column], prepend=wanted[0, column])) / resolution(sensor)
         if (worst := _falls_behind(counts, change, smooth, most)) is not None:
             raise SpecError(
                 f"joint {joint} would fall {counts[worst]:.0f} counts behind; set points pause at {most}, and a margin "

@@ -11,6 +11,7 @@ import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
+from daq.contracts.documents import read_text
 from daq.contracts.errors import SpecError
 from model.effects.effect import Effect, EffectFile
 from model.effects.library import add_own, own_effects
@@ -26,10 +27,7 @@ def load_effect_file(path: Path) -> Effect:
     Raises SpecError, in one line, for a file that cannot be read or run, that states no effect, or states it wrongly,
     and for a name that another file has taken.
     """
-    try:
-        source = path.read_bytes()
-    except OSError as error:
-        raise SpecError(f"effect file {path}: cannot be read: {error.strerror}") from error
+    source = read_text(path, f"effect file {path}").encode()
     if path.suffix != ".py":
         raise SpecError(f"effect file {path}: is Python, so its name ends in .py")
     file = EffectFile(name=path.name, sha256=hashlib.sha256(source).hexdigest()[:HASH_DIGITS])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from daq.contracts.errors import SpecError
 from tests.daq.trajectories.machines import PERIOD, UNIT, motion, planned
 
 
@@ -29,8 +30,10 @@ def test_a_duration_of_whole_periods_takes_exactly_that_many() -> None:
     assert len(motion(trajectory={"kind": "ramp", "duration": 0.6})) == 31
 
 
-def test_a_ramp_shorter_than_a_period_takes_one() -> None:
-    assert len(motion(trajectory={"kind": "ramp", "duration": 0.001, "amplitude": 0.01})) == 2
+def test_a_ramp_of_one_period_is_one_set_point_and_a_shorter_one_is_none() -> None:
+    assert len(motion(trajectory={"kind": "ramp", "duration": PERIOD, "amplitude": 0.01})) == 2
+    with pytest.raises(SpecError, match=r"ramp: duration: 0.019 s is too short"):
+        motion(trajectory={"kind": "ramp", "duration": 0.019, "amplitude": 0.01})
 
 
 def test_settle_and_hold_stand_still_on_both_sides() -> None:
