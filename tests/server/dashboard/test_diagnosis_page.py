@@ -22,7 +22,7 @@ def test_a_diagnosis_is_begun_followed_and_ended(studied: Studied, studied_dashb
     expect(begin).to_be_disabled()
     first, second = (row_of(page, trace) for trace in studied.traces)
     first.get_by_role("radio", name="Fit to").check()
-    expect(page.get_by_text("Without a trace to judge by")).to_be_visible()
+    expect(page.get_by_text("Hold out a trace too")).to_be_visible()
     second.get_by_role("radio", name="Hold out").check()
     page.get_by_role("checkbox", name="2", exact=True).check()
     page.get_by_label("Most effects to add").fill("1")
@@ -76,7 +76,7 @@ def _see_the_map(page: Page, given: dict[str, object]) -> None:
     pairs = {(cell["joint"], cell["phase"]) for cell in where["cells"]}
     expect(region.get_by_role("row")).to_have_count(1 + len(pairs))
     region.get_by_role("combobox").select_option(index=1)
-    expect(region).to_contain_text("a window counts beyond")
+    expect(region).to_contain_text("standard deviations count")
 
 
 def test_the_proposed_experiment_is_queued(studied: Studied, studied_dashboard: Dashboard) -> None:
@@ -88,7 +88,7 @@ def test_the_proposed_experiment_is_queued(studied: Studied, studied_dashboard: 
     (queued,) = studied.service.robot.get("/queue/experiments").json()
     assert queued["spec"]["name"] == asked["spec"]["name"]
     assert queued["spec"]["trajectory"] == asked["spec"]["trajectory"]
-    expect(page.get_by_role("link", name=f"Experiment {queued['id']}")).to_be_visible()
+    expect(page.get_by_role("link", name=asked["spec"]["name"], exact=True)).to_be_visible()
     studied.service.robot.post(f"/experiments/{queued['id']}/cancel")
 
 

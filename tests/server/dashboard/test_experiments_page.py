@@ -85,7 +85,7 @@ def test_a_field_says_what_is_allowed_and_the_button_stays_under_the_pointer(for
 def test_a_preset_fills_the_form_and_can_be_changed_as_text(dashboard: Dashboard, form: Page) -> None:
     form.get_by_role("combobox", name="Start from").select_option("diagnostic-c")
     expect(form.get_by_text("staircases of 0.3°, 1° and 3°")).to_be_visible()
-    expect(form.get_by_text("3 pieces, one after the other")).to_be_visible()
+    expect(form.get_by_text("3 parts, one after the other")).to_be_visible()
     form.get_by_role("button", name="Edit as text").click()
     text = form.get_by_role("textbox", name="Specification")
     expect(text).to_have_value(re.compile('"kind": "sequence"'))

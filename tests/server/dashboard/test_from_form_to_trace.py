@@ -21,7 +21,7 @@ def test_a_ramp_is_started_from_the_form_and_its_trace_appears(dashboard: Dashbo
     form.get_by_role("textbox", name="Name").fill("from-the-form")
     expect(form.get_by_text("within all limits")).to_be_visible()
     form.get_by_role("button", name="Add to the queue").click()
-    expect(form.get_by_text("from-the-form is in the queue")).to_be_visible()
+    expect(form.get_by_text("from-the-form was added to the queue")).to_be_visible()
     form.get_by_role("link", name="Trace of from-the-form").click()
     expect(form.get_by_role("img", name=re.compile("Position and set point of joint 1, 2, 3")).first).to_be_visible()
     entry = dashboard.service.robot.get("/traces").json()["items"][0]

@@ -47,7 +47,7 @@ def test_parameters_have_their_intervals_and_say_what_is_not_known(
     panel = page.get_by_role("region", name=re.compile("^Parameters"))
     expect(panel).to_contain_text(f"{verdicts.count('known')} of {len(verdicts)} known")
     expect(panel.get_by_text("not identifiable")).to_have_count(verdicts.count("unknown"))
-    expect(panel.get_by_text("only with others")).to_have_count(verdicts.count("combination"))
+    expect(panel.get_by_text("only in combination")).to_have_count(verdicts.count("combination"))
     panel.get_by_role("checkbox", name="show all parameters").check()
     expect(panel.get_by_role("rowheader", name="link 1")).to_be_visible()
 
