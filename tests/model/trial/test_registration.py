@@ -123,7 +123,7 @@ def test_registrations_that_were_made_stay_readable(file: Path) -> None:
         ("single = 4", "single = 0", "greater than or equal to 1"),
         ('"ramp"\n', '"walk"\n', "runs.ramp.experiment"),
         ("title", "titel", "title: Field required"),
-        ("[hashes]", "[hashes", "no TOML"),
+        ("[hashes]", "[hashes", "not TOML"),
         ("detectable", 'loads = ["none"]\ndetectable', "loads: 'none': allowed are nominal"),
     ],
 )
