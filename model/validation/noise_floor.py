@@ -25,7 +25,7 @@ from model.validation.measured_motion import Observation, observe
 
 Floats = NDArray[np.float64]
 
-FEWEST, MOST, SECONDS, SEED = 12, 40, 80.0, 1991
+FEWEST, MOST, SECONDS, SEED = 12, 40, 400.0, 1991
 """Replicas of a record: enough for so many seconds, since friction turns but a few times in a short one."""
 
 
