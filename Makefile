@@ -14,7 +14,9 @@ WORKERS ?= -n 2 --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help serve demo page test test-all lint lint-python lint-page format types requirements bench clean distclean
+# Also with -j: `page` and what `lint` runs in the background use the page's packages, which are installed into one folder.
+.NOTPARALLEL:
+.PHONY: help serve demo page test test-all lint format types requirements bench clean distclean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -42,22 +44,13 @@ test-all: lint ## the same, with the slow tests
 	@$(BIN)/python -m pytest -q $(WORKERS)
 
 lint: $(FOR_DEVELOPMENT) page ## lint, format, types and import contracts, without the tests
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target lint-python lint-page
-
-lint-python: $(FOR_DEVELOPMENT)
-	@echo "== lint"
-	@$(BIN)/ruff check --quiet
-	@echo "== format"
-	@$(BIN)/ruff format --quiet --check --diff
-	@echo "== types"
-	@$(BIN)/mypy --no-error-summary
-	@echo "== import contracts"
-	@$(BIN)/lint-imports >.venv/import-contracts.log 2>&1 || { cat .venv/import-contracts.log; exit 1; }
-
-# After the page, for both install its packages, into the same folder.
-lint-page: page
 	@echo "== page"
-	@$(BIN)/python hatch_build.py check
+	@$(BIN)/python hatch_build.py check >.venv/page-check.log 2>&1 & page=$$!; \
+	echo "== lint" && $(BIN)/ruff check --quiet && \
+	echo "== format" && $(BIN)/ruff format --quiet --check --diff && \
+	echo "== types" && $(BIN)/mypy --no-error-summary && \
+	echo "== import contracts" && { $(BIN)/lint-imports >.venv/import-contracts.log 2>&1 || { cat .venv/import-contracts.log; false; }; }; \
+	code=$$?; wait $$page || { cat .venv/page-check.log; code=1; }; exit $$code
 
 format: $(FOR_DEVELOPMENT) ## format the sources and mend what ruff can mend
 	@$(BIN)/ruff check --fix-only --quiet

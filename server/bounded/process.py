@@ -94,15 +94,21 @@ def _limit_time(seconds: float) -> None:
 
 def _virtual_data() -> int:
     """Bytes that RLIMIT_DATA counts."""
-    with suppress(OSError, ValueError, IndexError):
-        for line in Path("/proc/self/status").read_text("ascii").splitlines():
-            if line.startswith("VmData:"):
-                return int(line.split()[1]) << 10
-    return 0
+    return _memory("VmData")
 
 
 def _has_grown() -> bool:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10 > GROWN
+    """Not by `ru_maxrss`, which a process inherits from the one that starts it."""
+    return _memory("VmHWM") > GROWN
+
+
+def _memory(name: str) -> int:
+    """Bytes of a kind of memory of this process, as the kernel counts it; 0 where it does not say."""
+    with suppress(OSError, ValueError, IndexError):
+        for line in Path("/proc/self/status").read_text("ascii").splitlines():
+            if line.startswith(f"{name}:"):
+                return int(line.split()[1]) << 10
+    return 0
 
 
 def _short(line: str) -> str:

@@ -97,6 +97,9 @@ def test_diagnose_is_a_job_of_the_service(daq: Daq, sound_service: Service, tmp_
     daq("diagnose", "last", "--effects", "no_such_effect").complains(2, "no_such_effect")
 
 
+NOW = datetime(2026, 11, 22, 18, 0, tzinfo=UTC)
+
+
 @pytest.mark.parametrize(
     ("behind", "words"),
     [
@@ -106,9 +109,7 @@ def test_diagnose_is_a_job_of_the_service(daq: Daq, sound_service: Service, tmp_
             "waits behind: diagnosis of 2 traces",
         ),
         (
-            WaitsBehind(
-                job="a", request=FitRequest(traces=("a",)), started=datetime.now(UTC) - timedelta(minutes=3), others=2
-            ),
+            WaitsBehind(job="a", request=FitRequest(traces=("a",)), started=NOW - timedelta(minutes=3), others=2),
             "waits behind: fit of 1 trace (3 min so far), 2 more",
         ),
     ],
@@ -124,4 +125,4 @@ def test_a_job_that_waits_says_behind_what(behind: WaitsBehind | None, words: st
         submitted_by="anna",
         waits_behind=behind,
     )
-    assert standing_of(job) == words
+    assert standing_of(job, NOW) == words

@@ -99,14 +99,14 @@ def done_at_server(call: Invocation, request: JobRequest, report: Path | None) -
     return found
 
 
-def standing_of(job: Job) -> str:
+def standing_of(job: Job, now: datetime) -> str:
     """How far a job is, or what it waits behind, in a few words."""
     behind = job.waits_behind
     if job.state != "queued" or behind is None:
         return job.progress_text or job.state
     traces = len(behind.request.traces)
     of = f"{KINDS[behind.request.kind]} of {traces} trace{'' if traces == 1 else 's'}"
-    minutes = None if behind.started is None else (datetime.now(UTC) - behind.started).total_seconds() / 60
+    minutes = None if behind.started is None else (now - behind.started).total_seconds() / 60
     so_far = "" if minutes is None else f" ({max(0, round(minutes))} min so far)"
     return f"waits behind: {of}{so_far}" + (f", {behind.others} more" if behind.others else "")
 
@@ -116,7 +116,9 @@ def _followed(robot: Robot, request: JobRequest) -> Job:
     try:
         with shown_progress(f"{request.kind} at the server") as tell:
             return robot.jobs.wait(
-                job.id, lambda now: tell(now.progress or 0.0, standing_of(now)), look_every=LOOK_EVERY
+                job.id,
+                lambda job: tell(job.progress or 0.0, standing_of(job, datetime.now(UTC))),
+                look_every=LOOK_EVERY,
             )
     except KeyboardInterrupt:
         robot.jobs.cancel(job.id)

@@ -17,6 +17,8 @@ from tests.daq.cli.test_documentation import COMMANDS
 WITHOUT = {
     "gains set", "io set", "io gripper", "teach jog", "teach step", "teach program", "teach lead", "serve",
     "queue pause", "queue resume", "token add", "token revoke", "mock", "demo",
+    "teach programs keep", "teach programs fetch", "teach programs delete",
+    "teach edit insert", "teach edit move", "teach edit delete", "teach edit change", "teach edit rename",
 }  # fmt: skip
 """Commands that do something and have no data to give."""
 

@@ -109,7 +109,7 @@ def test_a_validation_of_a_sliding_joint_is_in_metres(
     assert dict(report.facts)["squared error"].startswith("0.02 m² (")
     assert "measured − expected / m/s²" in labels
     _print_in_time(in_time, axis)
-    assert "rms 0.15 m/s² (noise 0.01)" in capsys.readouterr().out
+    assert "rms 0.15 m/s², 15 × the noise floor (0.01)" in capsys.readouterr().out
 
 
 def test_an_axis_of_degrees_and_millimetres_is_not_labelled_with_one_of_them(labels: list[str]) -> None:

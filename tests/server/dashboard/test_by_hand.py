@@ -16,13 +16,13 @@ pytestmark = pytest.mark.browser
 def controlled(dashboard: Dashboard) -> Iterator[Page]:
     """The Live page of whoever has the control."""
     yield _in_control(dashboard)
-    dashboard.page.get_by_role("button", name="Give it back").click()
-    expect(dashboard.page.get_by_role("button", name="Take the control")).to_be_visible()
+    dashboard.page.get_by_role("button", name="Release control").click()
+    expect(dashboard.page.get_by_role("button", name="Take control")).to_be_visible()
 
 
 def _in_control(dashboard: Dashboard) -> Page:
     page = dashboard.until_live()
-    page.get_by_role("button", name="Take the control").click()
+    page.get_by_role("button", name="Take control").click()
     expect(page.get_by_role("heading", name="Teach")).to_be_visible()
     return page
 
@@ -40,7 +40,7 @@ def test_a_program_is_there_after_another_page_and_another_control(dashboard: Da
     (entry,) = robot.get("/programs").json()
     assert (entry["name"], entry["instructions"]) == ("pick", 2)
 
-    page.get_by_role("button", name="Give it back").click()
+    page.get_by_role("button", name="Release control").click()
     dashboard.open("system")
     page.reload()
     _in_control(dashboard)

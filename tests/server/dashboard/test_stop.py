@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page, Route, expect
@@ -25,6 +26,16 @@ def hanging(process: int) -> Iterator[None]:
         yield
     finally:
         os.kill(process, signal.SIGCONT)
+
+
+def stop_listener(service: int) -> int:
+    """The process at the service's other door."""
+    for status in Path("/proc").glob("[0-9]*/status"):
+        with suppress(OSError):  # it has ended meanwhile
+            words = (status.parent / "cmdline").read_bytes().split(b"\0")
+            if b"server.stopping" in words and f"PPid:\t{service}\n" in status.read_text("utf-8"):
+                return int(status.parent.name)
+    raise AssertionError("no stop listener runs")
 
 
 def held(page: Page, address: str) -> list[Route]:
@@ -78,11 +89,21 @@ def test_stop_is_on_every_page_also_on_a_tablet(dashboard: Dashboard) -> None:
             expect(button).to_be_in_viewport(ratio=1)
 
 
+def test_a_stop_reaches_the_arm_while_the_service_hangs(dashboard: Dashboard) -> None:
+    page = dashboard.until_live()
+    with hanging(dashboard.service.process.pid):
+        page.keyboard.press("F8")
+        expect(page.locator(CONFIRMED)).to_be_visible()
+        assert dashboard.mock.ask("state")["frozen"]
+    dashboard.forgive()
+
+
 def test_a_stop_that_nobody_answers_is_not_called_delivered_and_one_that_arrives_late_is_told(
     dashboard: Dashboard,
 ) -> None:
     page = dashboard.until_live()
-    with hanging(dashboard.service.process.pid):
+    service = dashboard.service.process.pid
+    with hanging(service), hanging(stop_listener(service)):
         page.keyboard.press("F8")
         message = page.locator("[data-stop='not-delivered']")
         expect(message).to_contain_text("Stop NOT DELIVERED")
