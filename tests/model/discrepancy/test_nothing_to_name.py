@@ -6,12 +6,24 @@ from pathlib import Path
 
 import pytest
 
+from model.discrepancy.options import DiagnosisOptions
 from tests.model.discrepancy.diagnosed import diagnosed
 
 
+COUPLED = "drive_coupling:joint=1,onto=2,share=0.2"
+"""A part of joint 1's drive reaches joint 2: no law of the library describes it."""
+IMITATORS = DiagnosisOptions(effects=("coulomb_friction", "motor_inductance", "dead_zone"), joints=(2,))
+"""Laws that take most of it, on the joint that it reaches."""
+
+
+@pytest.mark.parametrize(
+    "options", [pytest.param(IMITATORS, id="its imitators"), pytest.param(None, id="library", marks=pytest.mark.slow)]
+)
 @pytest.mark.timeout(400)
-def test_an_effect_that_no_law_of_the_library_describes_is_not_given_a_name(tmp_path: Path) -> None:
-    answer = diagnosed(tmp_path, "drive_coupling:joint=1,onto=2,share=0.2")
+def test_an_effect_that_no_law_of_the_library_describes_is_not_given_a_name(
+    tmp_path: Path, options: DiagnosisOptions | None
+) -> None:
+    answer = diagnosed(tmp_path, COUPLED, options=options)
     assert answer.verdict == "unknown-effect", answer.summary
     assert not [s for s in answer.steps if s.adopted]
     assert answer.summary.startswith("joint 2")
