@@ -9,7 +9,6 @@ import pytest
 from model.discrepancy.options import DiagnosisOptions
 from tests.model.discrepancy.diagnosed import diagnosed
 
-
 COUPLED = "drive_coupling:joint=1,onto=2,share=0.2"
 """A part of joint 1's drive reaches joint 2: no law of the library describes it."""
 IMITATORS = DiagnosisOptions(effects=("coulomb_friction", "motor_inductance", "dead_zone"), joints=(2,))
