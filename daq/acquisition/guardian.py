@@ -7,11 +7,13 @@ port is opened until nothing can move any more.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import select
 import signal
 import socket
 import threading
+import time
 from collections.abc import Callable
 from enum import Enum
 from types import TracebackType
@@ -60,6 +62,10 @@ class Guardian:
         self._wakeup_before = -1
         self._closing = False
         self._cause: EndCause | None = None
+        self._asked = -math.inf
+        """When the newest request to end came: monotonic clock, s."""
+        self._lock = threading.Lock()
+        """Held for moments only: of cause and time of the newest request together."""
 
     @property
     def cause(self) -> EndCause | None:
@@ -68,9 +74,18 @@ class Guardian:
             return EndCause.DEAF
         return self._cause
 
-    def forget(self) -> None:
-        """After an explicit reset: what ended the work before ends nothing any more."""
-        self._cause = None
+    def forget(self, asked: float) -> bool:
+        """For an explicit reset, asked for at this moment (monotonic clock, s): what ended the work before ends nothing
+        any more. False, and nothing is forgotten, when somebody has wanted the end since."""
+        with self._lock:
+            if self.newer_than(asked):
+                return False
+            self._cause = None
+            return True
+
+    def newer_than(self, asked: float) -> bool:
+        """Whether somebody has wanted the end since this moment (monotonic clock, s)."""
+        return self._asked >= asked
 
     def __enter__(self) -> Self:
         self._wake_read, self._wake_write = os.pipe()
@@ -106,7 +121,9 @@ class Guardian:
             raise
 
     def _end(self, cause: EndCause) -> StopAnswer:
-        self._cause = self._cause or cause
+        with self._lock:
+            self._asked = time.monotonic()
+            self._cause = self._cause or cause
         return self._freeze(cause.value)
 
     def _listen(self) -> None:

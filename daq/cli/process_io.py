@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
@@ -69,8 +70,7 @@ def set_output(
 
         found = set_output_at_server(call, output, on=on, asked=asked).outputs[output]
     else:
-        with connected(call) as controller:
-            _require_allowed(call, controller, asked)
+        with _allowed(call, asked) as controller:
             controller.write_outputs(1 << output, on << output)
             found = bool(controller.process().outputs >> output & 1)
     _tell(f"output {output}", value, "on" if found else "off")
@@ -93,21 +93,36 @@ def gripper(
 
         found = set_gripper_at_server(call, closed=closed, asked=asked).gripper == "closed"
     else:
-        with connected(call) as controller:
-            _require_allowed(call, controller, asked)
+        with _allowed(call, asked) as controller:
             controller.set_gripper(closed=closed)
             found = bool(controller.process().gripper)
     _tell("gripper", "closed" if closed else "open", "closed" if found else "open")
 
 
-def _require_allowed(call: Invocation, controller: Controller, asked: SwitchConsent) -> None:
-    """Raises SafetyError without the operator's word on a real arm, and for one that has been stopped."""
+@contextmanager
+def _allowed(call: Invocation, asked: SwitchConsent) -> Iterator[Controller]:
+    """The controller of an arm that may be switched now.
+
+    Raises SafetyError without the operator's word on a real arm, and for one that has been stopped, also while the
+    operator was asked: nobody holds the port meanwhile, so that a stop gets through.
+    """
+    with connected(call) as controller:
+        _require_not_stopped(controller, asked)
+        simulated = controller.identity.simulated
+        if simulated or asked.consent:
+            yield controller
+            return
+    require_consent(call.port, simulated=simulated, consent=asked.consent, what=asked.what, refused=asked.refused)
+    with connected(call) as controller:
+        _require_not_stopped(controller, asked)
+        yield controller
+
+
+def _require_not_stopped(controller: Controller, asked: SwitchConsent) -> None:
     from firmware_protocol.commands import StatusFlag
 
     if StatusFlag.FROZEN in controller.status().flags and not asked.while_stopped:
         raise SafetyError("the arm has been stopped: `daq reset` first, or --while-stopped; nothing was switched")
-    simulated = controller.identity.simulated
-    require_consent(call.port, simulated=simulated, consent=asked.consent, what=asked.what, refused=asked.refused)
 
 
 def _tell(what: str, wanted: str, found: str) -> None:

@@ -43,14 +43,16 @@ def reset(
             print(text)
         return
     with connected(invocation(context)) as controller:
-        frozen = StatusFlag.FROZEN in controller.status().flags
+        status = controller.status()
+        frozen, stop = StatusFlag.FROZEN in status.flags, status.stop  # this stop is ended, and none that comes later
         if here:
             # A second stop would change nothing: the board measures the posture when a stop begins.
-            controller.release()
+            controller.release(stop)
             stopped = controller.stop()
             if not stopped.acknowledged:
                 raise NotFrozenError(f"reset --here: {stopped.problem}; the set points are not known to be here")
-        controller.release()
+            stop = controller.status().stop
+        controller.release(stop)
         limp = limp_line(controller.gains())
     holds = "takes set points again" if limp else "the arm holds its posture and takes set points again"
     text = f"released: {holds}" + ("; the set points are the posture measured now" if here else "")

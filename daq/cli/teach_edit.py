@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from daq.cli.context import JsonOption, invocation, print_json
+from daq.cli.context import JsonOption, invocation, print_json, printable
 from daq.cli.quantities import parse_angle, parse_per_joint_angles
 from daq.contracts.errors import SafetyError, SpecError
 
@@ -35,7 +35,7 @@ def list_all(file: FileArgument, json: JsonOption = False) -> None:
     if json:
         print_json({"file": file, **program.model_dump(mode="json")})
         return
-    print(f"{program.name}, for {program.machine}: {len(program.instructions)} instructions")
+    print(printable(f"{program.name}, for {program.machine}: {len(program.instructions)} instructions"))
     for number, one in enumerate(program.instructions, start=1):
         print(f"{number:4d}  {_in_words(one)}")
 
@@ -131,7 +131,7 @@ def _edit(context: typer.Context, file: Path, edited: Any) -> None:
     if against:
         raise SafetyError(f"program {file}: refused: {against[0]}; the file is as it was")
     save_program(after, file)
-    print(f"{file}: {len(after.instructions)} instructions")
+    print(printable(f"{file}: {len(after.instructions)} instructions"))
 
 
 def _instruction(

@@ -123,7 +123,7 @@ def show(
     print_figures(found)
     for event in found.events:
         print(printable(f"  {event.time:8.2f} s  {event.kind.replace('_', ' ')}: {event.message}"))
-    print(f"file: {path}")
+    print(printable(f"file: {path}"))
 
 
 def print_figures(trace: Trace) -> None:
@@ -199,7 +199,7 @@ def _tell_file(made_from: Path, file: Path, *, as_json: bool) -> None:
     if as_json:
         print_json({"trace": made_from, "file": file})
     else:
-        print(file)
+        print(printable(str(file)))
 
 
 @app.command("import")

@@ -76,12 +76,14 @@ class Identity:
 
 @dataclass(frozen=True)
 class ControllerStatus:
-    """Board and link at one moment. `missed` counts the periods without new set points since the board's reset."""
+    """Board and link at one moment. `missed` counts the periods without new set points since the board's reset; `stop`
+    is the number of the newest stop, 0 for none."""
 
     tick: int
     flags: StatusFlag
     boots: int
     missed: int
+    stop: int
     link: LinkState
     counters: LinkCounters
 
@@ -168,23 +170,25 @@ class Controller:
         self._watch.replaced(frozen, stopped.tick + 1)
         return StopConfirmation(sent=True, acknowledged=True, tick=stopped.tick, frozen=frozen)
 
-    def release(self) -> None:
+    def release(self, stop: int | None = None) -> None:
         """Ends the freeze; the set points stay where the stop put them. Takes the control back from another host.
 
-        Raises RequestRefusedError when another stop arrives meanwhile: that one holds. Raises ControllerRestartedError.
+        `stop` is the number of the stop that is to end (`ControllerStatus.stop`, read when the release was asked for);
+        None is the newest. Raises RequestRefusedError when there is a newer one: that one holds. Raises
+        ControllerRestartedError.
         """
         try:
-            self._release_newest()
+            self._release(stop)
         except RequestRefusedError as error:
             if error.reason != Refusal.BAD_SESSION:
                 raise
             self._deliveries.check_restart(self.link.request(ReadStatus(), Status).status)
             self.hello()
-            self._release_newest()
+            self._release(stop)
 
-    def _release_newest(self) -> None:
-        newest = self.link.request(ReadStatus(), Status).stop
-        self.link.request(Release(newest), Released)
+    def _release(self, stop: int | None) -> None:
+        named = self.link.request(ReadStatus(), Status).stop if stop is None else stop
+        self.link.request(Release(named), Released)
 
     def gains(self) -> dict[int, tuple[int, int, int]]:
         """Joint → (P, I, D), each 0–20."""
@@ -218,7 +222,9 @@ class Controller:
         """Board and link now."""
         reply = self.link.request(ReadStatus(), Status)
         flags = StatusFlag(reply.status)
-        return ControllerStatus(reply.tick, flags, reply.boots, reply.missed, self.link.state, self.counters)
+        return ControllerStatus(
+            reply.tick, flags, reply.boots, reply.missed, reply.stop, self.link.state, self.counters
+        )
 
     def close(self) -> None:
         """Ends the connection. Sends nothing: the arm stays at its last set points."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from daq.link.counters import Tally
 from daq.link.timing import reply_opcode
-from firmware_protocol.commands import NO_SESSION, Hello, HelloReply, Refused, Reply, Request
+from firmware_protocol.commands import NO_SESSION, PROTOCOL_VERSION, Hello, HelloReply, Refused, Reply, Request
 
 SEQUENCE_NUMBERS = 0x10000
 REMEMBERED = 256
@@ -79,5 +79,7 @@ def _answers(reply: Reply, request: Request) -> bool:
         return reply.opcode == request.OPCODE
     if isinstance(reply, HelloReply) and isinstance(request, Hello):
         # One that was recorded names another nonce; a bridge of another version names none.
-        return reply.nonce == request.nonce or reply.session == NO_SESSION
+        if reply.session == NO_SESSION:
+            return reply.version != PROTOCOL_VERSION
+        return reply.nonce == request.nonce
     return reply_opcode(request) == reply.OPCODE

@@ -50,11 +50,12 @@ class ArmControl:
         """Whether set points may be sent now."""
         return self._arm.state is State.RUNNING and self._halted is None
 
-    def handle(self, event: Event, cause: str | None = None) -> StopConfirmation | None:
-        """Takes an event and carries out its actions; returns what became of a freeze, if there was one.
+    def handle(self, event: Event, cause: str | None = None, stop: int | None = None) -> StopConfirmation | None:
+        """Takes an event and carries out its actions; returns what became of a freeze, if there was one. A RESET ends
+        the stop of number `stop` and no other; None is the newest.
 
-        Raises StoppedError for an orderly step when the arm has been halted meanwhile, IllegalEventError, and LinkError
-        when a release cannot be sent.
+        Raises StoppedError for an orderly step when the arm has been halted meanwhile, IllegalEventError, LinkError
+        when a release cannot be sent, and RequestRefusedError when there is a newer stop.
         """
         with self._lock:
             if event in _ORDERLY:
@@ -69,7 +70,7 @@ class ArmControl:
             if action is Action.FREEZE:
                 confirmation = self._freeze()
             elif action is Action.RELEASE:
-                self._release()
+                self._release(stop)
         return confirmation
 
     def stop(self, cause: str) -> StopConfirmation:
@@ -95,8 +96,8 @@ class ArmControl:
         self._frozen = self._frozen or confirmation.acknowledged
         return confirmation
 
-    def _release(self) -> None:
-        self._controller.release()
+    def _release(self, stop: int | None) -> None:
+        self._controller.release(stop)
         if self._halted is not None:
             # A stop was written while the release was on its way, and the release may have undone it.
             self._controller.stop()

@@ -6,8 +6,10 @@ import time
 
 from daq.contracts.errors import DaqError, ReachError, SafetyError
 from daq.contracts.limp import limp_line, require_no_jump
+from daq.link import RequestRefusedError
 from daq.runner import StoppedError
 from daq.safety import Event, State
+from firmware_protocol.commands import Refusal
 from server.owner.desk import Desk
 from server.owner.messages import (
     WAITS_AT_MOST,
@@ -54,7 +56,7 @@ def carry_out(desk: Desk, order: Quick) -> dict[str, object]:
             desk.controller.set_gripper(closed=order.closed)
             return _process(desk)
         case Reset():
-            return {"text": _reset(desk, order.here)}
+            return {"text": _reset(desk, order)}
 
 
 def _write_gains(desk: Desk, order: WriteGains) -> dict[str, object]:
@@ -82,22 +84,48 @@ def _process(desk: Desk) -> dict[str, object]:
     }
 
 
-def _reset(desk: Desk, here: bool) -> str:
-    """Ends a stop or a fault. A stop that comes meanwhile wins."""
+def _release(desk: Desk, order: Reset) -> None:
+    """Raises RequestRefusedError or SafetyError when another stop has come since the reset was asked for.
+
+    The stop's number is read before the guardian is asked: a stop through the guardian reaches the guardian first and
+    then the board, so one that came before the number was read is known to the guardian, and a later one has another
+    number.
+    """
     controller, control = desk.controller, desk.control
-    if control.arm.state not in (State.STOPPED, State.FAULT) and not here:
-        return "was not stopped"
-    if here:
+    seen = controller.status().stop
+    if desk.guardian.newer_than(order.asked):
+        raise _overtaken(desk)
+    if order.here:
         # A second stop would change nothing: the board measures the posture when a stop begins.
-        controller.release()
+        controller.release(seen)
         stopped = controller.stop()
         if not stopped.acknowledged:
             raise NotFrozenError(f"reset here: {stopped.problem}; the set points are not known to be here")
-    desk.guardian.forget()
+        seen = controller.status().stop
+    if not desk.guardian.forget(order.asked):
+        raise _overtaken(desk)
     if control.arm.state in (State.STOPPED, State.FAULT):
-        control.handle(Event.RESET)
+        control.handle(Event.RESET, stop=seen)
     else:
-        controller.release()
+        controller.release(seen)
+
+
+def _overtaken(desk: Desk) -> SafetyError:
+    return SafetyError(f"the arm has been stopped since this reset was asked for ({desk.ended()}): reset again")
+
+
+def _reset(desk: Desk, order: Reset) -> str:
+    """Ends the stop, or the fault, that there was when it was asked for. One that has come since wins."""
+    control, here = desk.control, order.here
+    if control.arm.state not in (State.STOPPED, State.FAULT) and not here:
+        return "was not stopped"
+    try:
+        _release(desk, order)
+    except RequestRefusedError as error:
+        if error.reason != Refusal.OTHER_STOP:
+            raise
+        control.stop(desk.ended() or "stopped on the board by somebody else")
+        raise SafetyError("another stop has come meanwhile, and holds: reset again") from error
     if (cause := desk.ended()) is not None:
         control.stop(cause)
         raise SafetyError(f"the arm has been stopped again: {cause}")

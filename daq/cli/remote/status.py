@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from daq.cli.context import Invocation, print_json
+from daq.cli.context import Invocation, print_json, printable
 from daq.cli.remote.robot import remote_robot
 from daq.contracts.limp import limp_line
 from daq.contracts.status import report_of
@@ -20,12 +20,13 @@ def show_status(call: Invocation, as_json: bool) -> None:
         print_json(report_of(found, call.server).model_dump(mode="json"))
         return
     if found.identity is None:
-        print(f"{found.robot}: {found.connection}{': ' if found.connection_problem else ''}{found.connection_problem}")
+        problem = f": {found.connection_problem}" if found.connection_problem else ""
+        print(printable(f"{found.robot}: {found.connection}{problem}"))
     else:
         kind = "mock" if found.identity.simulated else "REAL ARM"
         tick = "" if found.sample is None else f", tick {found.sample.tick}, {found.sample.age * 1e3:.0f} ms old"
         cause = f" ({found.cause})" if found.cause else ""
-        print(f"{kind}{tick}, {found.arm}{cause}; {found.activity}; link {found.link.state}")
+        print(printable(f"{kind}{tick}, {found.arm}{cause}; {found.activity}; link {found.link.state}"))
     if found.sample is not None:
         one = found.sample
         for joint, *angles in zip(one.joints, one.position, one.set_point, one.error, strict=True):
@@ -33,8 +34,8 @@ def show_status(call: Invocation, as_json: bool) -> None:
             print(f"  joint {joint}: {position:8.2f}°   set point {aim:8.2f}°   error {error:6.2f}°")
     queue = found.queue
     state = f"paused: {queue.reason}" if queue.paused else "open"
-    print(f"queue {state}; {queue.queued} waiting" + (f"; {queue.running} runs" if queue.running else ""))
+    print(printable(f"queue {state}; {queue.queued} waiting" + (f"; {queue.running} runs" if queue.running else "")))
     holder = found.control.name if found.control.holder == "client" else found.control.holder
-    print(f"control: {holder}")
+    print(printable(f"control: {holder}"))
     if found.limp:
         print(limp_line(gains))

@@ -6,6 +6,7 @@ import os
 import signal
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -97,6 +98,16 @@ def test_a_word_of_the_parent_is_a_stop_and_its_end_the_loss_of_it() -> None:
         scene.freezes.wait()
         assert scene.freezes.causes[-1] == EndCause.ORPHANED.value
         assert scene.guardian.cause is EndCause.PARENT, "the first cause is kept"
+
+
+def test_a_reset_forgets_what_came_before_it_was_asked_for_and_nothing_later() -> None:
+    with guarded() as scene:
+        before = time.monotonic()
+        request_stop()
+        assert not scene.guardian.forget(before)
+        assert scene.guardian.cause is EndCause.STOP
+        assert scene.guardian.forget(time.monotonic())
+        assert scene.guardian.cause is None
 
 
 def test_a_cancel_of_the_service_is_called_one_however_often_it_is_said() -> None:

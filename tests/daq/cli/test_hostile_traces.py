@@ -84,6 +84,15 @@ def test_a_trace_does_not_command_the_terminal(daq: CommandLine, tmp_path: Path)
     assert "\x07" not in shown.out
 
 
+def test_the_name_of_a_file_does_not_command_the_terminal(daq: CommandLine, tmp_path: Path) -> None:
+    path = write(tmp_path / "a\x1b[2J.mcap", 3)
+    for words in (("show", path), ("export", path)):
+        shown = daq("traces", *words)
+        assert shown.code == 0
+        assert "a\N{REPLACEMENT CHARACTER}[2J" in shown.out
+        assert "\x1b" not in shown.out
+
+
 def test_what_was_not_salvaged_is_told_with_where_it_is(daq: CommandLine, tmp_path: Path) -> None:
     data = write(tmp_path / "a.mcap", 50).read_bytes()
     (tmp_path / "a.mcap").rename(tmp_path / "a.mcap.part")

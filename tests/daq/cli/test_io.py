@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
+import typer
 
+from daq.acquisition.port_stop import stop_at_port
+from daq.cli import consent
+from daq.driver import Controller
 from daq.driver.controller import Identity
 from daq.transport.mock_process import MockProcess
 from tests.daq.cli.board import ask
@@ -39,6 +44,48 @@ def test_a_real_arm_is_switched_only_with_the_operators_word(
     daq("--port", port, "io", *words).complains(4, "is a real arm", "--yes")
     assert daq("--port", port, "io", "show").out.endswith(UNTOUCHED)
     assert daq("--port", port, "io", *words, "--yes").out == told
+
+
+def answered(monkeypatch: pytest.MonkeyPatch, answer: Callable[[], bool]) -> None:
+    """The arm is real, and a person at the terminal answers what is asked."""
+    monkeypatch.setattr(Identity, "simulated", property(lambda _: False))
+    monkeypatch.setattr(consent, "can_be_asked", lambda: True)
+    monkeypatch.setattr(typer, "confirm", lambda *_, **__: answer())
+
+
+@pytest.mark.parametrize(("words", "told"), SWITCHES)
+def test_what_a_person_has_agreed_to_is_switched(
+    daq: CommandLine, port: str, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], told: str
+) -> None:
+    answered(monkeypatch, lambda: True)
+    assert daq("--port", port, "io", *words).out == told
+
+
+@pytest.mark.parametrize(("words", "_told"), SWITCHES)
+def test_a_stop_gets_through_while_a_person_is_asked_and_nothing_is_switched_then(
+    daq: CommandLine, port: str, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], _told: str
+) -> None:
+    held: list[str] = []
+    connect, close = Controller.connect, Controller.close
+
+    def opened(url: str, *more: Any) -> Controller:
+        held.append(url)
+        return connect(url, *more)
+
+    def closed(controller: Controller) -> None:
+        close(controller)
+        held.pop()
+
+    def stopped_meanwhile() -> bool:
+        assert held == [], "whoever thinks holds no port"
+        assert stop_at_port("arm", port).confirmed
+        return True
+
+    monkeypatch.setattr(Controller, "connect", opened)
+    monkeypatch.setattr(Controller, "close", closed)
+    answered(monkeypatch, stopped_meanwhile)
+    daq("--port", port, "io", *words).complains(4, "the arm has been stopped", "nothing was switched")
+    assert daq("--port", port, "io", "show").out.endswith(UNTOUCHED)
 
 
 @pytest.mark.parametrize(("words", "told"), SWITCHES)

@@ -11,6 +11,7 @@ import pytest
 import serial
 
 from daq.acquisition.stop_socket import StopAnswer, StopAttempt, stop_listener
+from daq.driver import Controller
 from daq.transport.mock_process import MockProcess
 from tests.daq.cli.board import ask
 from tests.daq.cli.invoke import CommandLine
@@ -31,6 +32,25 @@ def test_a_robot_that_nobody_holds_is_stopped_over_its_port(daq: CommandLine, mo
     assert "holds its posture and takes set points again" in daq("--port", port, "reset").out
     assert not ask(mock, "state")["frozen"]
     assert "was not stopped" in daq("--port", port, "reset").out
+
+
+@pytest.mark.parametrize("words", [("reset",), ("reset", "--here")])
+def test_a_reset_ends_no_stop_that_comes_after_it_has_looked(
+    daq: CommandLine, mock: MockProcess, port: str, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
+) -> None:
+    assert daq("--port", port, "stop").code == 0
+    release = Controller.release
+
+    def overtaken(controller: Controller, *stop: int) -> None:
+        controller.link.stop()
+        release(controller, *stop)
+
+    with monkeypatch.context() as meanwhile:
+        meanwhile.setattr(Controller, "release", overtaken)
+        daq("--port", port, *words).complains(3, "another stop has come meanwhile, and holds")
+    assert ask(mock, "state")["frozen"]
+    assert daq("--port", port, *words).code == 0
+    assert not ask(mock, "state")["frozen"]
 
 
 def test_the_configured_robot_is_stopped_beside_those_that_run(daq: CommandLine, mock: MockProcess, port: str) -> None:

@@ -50,6 +50,12 @@ def test_the_list_numbers_what_the_other_commands_take(daq: CommandLine) -> None
     ) == load_program(FILE)
 
 
+def test_a_program_does_not_command_the_terminal(daq: CommandLine) -> None:
+    FILE.write_text(FILE.read_text().replace('"name"', '"machine": "a\\u001b[2J", "name"', 1))
+    said = daq(*EDIT, "list", FILE)
+    assert "\x1b" not in said.out + said.err
+
+
 def test_deleting_moving_and_renaming(daq: CommandLine) -> None:
     assert daq(*EDIT, "delete", FILE, 2).out == "pick.json: 3 instructions\n"
     assert kinds() == ["absolute", "relative", "gripper"]

@@ -50,6 +50,21 @@ def test_another_protocol_is_refused_with_both_versions() -> None:
         controller_that(lambda _: None, newer)
 
 
+def test_a_recorded_short_greeting_of_the_same_version_is_no_identity() -> None:
+    short = HelloReply(2, Capability.SIMULATED, 1_000, 8, 9)
+    replies = iter([short, None])
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        assert isinstance(request, Hello)
+        own = HelloReply(2, Capability.SAMPLE, 20_000, 8, 3, request.nonce, 7)
+        return [(0.001, frame_of(sequence, next(replies, None) or own))]
+
+    link, _ = scripted_link(answer)
+    controller = Controller(link)
+    assert (controller.identity.boots, controller.identity.simulated) == (3, False)
+    assert controller.counters.stale == 1, "dropped, counted, and asked again"
+
+
 def test_a_bridge_of_version_1_is_refused_in_one_line_and_can_be_stopped_all_the_same() -> None:
     stopped = Stopped(7, (500,) * 6)
 

@@ -90,6 +90,18 @@ def test_a_stop_between_question_and_release_holds(controller: Controller, endpo
     assert not endpoint.board.frozen
 
 
+def test_a_release_ends_the_stop_that_it_names_and_no_later_one(controller: Controller, endpoint: InProcess) -> None:
+    assert controller.stop().acknowledged
+    seen = controller.status().stop
+    endpoint.bridge.receive(to_frame(0, Stop()))
+    greeted_by_another(endpoint)
+    with pytest.raises(RequestRefusedError, match="another stop has come meanwhile, and holds"):
+        controller.release(seen)
+    assert endpoint.board.frozen
+    controller.release(controller.status().stop)
+    assert not endpoint.board.frozen
+
+
 def test_set_points_of_before_a_restart_of_the_board_move_nothing(controller: Controller, endpoint: InProcess) -> None:
     controller.set_points({1: 600})
     endpoint.board.brown_out()

@@ -25,7 +25,7 @@ class Written:
         self.requests.append("stop")
         return self.answer
 
-    def release(self) -> None:
+    def release(self, _stop: int | None = None) -> None:
         self.requests.append("release")
         self.during_release()
 
