@@ -49,6 +49,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         except SpecError:
             services.close()
             raise
+        door.knows(services.tokens.callers())
         app = make_app(services, gate)
         config = uvicorn.Config(
             app,
