@@ -139,6 +139,11 @@ class QueueDesk:
         self.notices.arm_reported(arm)
         self.wake()
 
+    def stop_asked(self, name: str) -> None:
+        """At any door: the queue is held whether or not the stop reaches an arm. Must not wait."""
+        self.notices.stop_asked(name)
+        self.wake()
+
     def control_lapsed(self, name: str) -> None:
         """A client that had the control went silent: the queue is held. Must not wait."""
         self.notices.control_lapsed(name)

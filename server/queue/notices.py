@@ -48,6 +48,10 @@ class Notices:
         if waiting:
             self.note(f"{name} gave the control back while {_counted(waiting)}: {LOOK_FIRST}")
 
+    def stop_asked(self, name: str) -> None:
+        """Somebody wants nothing to move, whatever became of the stop: no arm need be connected that could tell."""
+        self.note(f"{name} asked for a stop: look at the arm, reset it if it is stopped, then resume the queue")
+
     def operator_left(self) -> None:
         """An operator who had said to be there has not said so for too long."""
         self.note(f"no operator says to be there any more: {LOOK_FIRST}")

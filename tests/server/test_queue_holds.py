@@ -118,6 +118,12 @@ def test_a_connection_that_ends_and_the_word_for_the_arm_that_was_there(bench: B
     assert "moves_real_arm" in waiting_for  # the word that the next person has to give
 
 
+def test_a_stop_that_reaches_no_arm_holds_what_a_schedule_brings(bench: Bench) -> None:
+    bench.queue.stop_asked("anna")
+    bench.schedule()
+    _is_held(bench, "anna asked for a stop: look at the arm, reset it if it is stopped, then resume the queue")
+
+
 def test_an_attempt_to_connect_that_fails_holds_nothing(bench: Bench) -> None:
     bench.queue.connection_ended("exit code 3")
     assert not bench.queue.status().paused

@@ -164,6 +164,19 @@ def test_the_listener_stops_and_does_nothing_else(service: Service) -> None:
     assert (answer.status_code, answer.json()["type"]) == (404, "docs/service.md#not-found")
 
 
+def test_a_stop_that_is_not_delivered_holds_the_queue_at_either_door(service: Service) -> None:
+    service.until_connected()
+    assert service.robot.post("/disconnect").status_code == 200
+    for stop in (f"{service.robot.base_url}stop", f"{_beside(service)}/stop"):
+        while not service.robot.get("/queue").json()["paused"]:  # first, because the connection has ended
+            assert service.process.poll() is None
+        assert service.robot.post("/queue/resume", json={}).json()["paused"] is False
+        assert httpx.post(stop, timeout=30).json()["delivered"] is False
+        while not (queue := service.robot.get("/queue").json())["paused"]:
+            assert service.process.poll() is None
+        assert queue["reason"].startswith("local asked for a stop")
+
+
 @pytest.mark.parametrize(
     ("head", "status"),
     [(b"x: y\r\n" * 300_000, 431), (b"x: " + b"y" * 5_000_000, 431), (b"x: y\r\n" * 20, 404)],
