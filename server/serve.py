@@ -49,6 +49,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         except SpecError:
             services.close()
             raise
+        door.knows(services.tokens.callers())
         app = make_app(services, gate)
         config = uvicorn.Config(
             app,
@@ -120,6 +121,7 @@ def _connect(services: Services, door: StopDoor, listener: socket.socket) -> Non
     """The service hears of stops at the listener, which hears how each robot is reached."""
 
     def stopped(news: Stopped) -> None:
+        services.robot(news.robot).queue.stop_asked(news.actor)
         with suppress(RuntimeError):  # the service is ending, and writes nothing down any more
             services.tell_later(news.robot, "stop", news.text, actor=news.actor)
 

@@ -42,7 +42,7 @@ from server.robot.keeper import Keeper
 from server.robot.robot import Robot, RobotPlace
 from server.robot.status import status_of
 from server.robot.stop import StopDesk
-from server.robot.teaching import TeachingDesk
+from server.robot.teaching import TeachingDesk, Word
 from server.store.engine import Store
 from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
@@ -80,6 +80,10 @@ class RobotServices:
         if identity is not None and not identity.simulated and not held.moves_real_arm:
             line = f"{self.robot.place.url} is a real arm: it moves only with the operator's word"
             raise conflict("consent-needed", line, "take control again, with moves_real_arm")
+
+    def word(self, lease: str | None, said: float) -> Word:
+        """That of a client with this lease to move the arm by hand."""
+        return Word(said, lambda: self.require_motion(lease))
 
 
 class Services:

@@ -68,6 +68,15 @@ def let_others_ask(connection: HTTPConnection) -> None:
 
 Turn = Annotated[None, Depends(_turn, scope="function")]
 """Of routes that cost much: a caller has a few of them at once. It ends before the answer is sent."""
+
+
+async def _arrived(connection: HTTPConnection) -> float:
+    arrived: float = connection.state.arrived
+    return arrived
+
+
+Arrived = Annotated[float, Depends(_arrived)]
+"""When the request came (s, monotonic): before it waited for anything."""
 Viewer = Annotated[Caller, Depends(_viewer)]
 Operator = Annotated[Caller, Depends(_operator)]
 

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Path, Query, Response
 from daq.contracts.service.teaching import ProgramEntry, TeachingStatus
 from daq.teaching import Program
 from daq.teaching.program import NAME
-from server.api.parts import LeaseHeader, Operator, RobotPart, ServicesPart, Viewer
+from server.api.parts import Arrived, LeaseHeader, Operator, RobotPart, ServicesPart, Viewer
 from server.problems import PROBLEMS
 from server.store.programs import StoredProgram
 
@@ -57,9 +57,14 @@ def delete_program(program: ProgramName, one: RobotPart, found: ServicesPart, wh
 
 @router.post("/{program}/run", status_code=202)
 def run_stored_program(
-    program: ProgramName, one: RobotPart, found: ServicesPart, _: Operator, lease: LeaseHeader = None
+    program: ProgramName,
+    one: RobotPart,
+    found: ServicesPart,
+    _: Operator,
+    arrived: Arrived,
+    lease: LeaseHeader = None,
 ) -> TeachingStatus:
     """Carries out a kept program, as POST …/teaching/program does with one that is sent."""
     one.require_motion(lease)
-    one.teaching.perform(found.programs.get(one.robot.name, program).program)
+    one.teaching.perform(one.word(lease, arrived), found.programs.get(one.robot.name, program).program)
     return one.teaching.status()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Response
 
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Experiment, Schedule, ScheduleChange, ScheduleRequest
@@ -10,8 +12,17 @@ from daq.contracts.service.queue import Control, ControlLease, ControlRequest, Q
 from server.api.experiments import require_possible
 from server.api.parts import CursorOf, Identity, LeaseHeader, Limit, Operator, RobotPart, ServicesPart, Turn, Viewer
 from server.problems import PROBLEMS, ProblemError
+from server.queue.notices import Seen
 
 router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
+
+
+async def _seen(one: RobotPart) -> Seen:
+    """When the request came, before it waited for a thread or for the queue."""
+    return one.queue.notices.seen
+
+
+SeenPart = Annotated[Seen, Depends(_seen)]
 
 
 @router.get("/queue", tags=["queue"])
@@ -34,13 +45,13 @@ def pause_queue(one: RobotPart, who: Operator) -> QueueStatus:
 
 
 @router.post("/queue/resume", tags=["queue"])
-def resume_queue(request: QueueResume, one: RobotPart, who: Operator) -> QueueStatus:
+def resume_queue(request: QueueResume, one: RobotPart, seen: SeenPart, who: Operator) -> QueueStatus:
     """The operator's word that the queue may move the robot. A real arm needs `moves_real_arm`."""
     identity = one.robot.identity
     if identity is not None and not identity.simulated and not request.moves_real_arm:
         line = f"{one.robot.place.url} is a real arm: it moves only with the operator's word"
         raise ProblemError(409, "consent-needed", line, "is its workspace clear? then resume with moves_real_arm")
-    one.queue.resume(who.name, moves_real_arm=request.moves_real_arm)
+    one.queue.resume(who.name, moves_real_arm=request.moves_real_arm, seen=seen)
     return one.queue.status()
 
 

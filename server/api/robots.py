@@ -66,6 +66,7 @@ async def stop_robot(one: RobotPart, found: ServicesPart, who: Viewer) -> StopRe
 
     Anything but `confirmed`: use the emergency stop. The freeze is ended by a reset alone.
     """
+    one.queue.stop_asked(who.name)  # first: nothing begins while the stop is on its way, nor after one that was lost
     result = await one.stop.stop()
     found.tell_later(one.robot.name, "stop", result.text, actor=who.name)
     return result

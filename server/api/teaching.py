@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Response
 
 from daq.calibration import gain_experiment, gains_from_trace
 from daq.contracts.errors import SpecError
@@ -21,19 +19,20 @@ from daq.teaching import Program
 from daq.teaching.program import Absolute, Instruction, Relative
 from daq.traces.reader import read_trace
 from server.api.experiments import submit_experiment
-from server.api.parts import IdempotencyKey, Identity, LeaseHeader, Operator, RobotPart, ServicesPart, Turn, Viewer
+from server.api.parts import (
+    Arrived,
+    IdempotencyKey,
+    Identity,
+    LeaseHeader,
+    Operator,
+    RobotPart,
+    ServicesPart,
+    Turn,
+    Viewer,
+)
 from server.problems import PROBLEMS
 
 router = APIRouter(prefix="/robots/{robot}", tags=["teaching"], responses=PROBLEMS)
-
-
-async def _arrived(request: Request) -> float:
-    """When the request came (s, monotonic): before it waited for anything."""
-    arrived: float = request.state.arrived
-    return arrived
-
-
-Arrived = Annotated[float, Depends(_arrived)]
 
 
 @router.get("/teaching")
@@ -53,7 +52,9 @@ def jog_robot(
 
 
 @router.post("/teaching/step", status_code=202)
-def step_robot(request: StepRequest, one: RobotPart, _: Operator, lease: LeaseHeader = None) -> TeachingStatus:
+def step_robot(
+    request: StepRequest, one: RobotPart, _: Operator, arrived: Arrived, lease: LeaseHeader = None
+) -> TeachingStatus:
     """Begins one step, all joints arriving together. Checked before it moves; GET …/teaching tells its end."""
     one.require_motion(lease)
     if (request.to is None) == (request.by is None):
@@ -63,23 +64,31 @@ def step_robot(request: StepRequest, one: RobotPart, _: Operator, lease: LeaseHe
     if not angles:
         raise SpecError("step: names no joint")
     instruction: Instruction = kind(angles=angles, speed=request.speed)
-    one.teaching.perform(Program(name="step", machine=one.robot.machine.name, instructions=(instruction,)), "step")
+    one.teaching.perform(
+        one.word(lease, arrived),
+        Program(name="step", machine=one.robot.machine.name, instructions=(instruction,)),
+        "step",
+    )
     return one.teaching.status()
 
 
 @router.post("/teaching/program", status_code=202)
-def run_program(request: Program, one: RobotPart, _: Operator, lease: LeaseHeader = None) -> TeachingStatus:
+def run_program(
+    request: Program, one: RobotPart, _: Operator, arrived: Arrived, lease: LeaseHeader = None
+) -> TeachingStatus:
     """Begins a taught program: steps, paths, waits, process signals. Checked from end to end before it moves."""
     one.require_motion(lease)
-    one.teaching.perform(request)
+    one.teaching.perform(one.word(lease, arrived), request)
     return one.teaching.status()
 
 
 @router.post("/teaching/lead", status_code=202)
-def lead_robot(request: LeadRequest, one: RobotPart, _: Operator, lease: LeaseHeader = None) -> TeachingStatus:
+def lead_robot(
+    request: LeadRequest, one: RobotPart, _: Operator, arrived: Arrived, lease: LeaseHeader = None
+) -> TeachingStatus:
     """Begins to record a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive and sink."""
     one.require_motion(lease)
-    one.teaching.lead(tuple(sorted(set(request.joints))))
+    one.teaching.lead(one.word(lease, arrived), tuple(sorted(set(request.joints))))
     return one.teaching.status()
 
 

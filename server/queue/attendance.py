@@ -27,7 +27,7 @@ class Attendance:
         return 0.0 if until is None else max(0.0, until - self._clock.monotonic())
 
     def has_lapsed(self) -> bool:
-        """Whether an operator who was there has gone; told once."""
+        """True once, when the confirmed presence has expired."""
         if self._until is None or self.left > 0:
             return False
         self._until = None

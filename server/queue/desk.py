@@ -16,7 +16,7 @@ from server.problems import ProblemError, conflict
 from server.queue.attendance import Attendance
 from server.queue.due_runs import DueRuns
 from server.queue.endings import Ending, ending_of
-from server.queue.notices import Notices
+from server.queue.notices import Notices, Seen
 from server.queue.order import next_due
 from server.queue.parts import QueueParts
 from server.queue.readiness import Circumstances, what_is_missing, why_held
@@ -56,7 +56,8 @@ class QueueDesk:
         self._lock = threading.RLock()
         self._changed = threading.Event()
         self._closing = False
-        self._consent = False
+        self._consented: int | None = None
+        """The connection, as `Seen` counts them, that a person's word to move a real arm was given for."""
         self._attendance = Attendance(parts.clock)
         self._running: Running | None = None
         self._waiting_for = ""
@@ -111,10 +112,12 @@ class QueueDesk:
         if held:
             self._parts.told("queue", f"paused: {reason}", actor=by)
 
-    def resume(self, by: str, *, moves_real_arm: bool) -> None:
-        """The operator's word that the queue may move the arm. Raises a 409 while the arm is stopped or at fault."""
+    def resume(self, by: str, *, moves_real_arm: bool, seen: Seen | None = None) -> None:
+        """The operator's word that the queue may move the arm, given when there was so much to be `seen`: what came
+        later holds the queue again. Raises a 409 while the arm is stopped or at fault."""
+        seen = seen or self.notices.seen
         with self._lock:
-            self.notices.take()  # what came before; what is heard of from now on holds the queue again
+            self.notices.answer_for(seen)
             arm = self._parts.robot.arm
             if arm is not None and (held := why_held(arm)):
                 self.notices.note(held)
@@ -123,7 +126,7 @@ class QueueDesk:
             state = QueueState(False, f"resumed by {by}", self._parts.clock.utc())
             self._parts.queues.set(self._parts.robot.name, state)  # first: what is not written stays paused
             self._state, self._written = state, True
-            self._consent = self._consent or moves_real_arm
+            self._consented = seen.connections if moves_real_arm else self._consented
             self._attendance.say()
         self._parts.told("queue", "resumed", actor=by)
         self.wake()
@@ -137,6 +140,11 @@ class QueueDesk:
     def hear(self, arm: ArmReport) -> None:
         """What the arm's owner says: a stop, a fault or a lost link holds the queue, whatever waits. Must not wait."""
         self.notices.arm_reported(arm)
+        self.wake()
+
+    def stop_asked(self, name: str) -> None:
+        """At any door: the queue is held whether or not the stop reaches an arm. Must not wait."""
+        self.notices.stop_asked(name)
         self.wake()
 
     def control_lapsed(self, name: str) -> None:
@@ -156,8 +164,7 @@ class QueueDesk:
 
     def connection_ended(self, why: str) -> None:
         """The robot is not connected any more. The operator's word was for the arm that was there. Must not wait."""
-        if self.notices.connection_ended(why):
-            self._consent = False
+        self.notices.connection_ended(why)
         self.wake()
 
     def wake(self) -> None:
@@ -242,6 +249,9 @@ class QueueDesk:
     def _count_waiting(self) -> int:
         return self._parts.experiments.count_waiting(self._parts.robot.name)
 
+    def _has_consent(self) -> bool:
+        return self._consented == self.notices.seen.connections
+
     def _needs_attendance(self) -> bool:
         identity = self._parts.robot.identity
         return identity is not None and not identity.simulated and not self._parts.unattended
@@ -308,7 +318,9 @@ class QueueDesk:
         if robot.arm is not None:
             self.notices.arm_reported(robot.arm)  # what this decision is made from has been noticed before it
         attended = self._attendance.left > 0 or not self._needs_attendance()
-        missing = what_is_missing(Circumstances(robot.identity, robot.arm, robot.problem, self._consent, attended))
+        missing = what_is_missing(
+            Circumstances(robot.identity, robot.arm, robot.problem, self._has_consent(), attended)
+        )
         if missing is not None and missing.pause:
             self.pause(missing.pause)
         return "" if missing is None else missing.line
@@ -377,7 +389,7 @@ class QueueDesk:
                 asked=parts.clock.monotonic(),
                 spec=experiment.spec,
                 trace_id=parts.experiments.trace_number(experiment.id),
-                moves_real_arm=self._consent,
+                moves_real_arm=self._has_consent(),
             )
         found = self._await(answer)
         ending = ending_of(found)

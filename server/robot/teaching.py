@@ -7,6 +7,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from daq.contracts.errors import SpecError
@@ -26,6 +27,15 @@ LEAD_ENDS_WITHIN = PATIENCE + ANSWER_WITHIN
 IF_A_LEAD_GOES_ON = (
     "HOLD THE ARM: led joints have no drive, and a stop does not hold them; reset it here, then set gains"
 )
+
+
+@dataclass(frozen=True)
+class Word:
+    """A client's, that the arm is to move. `said`: when it arrived here (s, monotonic). `require_control` is called in
+    the last moment before the arm is asked, and raises where the client may not move it any more."""
+
+    said: float
+    require_control: Callable[[], object] = lambda: None
 
 
 class TeachingDesk:
@@ -56,18 +66,18 @@ class TeachingDesk:
             if self._robot.clock.monotonic() - said > DEAD_MAN:
                 return
             if self._under_way is None or self._under_way[0] != "jog":
-                self._begin("jog", JogBegin)
+                self._begin(Word(self._robot.clock.monotonic()), "jog", JogBegin)
             self._robot.tell(JogDrive(velocities=velocities, said=said))
 
-    def perform(self, program: Program, activity: Literal["program", "step"] = "program") -> None:
-        """Begins a taught program. Raises a 409 while something else is taught."""
+    def perform(self, word: Word, program: Program, activity: Literal["program", "step"] = "program") -> None:
+        """Begins a taught program. Raises a 409 while something else is taught, or without the control."""
         with self._changed:
-            self._begin(activity, RunProgram, program=program, activity=activity)
+            self._begin(word, activity, RunProgram, program=program, activity=activity)
 
-    def lead(self, joints: tuple[int, ...]) -> None:
-        """Begins leading by hand. Raises a 409 while something else is taught."""
+    def lead(self, word: Word, joints: tuple[int, ...]) -> None:
+        """Begins leading by hand. Raises a 409 while something else is taught, or without the control."""
         with self._changed:
-            self._begin("lead", LeadBegin, joints=joints)
+            self._begin(word, "lead", LeadBegin, joints=joints)
 
     def finish(self) -> None:
         """Ends jogging or leading in good order, and waits for the end. A program goes on to its own. Raises a 503 when
@@ -101,14 +111,15 @@ class TeachingDesk:
                 path=self._path,
             )
 
-    def _begin(self, activity: Activity, order: Callable[..., Any], /, **fields: object) -> None:
+    def _begin(self, word: Word, activity: Activity, order: Callable[..., Any], /, **fields: object) -> None:
         if self._under_way is not None and self._under_way[0] == "jog":
             self.finish()
         if self._under_way is not None:
             line = f"the arm is busy: {self._under_way[0]}"
             raise conflict("arm-busy", line, "wait for its end, or stop it")
         self._require_not_stopped()
-        asked = self._robot.ask(order, asked=self._robot.clock.monotonic(), **fields)
+        word.require_control()  # it may have lapsed while a jog came to its end
+        asked = self._robot.ask(order, asked=word.said, **fields)
         self._result = self._problem = ""
         self._path = None
         self._under_way = (activity, asked)

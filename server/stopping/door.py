@@ -8,11 +8,12 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from daq.contracts.errors import DaqError
 from daq.transport import Terminal
-from server.stopping.messages import NEWS, Begin, Owned, Ready, Stopped
+from server.access.caller import Caller
+from server.stopping.messages import NEWS, Begin, Known, Owned, Ready, Stopped
 
 READY_WITHIN = 30.0
 """s for the process to start, on a busy computer."""
@@ -66,6 +67,13 @@ class StopDoor:
             self._owned[robot] = told
             self._send(told)
 
+    def knows(self, callers: Mapping[str, Caller]) -> None:
+        """The tokens as the service has read them, by digest: a process that comes after begins with them."""
+        tokens = {digest: (caller.name, caller.role) for digest, caller in callers.items()}
+        with self._lock:
+            self._begin = self._begin.model_copy(update={"tokens": tokens})
+            self._send(Known(tokens=tokens))
+
     def close(self) -> None:
         """No more requests; those under way are answered."""
         self._closing.set()
@@ -92,8 +100,8 @@ class StopDoor:
             self._send(told)
         return process
 
-    def _send(self, message: Begin | Owned) -> None:
-        """One that finds nobody is told again to the process that comes after."""
+    def _send(self, message: Begin | Known | Owned) -> None:
+        """If the process has died, the message is sent again to its successor."""
         assert self._process.stdin is not None
         with contextlib.suppress(OSError, ValueError):
             self._process.stdin.write(message.model_dump_json().encode() + b"\n")

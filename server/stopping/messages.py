@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
+from daq.contracts.service.queue import Role
+
 
 class _Message(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -27,6 +29,15 @@ class Begin(_Message):
     database_url: str
     sqlite: Path | None
     """The database's file, where it is one of SQLite's."""
+    tokens: dict[str, tuple[str, Role]] | None = None
+    """Name and role of each token that opens something, by its digest; None while the service has not read them."""
+
+
+class Known(_Message):
+    """The tokens, as in `Begin`, once the service has read them."""
+
+    kind: Literal["known"] = "known"
+    tokens: dict[str, tuple[str, Role]]
 
 
 class Owned(_Message):
@@ -58,5 +69,5 @@ class Stopped(_Message):
     actor: str
 
 
-ORDER: TypeAdapter[Begin | Owned] = TypeAdapter(Annotated[Begin | Owned, Field(discriminator="kind")])
+ORDER: TypeAdapter[Begin | Known | Owned] = TypeAdapter(Annotated[Begin | Known | Owned, Field(discriminator="kind")])
 NEWS: TypeAdapter[Ready | Stopped] = TypeAdapter(Annotated[Ready | Stopped, Field(discriminator="kind")])

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
+from daq.contracts.service.queue import Role
 from daq.contracts.service.robot import StopResult
 from daq.transport import Terminal
 from server import logs
@@ -17,8 +18,11 @@ from server.access.stop_gate import StopGate
 from server.steady import keep_steady
 from server.stopping.arm import Reach, stop_arm
 from server.stopping.listener import StopListener
-from server.stopping.messages import ORDER, Begin, Owned, Ready, Stopped
-from server.stopping.tokens import StopTokens, reader_of
+from server.stopping.messages import ORDER, Begin, Known, Owned, Ready, Stopped
+from server.stopping.tokens import Callers, StopTokens, reader_of
+
+FIRST_READ_WITHIN = 1.0
+"""s for the database to be read before the service is told that stops are heard. It may not be there yet."""
 
 
 class Robots:
@@ -51,7 +55,7 @@ def main() -> int:
     begin = ORDER.validate_json(first)
     assert isinstance(begin, Begin)
     robots = Robots(begin.urls)
-    tokens = StopTokens(reader_of(begin.database_url, begin.sqlite))
+    tokens = StopTokens(reader_of(begin.database_url, begin.sqlite), _callers(begin.tokens))
     gate = StopGate(tokens, begin.open_on_loopback, begin.names, begin.service_port)
     os.set_blocking(sys.stdout.fileno(), False)
 
@@ -61,13 +65,22 @@ def main() -> int:
     stops = {name: partial(robots.stop, name) for name in robots.names()}
     listener = StopListener(socket.socket(fileno=begin.descriptor), gate, stops, told)
     keep_steady()
+    if begin.tokens is None:
+        tokens.wait_read(FIRST_READ_WITHIN)
     _tell(Ready())
     for line in lines:
         order = ORDER.validate_json(line)
         if isinstance(order, Owned):
             robots.owned(order)
+        elif isinstance(order, Known):
+            tokens.told(_callers(order.tokens) or {})
     listener.close()
+    tokens.close()
     return 0
+
+
+def _callers(tokens: dict[str, tuple[str, Role]] | None) -> Callers | None:
+    return None if tokens is None else {digest: Caller(*who, digest) for digest, who in tokens.items()}
 
 
 def _tell(news: Ready | Stopped) -> None:

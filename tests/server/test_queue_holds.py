@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from server.queue.attendance import ATTENDANCE
 from server.robot.control import LEASE_TIME
 from tests.server.queue_bench import CALM, REAL, Bench
@@ -115,7 +117,41 @@ def test_a_connection_that_ends_and_the_word_for_the_arm_that_was_there(bench: B
     bench.queue.start()
     while not (waiting_for := bench.queue.status().waiting_for):
         pass
-    assert waiting_for.startswith("an operator has to allow the queue to move this arm")
+    assert "moves_real_arm" in waiting_for  # the word that the next person has to give
+
+
+def test_a_stop_that_reaches_no_arm_holds_what_a_schedule_brings(bench: Bench) -> None:
+    bench.queue.stop_asked("anna")
+    bench.schedule()
+    _is_held(bench, "anna asked for a stop: look at the arm, reset it if it is stopped, then resume the queue")
+
+
+@pytest.mark.parametrize("taken", [True, False])
+def test_what_nobody_had_seen_when_the_queue_was_resumed_holds_it_again(bench: Bench, taken: bool) -> None:
+    bench.queue.pause("paused by anna", "anna")
+    bench.queue.stop_asked("anna")
+    seen = bench.queue.notices.seen  # a request that waits for the queue
+    bench.queue.stop_asked("bert")
+    if taken:
+        bench.queue.notices.take()
+    bench.queue.resume("anna", moves_real_arm=False, seen=seen)
+    assert bench.queue.status().reason.startswith("bert asked")
+    _is_held(bench, "bert asked for a stop: look at the arm, reset it if it is stopped, then resume the queue")
+
+
+def test_a_word_that_was_given_for_one_connection_is_none_for_the_next(bench: Bench) -> None:
+    bench.robot.identity = REAL
+    bench.queue.connection_made()
+    seen = bench.queue.notices.seen
+    bench.queue.connection_ended("exit code 0")
+    bench.queue.connection_made()
+    bench.queue.resume("anna", moves_real_arm=True, seen=seen)
+    bench.queue.resume("bert", moves_real_arm=False)
+    bench.submit()
+    bench.queue.start()
+    while not (waiting_for := bench.queue.status().waiting_for):
+        pass
+    assert "moves_real_arm" in waiting_for
 
 
 def test_an_attempt_to_connect_that_fails_holds_nothing(bench: Bench) -> None:

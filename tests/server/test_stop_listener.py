@@ -21,6 +21,7 @@ from daq.acquisition.stop_socket import FOLDER_VARIABLE
 from daq.client import Client
 from daq.config.service import ServiceSettings
 from server.access.caller import LOCAL, Caller
+from server.access.digest import digest_of
 from server.access.origin import beside
 from server.access.stop_gate import StopGate
 from server.access.tokens import KnownTokens, TokenStore
@@ -29,7 +30,7 @@ from server.problems import ProblemError
 from server.stopping.door import StopDoor
 from server.stopping.listener import StopListener
 from server.stopping.messages import Begin
-from server.stopping.tokens import READ_AGAIN_AFTER, UNKNOWN_FOR, StopTokens, TokensCannotBeReadError, reader_of
+from server.stopping.tokens import UNKNOWN_FOR, StopTokens, TokensCannotBeReadError, reader_of
 from server.store.engine import Store
 from tests.daq.cli.invoke import CommandLine
 from tests.server.clocks import HandClock
@@ -163,6 +164,19 @@ def test_the_listener_stops_and_does_nothing_else(service: Service) -> None:
     assert (answer.status_code, answer.json()["type"]) == (404, "docs/service.md#not-found")
 
 
+def test_a_stop_that_is_not_delivered_holds_the_queue_at_either_door(service: Service) -> None:
+    service.until_connected()
+    assert service.robot.post("/disconnect").status_code == 200
+    for stop in (f"{service.robot.base_url}stop", f"{_beside(service)}/stop"):
+        while not service.robot.get("/queue").json()["paused"]:  # first, because the connection has ended
+            assert service.process.poll() is None
+        assert service.robot.post("/queue/resume", json={}).json()["paused"] is False
+        assert httpx.post(stop, timeout=30).json()["delivered"] is False
+        while not (queue := service.robot.get("/queue").json())["paused"]:
+            assert service.process.poll() is None
+        assert queue["reason"].startswith("local asked for a stop")
+
+
 @pytest.mark.parametrize(
     ("head", "status"),
     [(b"x: y\r\n" * 300_000, 431), (b"x: " + b"y" * 5_000_000, 431), (b"x: y\r\n" * 20, 404)],
@@ -274,24 +288,52 @@ def test_tokens_are_read_while_a_writer_holds_the_database_and_count_on_when_it_
     store.migrate()
     tokens = TokenStore(store)
     anna, bert = tokens.add("anna", "viewer", clock.utc()), tokens.add("bert", "operator", clock.utc())
-    found = StopTokens(reader_of(store.url, file), clock.monotonic)
+    found = StopTokens(reader_of(store.url, file), clock=clock.monotonic)
     with store.writing() as writing:  # as a service that was put aside in the middle of it
         writing.execute(text("UPDATE tokens SET role = 'operator'"))
         assert found.look_up(anna) == Caller("anna", "viewer")
-    assert found.remembered(bert) == (True, Caller("bert", "operator"))
+    found.look_up("daq_wrong")
     assert found.remembered("daq_wrong") == (True, None)
     clock.turn(UNKNOWN_FOR)
     assert found.remembered("daq_wrong") == (False, None)
+    found.look_up("daq_wrong")
+    assert found.remembered(bert) == (True, Caller("bert", "operator"))
     tokens.revoke("bert", clock.utc())
-    clock.turn(READ_AGAIN_AFTER)
-    assert found.remembered(bert)[0] is False
+    clock.turn(UNKNOWN_FOR)
+    found.look_up("daq_wrong")  # as the thread does by itself every READ_AGAIN_AFTER s
     assert found.look_up(bert) is None
     store.close()
     file.unlink()
-    clock.turn(READ_AGAIN_AFTER)
+    clock.turn(UNKNOWN_FOR)
+    found.look_up("daq_wrong")
     assert found.look_up(anna) == Caller("anna", "operator")
-    with pytest.raises(TokensCannotBeReadError):
-        StopTokens(reader_of(store.url, file)).look_up(anna)
+    found.close()
+    with closing(StopTokens(reader_of(store.url, file))) as never, pytest.raises(TokensCannotBeReadError):
+        never.look_up(anna)
+
+
+def test_no_stop_with_a_known_token_waits_for_a_database_that_does_not_answer() -> None:
+    asked, answered, clock = threading.Event(), threading.Event(), HandClock()
+
+    def hangs() -> dict[str, Caller]:
+        asked.set()
+        answered.wait()
+        return {}
+
+    anna = Caller("anna", "viewer", digest_of("daq_anna"))
+    found = StopTokens(hangs, {digest_of("daq_anna"): anna}, clock.monotonic)
+    assert asked.wait(60)
+    clock.turn(3600)
+    assert found.remembered("daq_anna") == (True, anna)
+    assert found.look_up("daq_wrong") is None  # after a moment, from what is known
+    never = StopTokens(hangs, clock=clock.monotonic)
+    with pytest.raises(TokensCannotBeReadError, match="not answered"):
+        never.look_up("daq_anna")
+    never.told({digest_of("daq_anna"): anna})
+    assert never.look_up("daq_anna") == anna
+    answered.set()
+    found.close()
+    never.close()
 
 
 def test_a_listener_that_is_killed_is_started_again_and_whoever_asks_meanwhile_waits(
@@ -313,6 +355,10 @@ def test_a_listener_that_is_killed_is_started_again_and_whoever_asks_meanwhile_w
         os.kill(door.pid, signal.SIGKILL)
         unread = httpx.post(stop, headers={"Authorization": "Bearer daq_x"}, timeout=60)
         assert (unread.status_code, unread.json()["type"]) == (503, "docs/service.md#database")
+        door.knows({digest_of("daq_x"): Caller("anna", "viewer", digest_of("daq_x"))})
+        os.kill(door.pid, signal.SIGKILL)
+        known = httpx.post(stop, headers={"Authorization": "Bearer daq_x"}, timeout=60)
+        assert "no robot is connected" in known.json()["text"]
         last = door.pid
     with pytest.raises(ProcessLookupError):
         os.kill(last, 0)
