@@ -17,7 +17,7 @@ from sqlalchemy import Engine, event, text
 from sqlalchemy.exc import DatabaseError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 
-from server.store.address import StoreError, open_engine, parse_address
+from server.store.address import StoreError, masked, open_engine, parse_address
 from server.store.damage import require_sound
 from server.store.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
 
@@ -44,6 +44,8 @@ class Store:
                 # For nobody else to read, and what SQLite puts beside it likewise: the hashes of tokens are in it.
                 os.close(os.open(parsed.database, os.O_CREAT | os.O_RDWR, 0o600))
         self.url = url
+        self.place = masked(parsed)
+        """Its address as it may be told: without the password."""
         self.engine: Engine = open_engine(url)
         if parsed.get_backend_name() == "sqlite":
             event.listen(self.engine, "connect", _safe_and_shared)
@@ -67,11 +69,11 @@ class Store:
                 connection.commit()
         except OperationalError as error:
             line = line_of(error)
-            raise StoreError(f"database {self.engine.url}: cannot be opened: {line}; {advice_of(line)}") from error
+            raise StoreError(f"database {self.place}: cannot be opened: {line}; {advice_of(line)}") from error
         except DatabaseError as error:
-            raise StoreError(f"database {self.engine.url}: {line_of(error)}; {BRING_BACK}") from error
+            raise StoreError(f"database {self.place}: {line_of(error)}; {BRING_BACK}") from error
         except Exception as error:
-            line = f"database {self.engine.url}: its tables cannot be brought up to date: {one_line(error)}"
+            line = f"database {self.place}: its tables cannot be brought up to date: {one_line(error)}"
             raise StoreError(f"{line}; {BRING_BACK}") from error
 
     @contextmanager
@@ -103,7 +105,7 @@ class Store:
 
     def require_sound(self) -> None:
         """Raises DamagedError where tables, columns or states are not those that this program writes."""
-        require_sound(self.engine, self.url)
+        require_sound(self.engine, self.place)
 
     def require_writable(self) -> None:
         """Raises OperationalError where nothing could be written: the writer's lock is taken, and given back."""

@@ -7,9 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from sqlalchemy import text
+from sqlalchemy.engine import make_url
 
 from daq.contracts.errors import DaqError
 from server.clock import SystemClock
+from server.store.address import masked
+from server.store.database_errors import DamagedError
 from server.store.engine import Store
 from tests.daq.cli.invoke import CommandLine
 from tests.server.inside import service_inside
@@ -116,3 +120,17 @@ def test_a_table_that_breaks_while_it_runs_is_named_and_everything_else_goes_on(
             assert "\n" not in answer.json()["detail"]
         assert api.get("/queue").status_code == 200
         assert api.post("/stop").status_code == 200
+
+
+@pytest.mark.parametrize("address", ["postgresql://anna:secret@lab/daq", "postgresql://lab/daq?password=secret"])
+def test_no_line_about_damage_tells_the_password(tmp_path: Path, address: str) -> None:
+    store = Store(f"sqlite:///{tmp_path / FILE}")
+    store.migrate()
+    with store.writing() as session:
+        session.execute(text("DROP TABLE queues"))
+    store.place = masked(make_url(address))
+    with pytest.raises(DamagedError, match="queues") as refused:
+        store.require_sound()
+    store.close()
+    assert "secret" not in str(refused.value)
+    assert "***" in str(refused.value)
