@@ -38,7 +38,7 @@ def parse_address(url: str) -> URL:
 
 def masked(url: URL) -> str:
     """An address as it may be told: its password is left out, also where it is given as a parameter."""
-    query = {name: "***" if "pass" in name.lower() else value for name, value in url.query.items()}
+    query = {name: "hidden" if "pass" in name.lower() else value for name, value in url.query.items()}
     return url.set(query=query).render_as_string()
 
 

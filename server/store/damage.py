@@ -8,7 +8,7 @@ from sqlalchemy import Connection, Engine, inspect, select, text
 from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.service.experiments import ExperimentState
-from server.store.database_errors import BRING_BACK, DamagedError, line_of, one_line
+from server.store.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line
 from server.store.tables import ExperimentRow, JobRow, Table
 
 
@@ -23,7 +23,8 @@ def require_sound(engine: Engine, place: str) -> None:
             for rows in (ExperimentRow, JobRow):
                 _require_known_states(connection, rows, place)
     except DatabaseError as error:
-        raise DamagedError(f"database {place}: {line_of(error)}; {BRING_BACK}") from error
+        line = line_of(error)
+        raise DamagedError(f"database {place}: {line}; {advice_of(line)}") from error
 
 
 def _require_whole(connection: Connection, place: str) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import sqlite3
 import threading
-from collections.abc import Iterator
+import traceback
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from importlib import resources
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 
 from alembic import command
 from alembic.config import Config
+from pydantic import ValidationError
 from sqlalchemy import Engine, event, text
 from sqlalchemy.exc import DatabaseError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
@@ -71,7 +73,8 @@ class Store:
             line = line_of(error)
             raise StoreError(f"database {self.place}: cannot be opened: {line}; {advice_of(line)}") from error
         except DatabaseError as error:
-            raise StoreError(f"database {self.place}: {line_of(error)}; {BRING_BACK}") from error
+            line = line_of(error)
+            raise StoreError(f"database {self.place}: {line}; {advice_of(line)}") from error
         except Exception as error:
             line = f"database {self.place}: its tables cannot be brought up to date: {one_line(error)}"
             raise StoreError(f"{line}; {BRING_BACK}") from error
@@ -84,19 +87,22 @@ class Store:
 
     @contextmanager
     def writing(self) -> Iterator[Session]:
-        """A session whose changes are on the disk when it is left; all of them or none. Raises DamagedError."""
+        """A session whose changes are on the disk when it is left; all of them or none. Raises DamagedError for rows
+        that nobody can have written; an error of what is done within is no damage."""
         with self._writing:
-            with self._told_of_damage(), self._writers.begin() as session:
+            with self._told_of_damage(_is_of_a_row), self._writers.begin() as session:
                 yield session
             self.changes += 1
 
     @contextmanager
-    def _told_of_damage(self) -> Iterator[None]:
+    def _told_of_damage(self, is_damage: Callable[[Exception], bool] = lambda _error: True) -> Iterator[None]:
         """Within, what cannot be made of a row is told with its table: JSON, moments, states, numbers."""
         self._last.statement = ""
         try:
             yield
         except (ValueError, TypeError) as error:  # pydantic's and JSON's errors are ValueErrors
+            if not is_damage(error):
+                raise
             table = table_of(self._last.statement)
             raise DamagedError(f"table {table}: a row cannot be read: {one_line(error)}; {BRING_BACK}") from error
 
@@ -122,6 +128,14 @@ def migrations() -> Config:
     config = Config()
     config.set_main_option("script_location", str(resources.files("server.store") / "migrations"))
     return config
+
+
+def _is_of_a_row(error: Exception) -> bool:
+    """Whether this came of what a row holds: SQLAlchemy made its values of it, or a model was made of them."""
+    if isinstance(error, ValidationError):
+        return True
+    names = (frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__))
+    return any(name.startswith("sqlalchemy.engine.") for name in names)
 
 
 def _safe_and_shared(connection: sqlite3.Connection, _record: Any) -> None:
