@@ -42,6 +42,8 @@ class Connection(HttpToolsProtocol):
     """Bytes that the parser has told of this request's head."""
     _untold = 0
     """Bytes of it that came after its beginning, told or not: a header is told when it has ended."""
+    _silent = 0
+    """Bytes since the parser told of anything: it keeps a trailer after the body until that has ended."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """As uvicorn's."""
@@ -63,14 +65,16 @@ class Connection(HttpToolsProtocol):
             return
         if self._reading_head:
             self._untold += len(data)
-            if self._untold > LARGEST_HEAD:
-                self._refusal = _too_large(f"address and headers have more than {LARGEST_HEAD >> 10} kB")
-                self.send_400_response("")
-                return
+        self._silent += len(data)
+        if max(self._untold if self._reading_head else 0, self._silent - len(data)) > LARGEST_HEAD:
+            self._refusal = _too_large(f"address and headers have more than {LARGEST_HEAD >> 10} kB")
+            self.send_400_response("")
+            return
         super().data_received(data)
 
     def on_message_begin(self) -> None:
         """A request begins."""
+        self._silent = 0
         super().on_message_begin()
         self._reading_head, self._headers, self._head, self._untold = True, 0, 0, 0
 
@@ -84,6 +88,7 @@ class Connection(HttpToolsProtocol):
 
     def on_header(self, name: bytes, value: bytes) -> None:
         """A header, or a trailer after the body. Raises as `on_url`."""
+        self._silent = 0
         self._headers += 1
         if self._headers > MOST_HEADERS:
             self._refuse(_too_large(f"a request may have {MOST_HEADERS} headers"))
@@ -94,6 +99,11 @@ class Connection(HttpToolsProtocol):
         """The head has ended."""
         self._reading_head = False
         super().on_headers_complete()
+
+    def on_body(self, body: bytes) -> None:
+        """A part of the body."""
+        self._silent = 0
+        super().on_body(body)
 
     def send_400_response(self, msg: str) -> None:
         """The refusal, where there is one; else uvicorn's."""

@@ -37,13 +37,20 @@ class JsonLines(logging.Formatter):
 
 
 class PlainLines(logging.Formatter):
-    """For a terminal."""
+    """For a terminal. What strangers send gives it no orders and makes no lines of its own."""
 
     def format(self, record: logging.LogRecord) -> str:
         """The line."""
         moment = datetime.fromtimestamp(record.created).astimezone().strftime("%H:%M:%S")
-        text = f"{moment} {record.levelname.lower():7} {record.getMessage()}"
-        return f"{text}\n{self.formatException(record.exc_info)}" if record.exc_info else text
+        text = f"{moment} {record.levelname.lower():7} {_printable(record.getMessage())}"
+        if not record.exc_info:
+            return text
+        return "\n".join([text, *map(_printable, self.formatException(record.exc_info).split("\n"))])
+
+
+def _printable(text: str) -> str:
+    """With every other character written as its escape."""
+    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
 
 
 class StandardError(io.TextIOBase):

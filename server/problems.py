@@ -99,6 +99,12 @@ def of_database(error: DatabaseError) -> ProblemError:
     return ProblemError(503, "database", f"the database: {line}", advice_of(line))
 
 
+def of_damage(error: DamagedError) -> ProblemError:
+    """A 503 that names the table."""
+    log.error("database: %s", error)
+    return ProblemError(503, "database", f"the database: {error}", BRING_BACK)
+
+
 def no_room(error: OSError) -> ProblemError:
     """A 507: the disk takes no more."""
     log.error("disk: %s", error)
@@ -173,8 +179,7 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(DamagedError)
     async def damaged(request: Request, error: DamagedError) -> JSONResponse:
-        log.error("database: %s", error)
-        return response(request, ProblemError(503, "database", f"the database: {error}", BRING_BACK))
+        return response(request, of_damage(error))
 
     @app.exception_handler(OSError)
     async def disk(request: Request, error: OSError) -> JSONResponse:

@@ -37,6 +37,7 @@ from server.owner.messages import Answer, ArmReport, Opened, Report
 from server.problems import ProblemError, conflict, not_found
 from server.queue.desk import QueueDesk
 from server.queue.parts import QueueParts
+from server.readiness import Readiness
 from server.robot.control import ControlDesk
 from server.robot.keeper import Keeper
 from server.robot.robot import Robot, RobotPlace
@@ -108,6 +109,7 @@ class Services:
         self.stop_port = 0
         """Of the stop listener, once there is one."""
         self.lanes = Lanes()
+        self.readiness = Readiness(self.clock)
         self.metrics = Metrics()
         limits = Limits(memory=settings.server.upload_memory << 20, seconds=settings.server.upload_time)
         self.uploads = Workers(limits, 1)

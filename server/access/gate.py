@@ -27,7 +27,8 @@ from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_kno
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
 from server.access.turns import Turns
-from server.problems import ProblemError, of_database, response
+from server.problems import ProblemError, of_damage, of_database, response
+from server.store.database_errors import DamagedError
 
 STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
 """The one address whose POST no limit of requests holds up."""
@@ -102,9 +103,6 @@ class Gate:
                 self.refused(problem.kind)
                 await response(Request(scope), problem)(scope, receive, secured)
                 return
-            except DatabaseError as error:  # of whoever is not known by heart
-                await response(Request(scope), of_database(error))(scope, receive, secured)
-                return
             state["turn"] = turn = await self.turns.taken(scope, secured)
             try:
                 body = receive if _is_post(scope, UPLOADS) else counted(receive, LARGEST_BODY)
@@ -125,7 +123,8 @@ class Gate:
         except ProblemError as problem:
             self.refused(problem.kind)
             log.warning("refused a WebSocket: %s", problem.detail)
-            await WebSocketClose(NOT_ALLOWED, problem.detail)(scope, receive, send)
+            code = NOT_ALLOWED if problem.status < 500 else TRY_LATER
+            await WebSocketClose(code, problem.detail)(scope, receive, send)
             return
         caller = state["caller"]
         name = caller.name if caller else ""
@@ -166,7 +165,7 @@ class Gate:
                 await asyncio.gather(task, return_exceptions=True)
 
     async def _admit(self, scope: Scope) -> Caller | None:
-        """Who calls. Raises a 401, 403, 413 or 429."""
+        """Who calls. Raises a 401, 403, 413, 429 or 503."""
         headers = Headers(scope=scope)
         changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS
         if not is_known_name(headers.get("host", ""), self.names, loopback_only=self.open_on_loopback):
@@ -192,7 +191,7 @@ class Gate:
             if caller is None and not self.tokens.was_known(token.strip()) and not _is_post(scope, STOP):
                 self._count(None, scope)  # before the database is asked
             if not known:
-                caller = await asyncio.to_thread(self.tokens.look_up, token.strip())
+                caller = await self._looked_up(token.strip())
             if caller is None:
                 line = "this token is not known, or was revoked"
                 raise ProblemError(401, "token-unknown", line, "`daq token ls` lists tokens by name", (), _BEARER)
@@ -206,6 +205,15 @@ class Gate:
                     raise ProblemError(401, "ticket-unknown", line, "ask for a new one")
                 return caller
         return LOCAL if self.open_on_loopback and is_this_computers_user(headers) else None
+
+    async def _looked_up(self, token: str) -> Caller | None:
+        """Raises a 503 where the database has never said whose it is."""
+        try:
+            return await asyncio.to_thread(self.tokens.look_up, token)
+        except DamagedError as error:
+            raise of_damage(error) from error
+        except DatabaseError as error:
+            raise of_database(error) from error
 
     def _count(self, caller: Caller | None, scope: Scope) -> None:
         address = scope["client"][0] if scope.get("client") else ""

@@ -21,6 +21,7 @@ from daq.contracts.service.queue import Role
 from server.access.caller import Caller
 from server.access.digest import digest_of
 from server.clock import Clock
+from server.store.database_errors import DamagedError
 from server.store.engine import Store
 from server.store.tables import TokenRow
 
@@ -31,6 +32,8 @@ REMEMBERED_FOR = 2.0
 UNKNOWN_FOR = 0.2
 """s after which the database is asked again for a token that it did not have: one made meanwhile opens what it should,
 and whoever tries tokens has the database asked five times a second at most."""
+CANNOT_BE_READ = (SQLAlchemyError, DamagedError)
+"""Raised where the database does not say whose a token is."""
 log = logging.getLogger("server.access")
 
 
@@ -75,10 +78,11 @@ class TokenStore:
             return [TokenInfo(row.name, _role(row.role), row.created, row.revoked) for row in rows]
 
     def callers(self) -> dict[str, Caller]:
-        """Whose each token is that was not revoked, by its digest."""
+        """Whose each token is that was not revoked, by its digest. Reads nothing else: a moment that is damaged keeps
+        nobody out."""
         with self._store.reading() as session:
-            rows = session.scalars(select(TokenRow).filter_by(revoked=None))
-            return {row.digest: Caller(row.name, _role(row.role), row.digest) for row in rows}
+            rows = session.execute(select(TokenRow.digest, TokenRow.name, TokenRow.role).filter_by(revoked=None))
+            return {digest: Caller(name, _role(role), digest) for digest, name, role in rows}
 
 
 @dataclass(frozen=True)
@@ -109,7 +113,7 @@ class KnownTokens:
 
     def look_up(self, token: str) -> Caller | None:
         """Whose it is, from the database. Where that cannot be read, from what it said last: nobody can have revoked
-        anything meanwhile, and whoever could stop the robot still can. Raises SQLAlchemyError where it never said."""
+        anything meanwhile, and whoever could stop the robot still can. Raises CANNOT_BE_READ where it never said."""
         return self._look_up(digest_of(token))
 
     async def still_let_in(self, caller: Caller) -> bool:
@@ -120,7 +124,7 @@ class KnownTokens:
         if not known:
             try:
                 found = await asyncio.to_thread(self._look_up, caller.token)
-            except SQLAlchemyError:  # asked again soon: nobody loses sight of the arm because a disk is busy
+            except CANNOT_BE_READ:  # asked again soon: nobody loses sight of the arm because a disk is busy
                 return True
         return found == caller
 
@@ -137,7 +141,7 @@ class KnownTokens:
                 return caller
             try:
                 self._known = _Known(self._tokens.callers(), self._clock.monotonic())
-            except SQLAlchemyError as error:
+            except CANNOT_BE_READ as error:
                 if self._known.at == -math.inf:
                     raise
                 log.warning("tokens cannot be read, the last ones that were are taken: %s", error)

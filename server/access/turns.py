@@ -9,13 +9,19 @@ from __future__ import annotations
 
 import asyncio
 import re
+from contextlib import suppress
+from urllib.parse import parse_qs
 
 from starlette.types import Message, Scope, Send
 
 AT_ONCE = 8
 """Questions that are worked out in one round of the event loop: 10 to 20 ms of it."""
 ASKS_THE_ROBOT = re.compile(r"/api/v1/robots/[^/]+/(gains|process)")
-"""Answers that wait for the robot: they are limited already, and may not keep everybody else's turns."""
+"""These answers wait for the robot. Their number is limited elsewhere; they must not take the turns of others."""
+WAITS_FOR_AN_END = re.compile(r"/api/v1/robots/[^/]+/(experiments|jobs)/[^/]+")
+"""Where `wait` in the query lets the answer wait until something has ended."""
+READY = "/readyz"
+"""Anybody may ask it, and its answer waits for disk and database: one at a time is worked out, for all who ask."""
 
 
 class Turns:
@@ -58,6 +64,14 @@ class Turn:
 
 def _is_plain_question(scope: Scope) -> bool:
     """One that is answered from what is there: no change, no stop, and none that waits for news."""
-    if scope["method"] not in ("GET", "HEAD") or b"wait=" in scope.get("query_string", b""):
+    path = scope["path"]
+    if scope["method"] not in ("GET", "HEAD") or path == READY or ASKS_THE_ROBOT.fullmatch(path):
         return False
-    return ASKS_THE_ROBOT.fullmatch(scope["path"]) is None
+    return WAITS_FOR_AN_END.fullmatch(path) is None or not _waits(scope.get("query_string", b""))
+
+
+def _waits(query: bytes) -> bool:
+    with suppress(ValueError):
+        given = parse_qs(query.decode("latin-1")).get("wait", ["0"])
+        return float(given[-1]) > 0
+    return False

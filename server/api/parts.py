@@ -82,15 +82,15 @@ Operator = Annotated[Caller, Depends(_operator)]
 
 
 def _of_a_list(cursor: str | None) -> str | None:
-    """Raises ValueError for one that no list can have given out: its number is a row's or a moment's, its identity can
-    be written down."""
+    """Raises ValueError for a cursor that no list can have given out. Its number is that of a row or of a moment, and
+    its identity is text that can be encoded."""
     if cursor is not None:
         try:
             place = Cursor.parse(cursor)
             datetime.fromtimestamp(place.number, UTC)
             place.identity.encode()
         except (ProblemError, ValueError, OverflowError, OSError):
-            raise ValueError("is none that a list gave out; begin without one") from None
+            raise ValueError("was not given out by a list; begin without a cursor") from None
     return cursor
 
 

@@ -15,7 +15,10 @@ from server.store.programs import StoredProgram
 
 router = APIRouter(prefix="/robots/{robot}/programs", tags=["teaching"], responses=PROBLEMS)
 ProgramName = Annotated[str, Path(pattern=f"^{NAME}$", description="Name of the program.")]
-Revision = Annotated[int | None, Query(ge=1, lt=2**31, description="That which was changed; none for a new program.")]
+Revision = Annotated[
+    int | None,
+    Query(ge=1, lt=2**31, description="The revision that you changed. Leave it out for a new program."),
+]
 
 
 @router.get("")

@@ -36,12 +36,12 @@ async def healthz() -> Health:
 
 
 @plain.get("/readyz", responses={503: {"model": Health}})
-def readyz(request: Request, found: ServicesPart, response: Response) -> Health:
+async def readyz(request: Request, found: ServicesPart, response: Response) -> Health:
     """200 while experiments can be taken: database and traces' folder can be written. A robot need not be there.
 
-    What is wrong is told to whoever may see the robot.
+    What is wrong is told to whoever may see the robot. The answer is up to a second old.
     """
-    problems = _checks(found)
+    problems = await found.readiness.told(lambda: _checks(found))
     if caller_of(request) is None:
         problems = {name: problem and NOT_WELL for name, problem in problems.items()}
     if any(problems[name] for name in ("database", "traces")):

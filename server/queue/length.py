@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import assert_never
+
 from daq.contracts.experiment import (
     Cubic,
     ExperimentSpec,
     Multisine,
     Path,
     Pause,
+    PickAndPlace,
     Ramp,
     Sequence,
     Sine,
@@ -15,6 +18,7 @@ from daq.contracts.experiment import (
     Staircase,
     Step,
     Trajectory,
+    Via,
 )
 
 LONGEST = 4 * 3600.0
@@ -28,13 +32,20 @@ def least_length(spec: ExperimentSpec) -> float:
 
 
 def points_of(spec: ExperimentSpec) -> int:
-    """Set points, or segments, that the specification itself has."""
-    match spec.trajectory:
-        case Path() as path:
-            return len(path.times)
-        case Sequence() as sequence:
-            return len(sequence.segments)
-    return 0
+    """Set points, via points or segments that the specification itself has; those of its segments, too."""
+    return _points(spec.trajectory)
+
+
+def _points(trajectory: Trajectory) -> int:
+    match trajectory:
+        case Path() | Via():
+            return len(trajectory.times)
+        case Sequence():
+            return sum(max(1, _points(segment.move)) for segment in trajectory.segments)
+        case Ramp() | Step() | Staircase() | SlowRamp() | Sine() | Multisine() | Cubic() | PickAndPlace() | Pause():
+            return 0
+        case _:
+            assert_never(trajectory)
 
 
 def _of(trajectory: Trajectory) -> float:
@@ -52,8 +63,12 @@ def _of(trajectory: Trajectory) -> float:
             length = (trajectory.reversals + 1) * farthest / trajectory.speed
         case Sine():
             length = trajectory.period * trajectory.cycles
-        case Path():
+        case PickAndPlace():
+            length = trajectory.pick + trajectory.travel + trajectory.place
+        case Path() | Via():
             length = trajectory.times[-1]
         case Sequence():
             length = sum(_of(segment.move) for segment in trajectory.segments)
+        case _:
+            assert_never(trajectory)
     return length

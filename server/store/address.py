@@ -36,6 +36,12 @@ def parse_address(url: str) -> URL:
     return parsed
 
 
+def masked(url: URL) -> str:
+    """An address as it may be told: its password is left out, also where it is given as a parameter."""
+    query = {name: "hidden" if "pass" in name.lower() else value for name, value in url.query.items()}
+    return url.set(query=query).render_as_string()
+
+
 def open_engine(url: str) -> Engine:
     """The engine of a database; it connects when it is first used. Raises StoreError, also where a driver is missing:
     it says which package to install."""
@@ -45,7 +51,7 @@ def open_engine(url: str) -> Engine:
     except ModuleNotFoundError as error:
         raise _no_driver(parsed, error) from error
     except (ArgumentError, TypeError, ValueError) as error:
-        line = f"server.database {parsed.render_as_string()}: cannot be used: {error}"
+        line = f"server.database {masked(parsed)}: cannot be used: {error}"
         raise StoreError(line) from error
 
 
@@ -53,6 +59,6 @@ def _no_driver(parsed: URL, error: ModuleNotFoundError) -> StoreError:
     module = error.name or parsed.drivername
     package = PACKAGES.get(module, module)
     return StoreError(
-        f"server.database {parsed.render_as_string()}: its driver {module} is not installed: "
+        f"server.database {masked(parsed)}: its driver {module} is not installed: "
         f"`pip install '{package}'` where daq is installed"
     )

@@ -8,44 +8,46 @@ from sqlalchemy import Connection, Engine, inspect, select, text
 from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.service.experiments import ExperimentState
-from server.store.database_errors import BRING_BACK, DamagedError, line_of, one_line
+from server.store.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line
 from server.store.tables import ExperimentRow, JobRow, Table
 
 
-def require_sound(engine: Engine, url: str) -> None:
-    """Raises DamagedError for a file that is damaged, a table or column that is gone, a state that nobody knows."""
+def require_sound(engine: Engine, place: str) -> None:
+    """Raises DamagedError for a file that is damaged, a table or column that is gone, a state that nobody knows.
+    `place`: the database's address as it may be told."""
     try:
         with engine.connect() as connection:
             if engine.dialect.name == "sqlite":
-                _require_whole(connection, url)
-            _require_columns(connection, url)
+                _require_whole(connection, place)
+            _require_columns(connection, place)
             for rows in (ExperimentRow, JobRow):
-                _require_known_states(connection, rows, url)
+                _require_known_states(connection, rows, place)
     except DatabaseError as error:
-        raise DamagedError(f"database {url}: {line_of(error)}; {BRING_BACK}") from error
+        line = line_of(error)
+        raise DamagedError(f"database {place}: {line}; {advice_of(line)}") from error
 
 
-def _require_whole(connection: Connection, url: str) -> None:
+def _require_whole(connection: Connection, place: str) -> None:
     told = connection.execute(text("PRAGMA quick_check(1)")).scalar()
     if told != "ok":
-        raise DamagedError(f"database {url}: is damaged: {one_line(told)}; {BRING_BACK}")
+        raise DamagedError(f"database {place}: is damaged: {one_line(told)}; {BRING_BACK}")
 
 
-def _require_columns(connection: Connection, url: str) -> None:
+def _require_columns(connection: Connection, place: str) -> None:
     there = inspect(connection)
     tables = set(there.get_table_names())
     for name, table in Table.metadata.tables.items():
         if name not in tables:
-            raise DamagedError(f"database {url}: table {name} is missing; {BRING_BACK}")
+            raise DamagedError(f"database {place}: table {name} is missing; {BRING_BACK}")
         missing = {column.name for column in table.columns} - {str(one["name"]) for one in there.get_columns(name)}
         if missing:
-            line = f"database {url}: table {name} has no column {', '.join(sorted(missing))}"
+            line = f"database {place}: table {name} has no column {', '.join(sorted(missing))}"
             raise DamagedError(f"{line}; {BRING_BACK}")
 
 
-def _require_known_states(connection: Connection, rows: type[ExperimentRow | JobRow], url: str) -> None:
+def _require_known_states(connection: Connection, rows: type[ExperimentRow | JobRow], place: str) -> None:
     known = get_args(ExperimentState)  # those of jobs are the same
     unknown = connection.execute(select(rows.id, rows.state).where(rows.state.not_in(known)).limit(1)).first()
     if unknown is not None:
-        line = f"database {url}: table {rows.__tablename__}: {unknown[0]} has the state {unknown[1]!r:.40}"
+        line = f"database {place}: table {rows.__tablename__}: {unknown[0]} has the state {unknown[1]!r:.40}"
         raise DamagedError(f"{line}, which is none of {', '.join(known)}; {BRING_BACK}")

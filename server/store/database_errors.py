@@ -11,6 +11,18 @@ if TYPE_CHECKING:
     from sqlalchemy.exc import DatabaseError
 
 BRING_BACK = "`daq restore FILE --overwrite` brings a backup back"
+TRY_AGAIN = "try again; where it stays so, look at the database's own log"
+_DAMAGE = (
+    "disk image is malformed",
+    "malformed database schema",
+    "file is not a database",
+    "no such table",
+    "no such column",
+    "duplicate column name",
+    "already exists",
+)
+"""What SQLite says where its file, or what was made in it, is not as it was left. The last two are said by
+migrations."""
 _TABLE = re.compile(r'\b(?:FROM|INTO|UPDATE)\s+"?(\w+)', re.IGNORECASE)
 _LONGEST = 200
 
@@ -34,11 +46,13 @@ def line_of(error: DatabaseError) -> str:
 
 
 def advice_of(line: str) -> str:
-    """What helps against it: a backup against damage, room or patience against the rest."""
+    """What helps against it: a backup against proven damage, room on the disk, patience against the rest.
+
+    Whoever brings back a backup loses what came after it, so only SQLite's own word of damage advises that.
+    """
     if "full" in line:
         return "make room on its disk"
-    passes = ("locked", "busy", "readonly", "unable to open")
-    return "try again" if any(word in line for word in passes) else BRING_BACK
+    return BRING_BACK if any(words in line for words in _DAMAGE) else TRY_AGAIN
 
 
 def one_line(error: object) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import sqlite3
 import threading
-from collections.abc import Iterator
+import traceback
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from importlib import resources
 from pathlib import Path
@@ -13,11 +14,12 @@ from typing import Any
 
 from alembic import command
 from alembic.config import Config
+from pydantic import ValidationError
 from sqlalchemy import Engine, event, text
 from sqlalchemy.exc import DatabaseError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 
-from server.store.address import StoreError, open_engine, parse_address
+from server.store.address import StoreError, masked, open_engine, parse_address
 from server.store.damage import require_sound
 from server.store.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
 
@@ -44,6 +46,8 @@ class Store:
                 # For nobody else to read, and what SQLite puts beside it likewise: the hashes of tokens are in it.
                 os.close(os.open(parsed.database, os.O_CREAT | os.O_RDWR, 0o600))
         self.url = url
+        self.place = masked(parsed)
+        """Its address as it may be told: without the password."""
         self.engine: Engine = open_engine(url)
         if parsed.get_backend_name() == "sqlite":
             event.listen(self.engine, "connect", _safe_and_shared)
@@ -67,11 +71,12 @@ class Store:
                 connection.commit()
         except OperationalError as error:
             line = line_of(error)
-            raise StoreError(f"database {self.engine.url}: cannot be opened: {line}; {advice_of(line)}") from error
+            raise StoreError(f"database {self.place}: cannot be opened: {line}; {advice_of(line)}") from error
         except DatabaseError as error:
-            raise StoreError(f"database {self.engine.url}: {line_of(error)}; {BRING_BACK}") from error
+            line = line_of(error)
+            raise StoreError(f"database {self.place}: {line}; {advice_of(line)}") from error
         except Exception as error:
-            line = f"database {self.engine.url}: its tables cannot be brought up to date: {one_line(error)}"
+            line = f"database {self.place}: its tables cannot be brought up to date: {one_line(error)}"
             raise StoreError(f"{line}; {BRING_BACK}") from error
 
     @contextmanager
@@ -82,19 +87,22 @@ class Store:
 
     @contextmanager
     def writing(self) -> Iterator[Session]:
-        """A session whose changes are on the disk when it is left; all of them or none. Raises DamagedError."""
+        """A session whose changes are on the disk when it is left; all of them or none. Raises DamagedError for rows
+        that nobody can have written; an error of what is done within is no damage."""
         with self._writing:
-            with self._told_of_damage(), self._writers.begin() as session:
+            with self._told_of_damage(_is_of_a_row), self._writers.begin() as session:
                 yield session
             self.changes += 1
 
     @contextmanager
-    def _told_of_damage(self) -> Iterator[None]:
+    def _told_of_damage(self, is_damage: Callable[[Exception], bool] = lambda _error: True) -> Iterator[None]:
         """Within, what cannot be made of a row is told with its table: JSON, moments, states, numbers."""
         self._last.statement = ""
         try:
             yield
         except (ValueError, TypeError) as error:  # pydantic's and JSON's errors are ValueErrors
+            if not is_damage(error):
+                raise
             table = table_of(self._last.statement)
             raise DamagedError(f"table {table}: a row cannot be read: {one_line(error)}; {BRING_BACK}") from error
 
@@ -103,7 +111,7 @@ class Store:
 
     def require_sound(self) -> None:
         """Raises DamagedError where tables, columns or states are not those that this program writes."""
-        require_sound(self.engine, self.url)
+        require_sound(self.engine, self.place)
 
     def require_writable(self) -> None:
         """Raises OperationalError where nothing could be written: the writer's lock is taken, and given back."""
@@ -120,6 +128,14 @@ def migrations() -> Config:
     config = Config()
     config.set_main_option("script_location", str(resources.files("server.store") / "migrations"))
     return config
+
+
+def _is_of_a_row(error: Exception) -> bool:
+    """Whether this came of what a row holds: SQLAlchemy made its values of it, or a model was made of them."""
+    if isinstance(error, ValidationError):
+        return True
+    names = (frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__))
+    return any(name.startswith("sqlalchemy.engine.") for name in names)
 
 
 def _safe_and_shared(connection: sqlite3.Connection, _record: Any) -> None:

@@ -18,11 +18,12 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from server.access.caller import Caller
-from server.access.gate import NOT_ALLOWED, Gate
+from server.access.gate import NOT_ALLOWED, TRY_LATER, Gate
 from server.access.limits import Bucket, Buckets
 from server.access.origin import is_from_elsewhere, is_known_name, is_loopback, is_this_computers_user
 from server.access.tickets import GOOD_FOR, Tickets
 from server.access.tokens import REMEMBERED_FOR, UNKNOWN_FOR, KnownTokens, TokenStore, digest_of
+from server.store.database_errors import DamagedError
 from server.store.engine import Store
 from server.store.tables import TokenRow
 from tests.daq.cli.invoke import CommandLine
@@ -182,6 +183,71 @@ def test_who_was_known_still_is_while_the_database_cannot_be_read(tmp_path: Path
     assert known.look_up(token) == Caller("anna", "operator")
     with pytest.raises(SQLAlchemyError):
         late.look_up(token)
+    store.close()
+
+
+def test_a_moment_that_is_damaged_keeps_nobody_out(tmp_path: Path) -> None:
+    clock, store = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
+    store.migrate()
+    tokens = TokenStore(store)
+    token = tokens.add("anna", "operator", clock.utc())
+    tokens.add("bert", "viewer", clock.utc())
+    with store.writing() as session:
+        session.execute(text("UPDATE tokens SET created = 'noon'"))
+    assert KnownTokens(tokens, clock).look_up(token) == Caller("anna", "operator")
+    store.close()
+
+
+class _Damaged(TokenStore):
+    """Its rows can be read once, or never."""
+
+    damaged = True
+
+    def callers(self) -> dict[str, Caller]:
+        if self.damaged:
+            raise DamagedError("table tokens: a row cannot be read")
+        return super().callers()
+
+
+def test_tokens_that_are_damaged_keep_out_nobody_who_was_known(tmp_path: Path) -> None:
+    clock, store = HandClock(), Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
+    store.migrate()
+    tokens = _Damaged(store)
+    token = tokens.add("anna", "operator", clock.utc())
+    known, sent = KnownTokens(tokens, clock), []
+    gate = Gate(known, Tickets(clock), open_on_loopback=False)
+
+    async def inside(scope: Scope, _receive: Receive, send: Send) -> None:
+        if scope["type"] == "websocket":
+            await send({"type": "websocket.accept"})
+        else:
+            await send({"type": "http.response.start", "status": 200, "headers": []})
+
+    async def send(message: Message) -> None:
+        sent.append(message.get("status") or message.get("code") or message["type"])
+
+    async def receive() -> Message:
+        raise AssertionError("nobody asks for it")
+
+    async def asked(kind: str) -> object:
+        sent.clear()
+        headers = [(b"host", b"10.0.0.1"), (b"authorization", f"Bearer {token}".encode())]
+        path = "/api/v1/robots/ma2000/stop"
+        scope = {"type": kind, "method": "POST", "path": path, "query_string": b"", "headers": headers}
+        await gate.middleware(inside)(scope, receive, send)
+        return sent[0]
+
+    assert asyncio.run(asked("http")) == 503
+    assert asyncio.run(asked("websocket")) == TRY_LATER
+    tokens.damaged = False
+    assert asyncio.run(asked("http")) == 200
+    tokens.damaged = True
+    clock.turn(REMEMBERED_FOR)
+    assert asyncio.run(asked("http")) == 200
+    clock.turn(REMEMBERED_FOR)
+    assert asyncio.run(asked("websocket")) == "websocket.accept"
+    clock.turn(REMEMBERED_FOR)
+    assert asyncio.run(known.still_let_in(Caller("anna", "operator", digest_of(token))))
     store.close()
 
 

@@ -46,6 +46,29 @@ def test_a_crowd_that_asks_for_nothing_keeps_nobody_out_and_does_not_grow(monkey
     assert held <= MOST
 
 
+class _Transport(asyncio.Transport):
+    """Keeps what is written to it."""
+
+    def __init__(self) -> None:
+        super().__init__({"peername": ("127.0.0.1", 1), "sockname": ("127.0.0.1", 2)})
+        self.written = b""
+
+    def write(self, data: bytes | bytearray | memoryview) -> None:
+        self.written += bytes(data)
+
+    def is_closing(self) -> bool:
+        return False
+
+    def close(self) -> None:
+        pass
+
+    def pause_reading(self) -> None:
+        pass
+
+    def resume_reading(self) -> None:
+        pass
+
+
 def _head(headers: int = 0, *, address: int = 1, value: int = 1, end: bytes = b"\r\n") -> bytes:
     lines = b"".join(b"x-%d: %s\r\n" % (number, b"v" * value) for number in range(headers))
     return b"GET /%s HTTP/1.1\r\nhost: 127.0.0.1\r\n%s%s" % (b"a" * address, lines, end)
@@ -84,3 +107,38 @@ def test_a_head_too_large_is_refused_before_anything_is_made_of_it(sent: bytes, 
 
     with socket.create_server(("127.0.0.1", 0)) as listener:
         assert int(asyncio.run(answered(listener)).split()[1]) == status
+
+
+@pytest.mark.parametrize("trailer", [b"x", b"x: a"], ids=["name", "value"])
+def test_a_trailer_that_never_ends_is_refused_before_it_fills_the_memory(
+    trailer: bytes,
+) -> None:
+    """Also after the answer: the parser keeps what follows the body, whether anybody reads that or not."""
+    head = b"POST / HTTP/1.1\r\nhost: a\r\ntransfer-encoding: chunked\r\n\r\n0\r\n"
+
+    async def asked() -> bytes:
+        config, state = uvicorn.Config(_answer, lifespan="off", log_config=None), ServerState()
+        transport, connection = _Transport(), Connection(config, state, {})
+        connection.connection_made(transport)
+        connection.data_received(head + trailer)
+        for _ in range(100):
+            connection.data_received(b"a" * 1000)
+        connection.connection_lost(None)
+        return transport.written
+
+    assert b" 431 " in asyncio.run(asked())
+
+
+def test_a_body_of_any_length_is_none_of_the_head() -> None:
+    async def asked() -> bytes:
+        config, state = uvicorn.Config(_answer, lifespan="off", log_config=None), ServerState()
+        transport, connection = _Transport(), Connection(config, state, {})
+        connection.connection_made(transport)
+        connection.data_received(b"POST / HTTP/1.1\r\nhost: a\r\ntransfer-encoding: chunked\r\n\r\n")
+        for _ in range(100):
+            connection.data_received(b"3e8\r\n" + b"a" * 500)
+            connection.data_received(b"a" * 500 + b"\r\n")
+        connection.connection_lost(None)
+        return transport.written
+
+    assert b" 431 " not in asyncio.run(asked())

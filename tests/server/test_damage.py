@@ -8,10 +8,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from sqlalchemy import text
+from sqlalchemy.engine import make_url
 
 from daq.contracts.errors import DaqError
 from server.clock import SystemClock
+from server.store.address import masked
+from server.store.database_errors import DamagedError, advice_of
 from server.store.engine import Store
+from server.store.tables import QueueRow
 from tests.daq.cli.invoke import CommandLine
 from tests.server.inside import service_inside
 
@@ -121,3 +126,47 @@ def test_a_table_that_breaks_while_it_runs_is_named_and_everything_else_goes_on(
             assert "\n" not in answer.json()["detail"]
         assert api.get("/queue").status_code == 200
         assert api.post("/stop").status_code == 200
+
+
+@pytest.mark.parametrize("address", ["postgresql://anna:secret@lab/daq", "postgresql://lab/daq?password=secret"])
+def test_no_line_about_damage_tells_the_password(tmp_path: Path, address: str) -> None:
+    store = Store(f"sqlite:///{tmp_path / FILE}")
+    store.migrate()
+    with store.writing() as session:
+        session.execute(text("DROP TABLE queues"))
+    store.place = masked(make_url(address))
+    with pytest.raises(DamagedError, match="queues") as refused:
+        store.require_sound()
+    store.close()
+    assert "secret" not in str(refused.value)
+    assert "lab/daq" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "restore"),
+    [
+        ("database disk image is malformed", True),
+        ("file is not a database", True),
+        ("table traces: no such table: traces", True),
+        ("database is locked", False),
+        ("disk I/O error", False),
+        ("terminating connection due to administrator command", False),
+        ("deadlock detected", False),
+        ("table tokens: UNIQUE constraint failed: tokens.name", False),
+        ("database or disk is full", False),
+    ],
+)
+def test_a_backup_is_advised_against_damage_alone(line: str, restore: bool) -> None:
+    assert ("daq restore" in advice_of(line)) is restore
+
+
+def test_what_fails_while_something_is_written_is_damage_only_where_a_row_is_to_blame(tmp_path: Path) -> None:
+    store = Store(f"sqlite:///{tmp_path / FILE}")
+    store.migrate()
+    with store.writing() as session:
+        session.execute(text("INSERT INTO queues VALUES ('a', 0, '', 'noon')"))
+    with pytest.raises(ValueError, match="invalid literal"), store.writing():
+        int("an error of this program")
+    with pytest.raises(DamagedError, match="table queues"), store.writing() as session:
+        session.get(QueueRow, "a")
+    store.close()

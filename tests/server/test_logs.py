@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import logging
 import subprocess
 import sys
 from typing import Any
+
+from server.logs import PlainLines
 
 PROGRAM = """
 import logging, sys, threading, warnings
@@ -67,3 +70,15 @@ print("still here")
 """
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stdout) == (0, "still here\n")
+
+
+def test_what_is_logged_gives_a_terminal_no_orders_and_forges_no_line() -> None:
+    path = "/a\x1b[2J\x1b]0;title\x07\n12:00:00 info    all is well\r\u202e\x9b1m é"
+    trace = (ValueError, ValueError("first\x1b[2J\nsecond"), None)
+    record = logging.LogRecord("server", logging.INFO, __file__, 1, "%s %s", ("GET", path), None)
+    failed = logging.LogRecord("server", logging.INFO, __file__, 1, "%s", (path,), trace)
+    (line,) = PlainLines().format(record).split("\n")
+    assert line.isprintable()
+    assert line.endswith(r"/a\x1b[2J\x1b]0;title\x07\n12:00:00 info    all is well\r\u202e\x9b1m é")
+    for told in PlainLines().format(failed).split("\n"):
+        assert told.isprintable()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
+from typing import Any, get_args
 
 import pytest
 from hypothesis import given, settings
@@ -10,13 +11,13 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from daq.contracts.errors import SpecError
-from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.experiment import ExperimentSpec, Trajectory
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.robot import RobotIdentity
 from daq.trajectories import plan, start_angles
 from server.owner.messages import ArmReport
-from server.queue.length import LONGEST, least_length
+from server.queue.length import LONGEST, least_length, points_of
 from server.queue.order import Waiting, next_due
 from server.queue.readiness import Circumstances, what_is_missing
 from server.queue.schedule import Plan, following, is_due
@@ -198,3 +199,32 @@ def test_what_the_ways_back_make_too_long_is_refused_by_the_planner() -> None:
     assert least_length(spec) < LONGEST
     with pytest.raises(SpecError, match="at most 4 h are allowed"):
         plan(spec, machine, start_angles(spec, machine))
+
+
+VIA = {"kind": "via", "points": [0.01, 0.02], "times": [2.0, 4.0]}
+OF_EVERY_KIND: tuple[tuple[dict[str, Any], float, int], ...] = (
+    ({"kind": "ramp", "duration": 4.0}, 4.0, 0),
+    ({"kind": "step"}, 0.0, 0),
+    ({"kind": "staircase", "steps": 4, "dwell": 0.5}, 4.0, 0),
+    ({"kind": "slow_ramp", "amplitude": 0.1, "speed": 0.1, "reversals": 3}, 4.0, 0),
+    ({"kind": "sine", "period": 2.0, "cycles": 2.0}, 4.0, 0),
+    ({"kind": "multisine", "duration": 4.0}, 4.0, 0),
+    ({"kind": "cubic", "duration": 4.0}, 4.0, 0),
+    (VIA, 4.0, 2),
+    ({"kind": "pick_and_place", "pick": 1.0, "travel": 2.0, "place": 1.0}, 4.0, 0),
+    ({"kind": "path", "times": [0.0, 4.0], "positions": [[0.0] * 3] * 2}, 4.0, 2),
+    ({"kind": "pause", "duration": 4.0}, 4.0, 0),
+    ({"kind": "sequence", "segments": [{"move": VIA}, {"move": {"kind": "pause", "duration": 1.0}}]}, 5.0, 3),
+)
+
+
+@pytest.mark.parametrize(("trajectory", "length", "points"), OF_EVERY_KIND, ids=lambda one: str(one)[10:15])
+def test_every_kind_of_motion_is_as_long_as_it_says(trajectory: dict[str, Any], length: float, points: int) -> None:
+    spec = ExperimentSpec.model_validate({"trajectory": trajectory, "settle": 0.0, "hold": 0.0})
+    assert least_length(spec) == pytest.approx(length)
+    assert points_of(spec) == points
+
+
+def test_no_kind_of_motion_is_left_out() -> None:
+    kinds = {one.model_fields["kind"].default for one in get_args(get_args(Trajectory)[0])}
+    assert {trajectory["kind"] for trajectory, _, _ in OF_EVERY_KIND} == kinds

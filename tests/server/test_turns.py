@@ -51,7 +51,9 @@ def test_a_question_waits_while_others_are_worked_out_and_no_longer_than_their_a
     [
         {"method": "POST", "path": "/api/v1/robots/ma2000/stop"},
         {"method": "PUT", "path": "/api/v1/robots/ma2000/control"},
-        {"query": b"wait=30"},
+        {"path": f"{LIST}/a", "query": b"wait=30"},
+        {"path": "/api/v1/robots/ma2000/jobs/a", "query": b"x=y&w%61it=0.5"},
+        {"path": "/readyz"},  # anybody asks it, and it waits for the database
         {"path": "/api/v1/robots/ma2000/gains"},
     ],
 )
@@ -62,6 +64,27 @@ def test_what_is_no_plain_question_waits_for_none(scope: dict[str, Any]) -> None
             await _takes(turns)
         for _ in range(2 * AT_ONCE):
             assert (await _takes(turns, **scope)).done()
+
+    asyncio.run(ask())
+
+
+@pytest.mark.parametrize(
+    "scope",
+    [
+        {"query": b"wait=30"},
+        {"query": b"x=wait=30"},
+        {"path": f"{LIST}/a", "query": b"wait=0"},
+        {"path": f"{LIST}/a", "query": b"x=wait=30"},
+        {"path": f"{LIST}/a", "query": b"wait=long"},
+        {"path": "/api/v1/robots/ma2000/traces/a", "query": b"wait=30"},
+    ],
+)
+def test_what_only_looks_as_if_it_waits_takes_a_turn(scope: dict[str, Any]) -> None:
+    async def ask() -> None:
+        turns = Turns()
+        for _ in range(AT_ONCE):
+            assert (await _takes(turns, **scope)).done()
+        assert not (await _takes(turns, **scope)).done()
 
     asyncio.run(ask())
 

@@ -1264,7 +1264,7 @@ export interface paths {
          * Readyz
          * @description 200 while experiments can be taken: database and traces' folder can be written. A robot need not be there.
          *
-         *     What is wrong is told to whoever may see the robot.
+         *     What is wrong is told to whoever may see the robot. The answer is up to a second old.
          */
         get: operations["readyz"];
         put?: never;
@@ -5595,7 +5595,7 @@ export interface operations {
     put_program: {
         parameters: {
             query?: {
-                /** @description That which was changed; none for a new program. */
+                /** @description The revision that you changed. Leave it out for a new program. */
                 revision?: number | null;
             };
             header?: never;
