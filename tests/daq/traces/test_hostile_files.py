@@ -112,6 +112,7 @@ def test_a_bomb_of_two_gibibytes_is_refused_at_once(tmp_path: Path) -> None:
         (ours(memory_map={"a": 1e308 * 10}), "its metadata is not that of a trace"),
         (ours(created="9999-12-31T23:59:59-14:00"), "a moment of the years 1970 to 2261 is expected"),
         (ours(created="0001-01-01T00:00:00+14:00"), "a moment of the years 1970 to 2261 is expected"),
+        (ours(created="2026-11-21T05:14:42"), "created = 2026-11-21T05:14:42 has no time zone"),
         (ours(trace_id="../../x"), "its number '../../x' is not letters, digits, - and _"),
         (ours(format="x"), "its metadata is not that of a trace: format"),
         (ours(format=10**400), "of a newer version"),
