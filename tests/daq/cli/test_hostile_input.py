@@ -51,6 +51,22 @@ def test_a_machine_file_that_is_binary_is_not_called_missing(daq: CommandLine) -
     daq("config", "check").complains(2, "machine file machine.toml", "not UTF-8 text (byte 0xff at 0)")
 
 
+@pytest.mark.parametrize("digits", [60, 600, 6000])
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        ("run spec {} --dry-run", "trajectory.kind = 0x{}"),
+        ("run spec {} --dry-run", "trajectory = {{ kind = 'ramp', amplitude = 0x{} }}"),
+        ("--config {} config check", "operator = 0x{}"),
+        ("--config {} config check", "server.port = 0x{}"),
+        ("teach program {}", "format = 0x{}"),
+    ],
+)
+def test_a_whole_number_that_python_does_not_write(daq: CommandLine, words: str, text: str, digits: int) -> None:
+    Path("number.toml").write_text(text.format("f" * digits))
+    refuses(daq(*words.format("number.toml").split()))
+
+
 def options_of_motions() -> list[tuple[str, str]]:
     """(kind, option) of every number of every kind of motion, and of what all have in common."""
     common = ("settle", "hold", "repeats")
