@@ -168,7 +168,7 @@ class _Walk:
         self._limits = limits
         self._inflated = 0
         self._attached = 0
-        self._definitions: set[tuple[int, bytes]] = set()
+        self._defined_in_chunks = 0
 
     def take(self, opcode: int, body: memoryview) -> None:
         """Raises one of UNREADABLE."""
@@ -206,6 +206,9 @@ class _Walk:
                 break  # definitions come before the messages that need them, in every chunk that has any
             if opcode not in _DEFINITIONS:
                 raise ValueError(NOT_IN_CHUNKS)
+            self._defined_in_chunks += 1
+            count = self._found.records + self._defined_in_chunks
+            require(count, self._limits.records, "there are more than {} records", "records")
             self._take_definition(opcode, memoryview(chunk)[position + HEAD.size : following])
             position = following
         self._found.chunks.append(chunk)
@@ -230,10 +233,7 @@ class _Walk:
         self._found.attachments.append(fields.attachment_of(body))
 
     def _take_definition(self, opcode: int, body: memoryview) -> None:
-        raw = bytes(body)
-        if (opcode, raw) in self._definitions:  # some writers repeat them in every chunk
-            return
-        self._definitions.add((opcode, raw))
+        """Some writers repeat the same one in every chunk."""
         if opcode == Opcode.SCHEMA:
             schema = fields.schema_of(body)
             if self._found.schemas.setdefault(schema.id, schema) != schema:
