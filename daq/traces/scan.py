@@ -28,6 +28,11 @@ UNREADABLE = (ValueError, struct.error, *INFLATE_ERRORS)
 NOT_IN_CHUNKS = "a chunk holds something else than schemas, channels and whole messages"
 
 _DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
+_REBUILT = frozenset({
+    int(Opcode.HEADER), int(Opcode.CHUNK_INDEX), int(Opcode.MESSAGE_INDEX), int(Opcode.ATTACHMENT_INDEX),
+    int(Opcode.METADATA_INDEX), int(Opcode.SUMMARY_OFFSET),
+})  # fmt: skip
+"""Records that say nothing which the others do not say."""
 _MESSAGE = struct.Struct("<BQHIQQ")
 _CRC = struct.Struct("<I")
 _OURS = (layout.START_METADATA, layout.END_METADATA)
@@ -53,6 +58,7 @@ class Scan:
     good_bytes:      length of the readable part
     damage:          what is wrong after it; None when the file is whole
     records:         number of records outside of chunks
+    others:          number of records that say something and are not kept here: metadata and records of other programs
     chunks_indexed:  number of chunks that the index tells of; None without an index
     """
 
@@ -65,6 +71,7 @@ class Scan:
     good_bytes: int = 0
     damage: str | None = None
     records: int = 0
+    others: int = 0
     chunks_indexed: int | None = None
 
     def cut_before_chunk(self, number: int, damage: str) -> None:
@@ -192,6 +199,8 @@ class _Walk:
                 raise ValueError("the data section does not match its checksum")
         elif opcode == Opcode.FOOTER:
             self._check_footer(body)
+        elif opcode not in _REBUILT:
+            found.others += 1
 
     def _take_chunk(self, body: memoryview) -> None:
         packed = fields.chunk_of(body)
@@ -221,6 +230,8 @@ class _Walk:
             raise ValueError(f"the metadata {metadata.name!r} come twice")
         if metadata.name in _OURS:
             self._found.metadata[metadata.name] = metadata.metadata
+        else:
+            self._found.others += 1
 
     def _take_attachment(self, body: memoryview) -> None:
         self._attached += len(body)
