@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -168,6 +170,14 @@ def test_the_defaults_shown_are_a_configuration(daq: CommandLine) -> None:
     defaults = load_settings()[0]
     Path("again.toml").write_text(said.out)
     assert load_settings(Path("again.toml"))[0] == defaults
+
+
+def test_a_service_of_no_port_does_not_start() -> None:
+    command = [sys.executable, "-c", "from daq.cli import main; main()", "--port", "nonsense", "serve"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=30)
+    assert ended.returncode == 2
+    (line,) = ended.stderr.splitlines()
+    assert "port 'nonsense': must begin with serial://, tcp:// or mock://" in line
 
 
 def test_the_configuration_is_checked_with_the_port_that_is_named(daq: CommandLine) -> None:
