@@ -87,6 +87,7 @@ def main() -> None:
     _print_whatever_files_are_called()
     try:
         exit_code = app(prog_name="daq", standalone_mode=False)
+        _flush()  # now, while what keeps it from being written is still an error
     except DaqError as error:
         fail(str(error), error.exit_code)
     except ProtocolError as error:
@@ -99,15 +100,31 @@ def main() -> None:
         fail("the computer has not enough memory for this", EXIT_PROGRAM_FAULT)
     except BrokenPipeError:
         # `daq traces ls | head`: whoever read has enough. Python would complain at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
         raise SystemExit(EXIT_PROGRAM_FAULT) from None
     except OSError as error:
         # Where nobody knew better: a name that is too long, a folder that may not be read, a full disk.
         file = "" if error.filename is None else f"{error.filename}: "
+        _drop_output()
         code = EXIT_WRONG_INPUT if error.errno in WRONG_NAMES else EXIT_PROGRAM_FAULT
         fail(f"{file}{error.strerror or error}", code)
     # typer hands back either an exit code or what the command returned.
     raise SystemExit(exit_code if isinstance(exit_code, int) else 0)
+
+
+def _flush() -> None:
+    """Raises OSError. Python has no standard output where the shell has closed it (`>&-`)."""
+    out: io.TextIOBase | None = sys.stdout  # type: ignore[assignment]
+    if out is not None:
+        out.flush()
+
+
+def _drop_output() -> None:
+    """What could not be written is not tried again at exit, where Python would complain in its own words."""
+    try:
+        _flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _print_whatever_files_are_called() -> None:

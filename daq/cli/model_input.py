@@ -110,7 +110,7 @@ def read_traces(call: Invocation, folder: Path | None, names: Sequence[str]) -> 
     found = []
     for name in names:
         if Path(name).suffix == ".csv" and Path(name).is_file():
-            trace = import_csv(Path(name))
+            trace = import_csv(Path(name), call.trace_limits)
         else:
             trace = read_trace(call.find_trace(place, name), call.trace_limits)
         found.append(trace)

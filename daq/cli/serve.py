@@ -19,6 +19,7 @@ def serve(
     port: Annotated[int | None, typer.Option(min=0, max=65535, help="Port to listen at; 0 for any free one.")] = None,
 ) -> None:
     """Serve experiments, traces and the dashboard to people and programs."""
+    from daq.transport.url import parse_port_url
     from server import logs
     from server.serve import serve as run
 
@@ -28,6 +29,7 @@ def serve(
     section = settings.server.model_copy(
         update={key: value for key, value in (("host", host), ("port", port)) if value is not None}
     )
+    parse_port_url(call.port)  # a port that is none does not become one by trying again
     robot = settings.robot.model_copy(update={"port": call.port})
     run(settings.model_copy(update={"server": section, "robot": robot}), _tell)
 

@@ -283,4 +283,6 @@ def _salvage_line(result: Salvaged) -> str:
     line = f"{result.path}: salvaged from {result.part.name}"
     if result.kept is None:
         return line
+    if result.dropped_bytes == 0:
+        return f"{line}; what another program had put into it is in {result.kept.name}"
     return f"{line} up to its damage; the {result.dropped_bytes} bytes after it are in {result.kept.name}"

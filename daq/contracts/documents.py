@@ -18,10 +18,31 @@ DEEPEST = 64
 MOST_KEY_PARTS = 64
 """Parts of a dotted TOML key (`a.b.c`) that are taken: reading one costs the square of their number."""
 
+MOST_BITS = 4096
+"""Bits of a whole number that are taken: Python cannot write one of many thousands as text."""
+
 _LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:[\w\"'-]+[ \t]*\.[ \t]*){{{MOST_KEY_PARTS}}}", re.MULTILINE)
 """Only where a key can begin, so that looking for one takes time in proportion to the text."""
 
-_short = reprlib.Repr()
+
+class _Short(reprlib.Repr):
+    """As reprlib's, but for whole numbers that Python does not write in decimal digits (those from TOML's 0x…)."""
+
+    def repr_int(self, x: int, level: int) -> str:
+        """In hexadecimal digits where there are many."""
+        del level
+        if x.bit_length() <= _DECIMAL_BITS:
+            return repr(x)
+        digits = hex(x)
+        return f"{digits[:20]}...{digits[-3:]} ({x.bit_length()} bits)"
+
+
+_DECIMAL_BITS = 190
+"""Bits of the largest whole number that is shown in decimal digits; it has 58 of them."""
+
+_LONG_NUMBER = "a whole number has more than a thousand digits"
+
+_short = _Short()
 _short.maxstring = _short.maxother = _short.maxlong = 60
 _short.maxlevel = 2
 
@@ -54,7 +75,8 @@ def read_text(path: Path, what: str) -> str:
 
 
 def parse_json(text: str, what: str) -> Any:
-    """Plain data from JSON. Raises SpecError in one line for what is no JSON, or is nested deeper than DEEPEST."""
+    """Plain data from JSON. Raises SpecError in one line for what is no JSON, or is nested deeper than DEEPEST
+    or holds a whole number of more than MOST_BITS."""
     try:
         data = json.loads(text)
     except RecursionError:
@@ -65,9 +87,10 @@ def parse_json(text: str, what: str) -> Any:
 
 
 def parse_toml(text: str, what: str) -> dict[str, Any]:
-    """Plain data from TOML. Raises SpecError in one line for what is no TOML, or is nested deeper than DEEPEST."""
+    """Plain data from TOML. Raises SpecError in one line for what is no TOML, or is nested deeper than DEEPEST
+    or holds a whole number of more than MOST_BITS."""
     if _LONG_KEY.search(text):
-        raise SpecError(f"{what}: not TOML that is taken: a key has more than {MOST_KEY_PARTS} parts")
+        raise SpecError(f"{what}: a key has more than {MOST_KEY_PARTS} parts; no key here needs them")
     try:
         data = tomllib.loads(text)
     except RecursionError:
@@ -86,7 +109,7 @@ def read_document(path: Path, what: str) -> Any:
 
 def _plain(error: ValueError) -> str:
     text = str(error)
-    return "a whole number has thousands of digits" if "integer string conversion" in text else text
+    return _LONG_NUMBER if "integer string conversion" in text else text
 
 
 def _too_deep(what: str) -> SpecError:
@@ -94,16 +117,18 @@ def _too_deep(what: str) -> SpecError:
 
 
 def _bounded(data: Any, what: str) -> Any:
-    """The data itself. Level by level, not by recursion."""
+    """The data itself. Level by level, not by recursion. Raises SpecError."""
     level = [data]
     for _ in range(DEEPEST + 1):
-        level = [
+        parts = [
             part
             for value in level
             if isinstance(value, dict | list)
             for part in (value.values() if isinstance(value, dict) else value)
-            if isinstance(part, dict | list)
         ]
+        if any(isinstance(part, int) and part.bit_length() > MOST_BITS for part in parts):
+            raise SpecError(f"{what}: {_LONG_NUMBER}")
+        level = [part for part in parts if isinstance(part, dict | list)]
         if not level:
             return data
     raise _too_deep(what)

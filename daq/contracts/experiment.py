@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool, ValidationError, model_validator
@@ -262,12 +263,17 @@ def _one_line(error: ValidationError) -> str:
     if "gains" in where[:1] and len(where) == GAIN_PLACE:
         where = [f"gains of joint {where[1]}", "PID"[int(where[2])]]
     bound = next((first.get("ctx", {})[key] for key in ("le", "ge") if key in first.get("ctx", {})), None)
-    if bound is not None and math.isclose(abs(bound), 2 * math.pi) and isinstance(value, int | float):
+    if bound is not None and math.isclose(abs(bound), 2 * math.pi) and _fits_a_float(value):
         message, value = "must lie between -360° and 360°", f"{math.degrees(value):g}°"
     elif not isinstance(value, str) or len(value) > LONGEST_SHOWN:
         value = shown(value)
     given = "" if isinstance(first["input"], dict | BaseModel) else f" (got {value})"
     return f"{': '.join(['.'.join(where)] * bool(where) + [message])}{given}"
+
+
+def _fits_a_float(value: object) -> bool:
+    """Whether it is a number that can be converted to degrees; whole numbers may be larger than any float."""
+    return isinstance(value, int | float) and abs(value) <= sys.float_info.max
 
 
 def parse_joints(text: str) -> tuple[int, ...]:

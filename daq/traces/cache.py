@@ -1,9 +1,10 @@
 """A trace's columns beside its file, so that opening it again needs no decoding. Never needed: delete it at will.
 
-The cache holds the size and the CRC-32 over every byte of the trace file it was made from, and is used only when the
-file still has both. So a changed file is noticed whatever its times say: damage of up to 32 bits in a row always,
-anything else but for one case in 2³². A cryptographic hash would take four times as long, most of the 0.2 s that
-opening again may take, and protect from nobody: who can forge the trace can write the cache as well.
+The cache holds the limits that the trace was read within, and the size and the CRC-32 over every byte of the trace file
+it was made from, and is used only when the file still has both and the limits are the same. So a changed file is
+noticed whatever its times say: damage of up to 32 bits in a row always, anything else but for one case in 2³². A
+cryptographic hash would take four times as long, most of the 0.2 s that opening again may take, and protect from
+nobody: who can forge the trace can write the cache as well.
 """
 
 from __future__ import annotations
@@ -17,13 +18,15 @@ from pathlib import Path
 import numpy as np
 
 from daq.contracts.trace import Trace, TraceEvent, TraceRecord
+from daq.contracts.trace_limits import TraceLimits
 from daq.traces import layout
 
 FOLDER = ".cache"
 WORTH_IT = 1_000_000
 """Size of a trace file (bytes) below which decoding it is as fast as a cache."""
 
-_VERSION = 1
+_VERSION = 2
+"""Raised when a reader refuses, or takes otherwise, what an earlier one took: its caches are then of no use."""
 _PIECE = 1 << 19
 """Bytes read at a time: they stay in the processor's cache while their checksum is computed."""
 
@@ -33,14 +36,14 @@ def cache_path(path: Path) -> Path:
     return path.parent / FOLDER / f"{path.name}.npz"
 
 
-def key_of(path: Path) -> str:
-    """What a cache must have been made from to be used for this file. Raises OSError."""
+def key_of(path: Path, limits: TraceLimits) -> str:
+    """What a cache must have been made from, and within which limits, to be used for this file. Raises OSError."""
     size = crc = 0
     with path.open("rb", buffering=0) as stream:
         while piece := stream.read(_PIECE):
             size += len(piece)
             crc = zlib.crc32(piece, crc)
-    return f"{_VERSION}:{size}:{crc:08x}"
+    return f"{_VERSION}:{size}:{crc:08x}:{limits.model_dump_json()}"
 
 
 def load(path: Path, key: str) -> Trace | None:

@@ -33,7 +33,7 @@ class TraceSummary(BaseModel):
     path: Path
     state: State
     size: int
-    """Bytes."""
+    """Bytes; 0 where the file system cannot tell it."""
     trace_id: str | None = None
     created: datetime | None = None
     source: str | None = None
@@ -73,9 +73,10 @@ def list_traces(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> tup
 def summary_of(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> TraceSummary:
     """What one file says about itself. Raises FileNotFoundError when it is not there."""
     path = Path(path)
-    size = path.stat().st_size
+    size = 0
     unfinished = path.name.endswith(layout.PART_SUFFIX)
     try:
+        size = path.stat().st_size
         if unfinished:
             state: State = "recording" if disk.is_being_written(path) else "unfinished"
             start, end = _beginning(path, limits), None

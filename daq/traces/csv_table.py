@@ -6,8 +6,8 @@ import csv
 import io
 import json
 import math
+import os
 import re
-import tomllib
 from array import array
 from collections.abc import Iterable
 from datetime import UTC, datetime
@@ -17,7 +17,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from daq.contracts.errors import DaqError, TraceError
+from daq.contracts.documents import parse_toml, shown
+from daq.contracts.errors import DaqError, SpecError, TraceError
 from daq.contracts.machine import load_machine, shipped_machines
 from daq.contracts.trace import Floats, Moment, Outcome, Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
@@ -54,7 +55,9 @@ class Beside(BaseModel):
 
 
 def toml_path(path: Path) -> Path:
-    """The TOML beside a CSV file."""
+    """The TOML beside a CSV file. Raises TraceError for what can be no file's name, such as `.` and `/`."""
+    if not path.name:
+        raise TraceError(f"{path}: is a folder; name a .csv file")
     return path.with_suffix(".toml")
 
 
@@ -93,11 +96,11 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
     path = Path(path)
     data = _read(path, limits.file_bytes, "file_bytes")
     toml = toml_path(path)
-    beside_data = _read(toml, limits.metadata_bytes, "metadata_bytes") if toml.exists() else None
+    beside_data = _read(toml, limits.metadata_bytes, "metadata_bytes") if os.path.exists(toml) else None
     beside = _beside(toml, beside_data)
-    header, table = _read_table(path, data, limits)
+    header, table, rows = _read_table(path, data, limits)
     joints = _joints(path, header, beside)
-    _check_bounds(path, header, table)
+    _check_bounds(path, header, table, rows)
     signals: dict[str, Any] = {}
     for name in SIGNALS:
         having = [joint for joint in joints if f"{name}_{joint}" in header]
@@ -158,13 +161,13 @@ def _joints(path: Path, header: list[str], beside: Beside) -> tuple[int, ...]:
     return wanted
 
 
-def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str], Floats]:
-    """Header and numbers (rows, columns), all finite. Raises TraceError."""
+def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str], Floats, array[int]]:
+    """Header, numbers (rows, columns), all finite, and in which row of the file each stands. Raises TraceError."""
     try:
         rows = csv.reader(io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig", newline=""))
         header = [name.strip() for name in next(rows, [])]
         _check_header(path, header)
-        return header, _numbers(path, header, rows, limits)
+        return header, *_numbers(path, header, rows, limits)
     except UnicodeDecodeError as error:
         raise TraceError(f"{path}: is not text in UTF-8") from error
     except csv.Error as error:
@@ -186,9 +189,14 @@ def _check_header(path: Path, header: list[str]) -> None:
         raise TraceError(f"{path}: row 1: the first column must be 'time', it is {header[0]!r}")
 
 
-def _numbers(path: Path, header: list[str], rows: Iterable[list[str]], limits: TraceLimits) -> Floats:
-    """The numbers (rows, columns), all finite. Raises TraceError."""
-    found = array("d")
+def _numbers(
+    path: Path, header: list[str], rows: Iterable[list[str]], limits: TraceLimits
+) -> tuple[Floats, array[int]]:
+    """The numbers (rows, columns), all finite, and the row of the file of each: blank ones are left out.
+
+    Raises TraceError.
+    """
+    found, places = array("d"), array("q")
     most = limits.records // _records_of_a_row(header)
     for number, row in enumerate(rows, start=2):
         if not row:
@@ -202,9 +210,10 @@ def _numbers(path: Path, header: list[str], rows: Iterable[list[str]], limits: T
         if not math.isfinite(sum(values)) or "_" in "".join(row):
             _refuse_value(path, number, header, row)
         found.extend(values)
+        places.append(number)
         if len(found) > most * len(header):
             raise TraceError(f"{path}: row {number}: up to {most} samples are read (traces.limits.records)")
-    return np.frombuffer(found, dtype=np.float64).reshape(-1, len(header))
+    return np.frombuffer(found, dtype=np.float64).reshape(-1, len(header)), places
 
 
 def _records_of_a_row(header: list[str]) -> int:
@@ -212,20 +221,23 @@ def _records_of_a_row(header: list[str]) -> int:
     return 1 + len({name.rpartition("_")[2] for name in header[1:]})
 
 
-def _check_bounds(path: Path, header: list[str], table: Floats) -> None:
-    """Raises TraceError for the first value that no rig can have measured, and for time that does not increase."""
+def _check_bounds(path: Path, header: list[str], table: Floats, rows: array[int]) -> None:
+    """Raises TraceError for the first value that no rig can have measured, and for time that does not increase.
+
+    `rows` tells where in the file each row of the table stands.
+    """
     for column, name in enumerate(header):
         signal = name.rpartition("_")[0] or name
         outside = bounds.first_outside(signal, table[:, column])
         if outside is not None:
             value = table[outside[0], column]
-            place = f"row {outside[0] + 2}, column {name!r}"
+            place = f"row {rows[outside[0]]}, column {name!r}"
             raise TraceError(f"{path}: {place}: {value:g} is too large, {bounds.allowed(signal)}")
     row = bounds.first_short_step(table[:, 0])
     if row is not None:
         before, value = table[row - 1, 0], table[row, 0]
         raise TraceError(
-            f"{path}: row {row + 2}, column 'time': {value} does not increase after {before}"
+            f"{path}: row {rows[row]}, column 'time': {value} does not increase after {before}"
             f"{'' if value <= before else f' by {bounds.SMALLEST_STEP:g} s at least'}"
         )
 
@@ -253,13 +265,15 @@ def _beside(path: Path, data: bytes | None) -> Beside:
     if data is None:
         return Beside()
     try:
-        beside = Beside.model_validate(tomllib.loads(data.decode("utf-8")))
+        beside = Beside.model_validate(parse_toml(data.decode("utf-8"), str(path)))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        raise TraceError(f"{path}: {where}: {first['msg']} (got {str(first['input'])[:80]!r})") from error
-    except (ValueError, RecursionError) as error:
-        raise TraceError(f"{path}: is not TOML: {error}") from error
+        raise TraceError(f"{path}: {where}: {first['msg']} (got {shown(first['input'])})") from error
+    except UnicodeDecodeError as error:
+        raise TraceError(f"{path}: is not text in UTF-8") from error
+    except SpecError as error:
+        raise TraceError(str(error)) from error
     if beside.created is not None and beside.created.tzinfo is None:
         raise TraceError(f"{path}: created: {beside.created.isoformat()} has no time zone; write Z behind it for UTC")
     return beside

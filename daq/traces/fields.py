@@ -72,6 +72,11 @@ class Fields:
             found[key] = inner.text()
         return found
 
+    def end(self, what: str) -> None:
+        """Nothing may follow: two records that differ in it alone would be the same definition."""
+        if self.left:
+            raise ValueError(f"a {what} has {self.left} bytes after its last field")
+
     @property
     def left(self) -> int:
         """Bytes that have not been read."""
@@ -104,14 +109,18 @@ def schema_of(body: memoryview) -> Schema:
     """What the messages of a channel look like."""
     fields = Fields(body)
     number, name, encoding = fields.u16(), fields.text(), fields.text()
-    return Schema(id=number, name=name, encoding=encoding, data=bytes(fields.raw(fields.u32())))
+    schema = Schema(id=number, name=name, encoding=encoding, data=bytes(fields.raw(fields.u32())))
+    fields.end("schema")
+    return schema
 
 
 def channel_of(body: memoryview) -> Channel:
     """A topic, and how its messages are written."""
     fields = Fields(body)
     number, schema, topic, encoding = fields.u16(), fields.u16(), fields.text(), fields.text()
-    return Channel(id=number, schema_id=schema, topic=topic, message_encoding=encoding, metadata=fields.texts())
+    channel = Channel(id=number, schema_id=schema, topic=topic, message_encoding=encoding, metadata=fields.texts())
+    fields.end("channel")
+    return channel
 
 
 def data_end_of(body: memoryview) -> DataEnd:

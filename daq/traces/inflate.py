@@ -28,27 +28,41 @@ def inflate(chunk: CompressedChunk) -> bytes:
     elif chunk.compression == "lz4":
         data = _lz4(chunk)
     elif chunk.compression == "":
-        data = bytes(chunk.data) if len(chunk.data) == chunk.size else b""
+        data = _plain(chunk)
     else:
         raise ValueError(f"a chunk is compressed by {chunk.compression[:20]!r}; zstd, lz4 and none are read")
     if len(data) != chunk.size:
-        raise ValueError(f"a chunk does not have the {chunk.size} bytes that it declares")
+        raise _other_size(chunk)
     if chunk.crc not in (0, zlib.crc32(data)):
         raise ValueError("a chunk does not match its checksum")
     return data
 
 
+def _plain(chunk: CompressedChunk) -> bytes:
+    if len(chunk.data) != chunk.size:
+        raise _other_size(chunk)
+    return bytes(chunk.data)
+
+
 def _zstd(chunk: CompressedChunk) -> bytes:
-    if chunk.size == 0:
-        return b""  # no other size of a frame is taken, so there is nothing to uncompress
+    decompressor = zstandard.ZstdDecompressor(max_window_size=max(_LEAST_WINDOW, chunk.size))
+    if chunk.size == 0:  # zstandard takes a limit of 0 for none
+        return bytes(decompressor.stream_reader(chunk.data).read(1)) if len(chunk.data) else b""
     # zstandard takes the size in the frame's head before the one it is given, so the two have to agree first.
     if zstandard.frame_content_size(chunk.data) not in (_SIZE_UNKNOWN, chunk.size):
-        raise ValueError(f"a chunk does not have the {chunk.size} bytes that it declares")
-    decompressor = zstandard.ZstdDecompressor(max_window_size=max(_LEAST_WINDOW, chunk.size))
+        raise _other_size(chunk)
     return decompressor.decompress(chunk.data, max_output_size=chunk.size)
 
 
 def _lz4(chunk: CompressedChunk) -> bytes:
+    if chunk.size == 0 and not len(chunk.data):
+        return b""
     decompressor = lz4.frame.LZ4FrameDecompressor()
     data = bytes(decompressor.decompress(bytes(chunk.data), max_length=chunk.size + 1))
-    return data if decompressor.eof else b""
+    if not decompressor.eof:
+        raise _other_size(chunk)
+    return data
+
+
+def _other_size(chunk: CompressedChunk) -> ValueError:
+    return ValueError(f"a chunk does not have the {chunk.size} bytes that it declares")

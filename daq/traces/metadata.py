@@ -18,6 +18,8 @@ _NUMBER = re.compile(r"[A-Za-z0-9_-]{1,64}")
 """Of a trace: it becomes part of file names and addresses."""
 _SHOWN = 40
 """Characters of a wrong text that an error shows."""
+_MOST_SAMPLES = 2**31 - 1
+"""The largest whole number of every database that a catalogue may be kept in; a year and more at 50 Hz."""
 
 
 class NewerTraceError(TraceError):
@@ -45,6 +47,8 @@ def record_of(start: dict[str, str], end: dict[str, str] | None, origin: str) ->
         raise TraceError(f"{origin}: its metadata is not that of a trace: {one_line(error)}") from error
     if not _NUMBER.fullmatch(record.trace_id):
         raise TraceError(f"{origin}: its number {record.trace_id[:_SHOWN]!r} is not letters, digits, - and _")
+    if record.created.tzinfo is None:
+        raise TraceError(f"{origin}: created = {record.created.isoformat()} has no time zone")
     return record
 
 
@@ -75,7 +79,7 @@ def extent_of(end: dict[str, str], origin: str) -> tuple[int, float]:
         samples, duration = int(end["samples"][:_SHOWN]), float(end["duration"][:_SHOWN])
     except (KeyError, ValueError) as error:
         raise TraceError(f"{origin}: its metadata is not that of a trace: samples or duration are no number") from error
-    if samples < 0 or not 0 <= duration < math.inf:
+    if not 0 <= samples <= _MOST_SAMPLES or not 0 <= duration < math.inf:
         raise TraceError(f"{origin}: its metadata is not that of a trace: {samples} samples in {duration} s")
     return samples, duration
 

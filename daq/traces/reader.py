@@ -34,7 +34,7 @@ def read_trace(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
         with disk.open_regular(path) as stream:
             if disk.size_of(stream) < cache.WORTH_IT:
                 return _decoded(path, limits)
-        key = cache.key_of(path)
+        key = cache.key_of(path, limits)
         trace = cache.load(path, key)
         if trace is None:
             trace = _decoded(path, limits)

@@ -30,7 +30,7 @@ SALVAGE_SUFFIX = ".salvage"
 UNREADABLE_SUFFIX = ".unreadable"
 """Of a part file that holds no trace at all: it is put aside, never deleted."""
 DAMAGED_SUFFIX = ".damaged"
-"""Of a part file that was salvaged up to its damage, where something follows that might be of use to somebody."""
+"""Of a part file that was salvaged, and holds something that is not in the trace and might be of use to somebody."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +97,9 @@ def salvage_folder(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> 
 def salvage(part: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Salvaged:
     """Make a finished trace, marked `interrupted`, from a part file, and remove the part file once that is safe.
 
-    Everything up to the first damage is kept. Where something follows that was not read, the part file is renamed and
-    stays. Running it again after it was cut short itself gives the same trace.
+    Everything up to the first damage is kept. Where something follows that was not read, or another program has put
+    metadata or records of its own in, which are not copied, the part file is renamed and stays. Running it again after
+    it was cut short itself gives the same trace.
     Raises PutAsideError when no trace can be made from it: it has been renamed, so that it is not tried again. Raises
     TraceError when a living process is writing the file, when another trace has its name, when a newer version wrote
     it, or when reading or writing fails; the part file is then as it was.
@@ -150,7 +151,7 @@ def _salvage_locked(part: Path, data: bytes, limits: TraceLimits) -> Salvaged:
         unfinished.unlink(missing_ok=True)
         raise
     # A power cut may leave zeros behind what was synced: there is nothing in them to keep.
-    kept = _put_aside(part, DAMAGED_SUFFIX) if any(data[found.good_bytes :]) else None
+    kept = _put_aside(part, DAMAGED_SUFFIX) if found.others or any(data[found.good_bytes :]) else None
     if kept is None:
         part.unlink()
         disk.sync_folder(part.parent)

@@ -28,6 +28,11 @@ UNREADABLE = (ValueError, struct.error, *INFLATE_ERRORS)
 NOT_IN_CHUNKS = "a chunk holds something else than schemas, channels and whole messages"
 
 _DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
+_REBUILT = frozenset({
+    int(Opcode.HEADER), int(Opcode.CHUNK_INDEX), int(Opcode.MESSAGE_INDEX), int(Opcode.ATTACHMENT_INDEX),
+    int(Opcode.METADATA_INDEX), int(Opcode.SUMMARY_OFFSET),
+})  # fmt: skip
+"""Records that say nothing which the others do not say."""
 _MESSAGE = struct.Struct("<BQHIQQ")
 _CRC = struct.Struct("<I")
 _OURS = (layout.START_METADATA, layout.END_METADATA)
@@ -53,6 +58,7 @@ class Scan:
     good_bytes:      length of the readable part
     damage:          what is wrong after it; None when the file is whole
     records:         number of records outside of chunks
+    others:          number of records that say something and are not kept here: metadata and records of other programs
     chunks_indexed:  number of chunks that the index tells of; None without an index
     """
 
@@ -65,6 +71,7 @@ class Scan:
     good_bytes: int = 0
     damage: str | None = None
     records: int = 0
+    others: int = 0
     chunks_indexed: int | None = None
 
     def cut_before_chunk(self, number: int, damage: str) -> None:
@@ -168,7 +175,7 @@ class _Walk:
         self._limits = limits
         self._inflated = 0
         self._attached = 0
-        self._definitions: set[tuple[int, bytes]] = set()
+        self._defined_in_chunks = 0
 
     def take(self, opcode: int, body: memoryview) -> None:
         """Raises one of UNREADABLE."""
@@ -192,6 +199,8 @@ class _Walk:
                 raise ValueError("the data section does not match its checksum")
         elif opcode == Opcode.FOOTER:
             self._check_footer(body)
+        elif opcode not in _REBUILT:
+            found.others += 1
 
     def _take_chunk(self, body: memoryview) -> None:
         packed = fields.chunk_of(body)
@@ -206,6 +215,9 @@ class _Walk:
                 break  # definitions come before the messages that need them, in every chunk that has any
             if opcode not in _DEFINITIONS:
                 raise ValueError(NOT_IN_CHUNKS)
+            self._defined_in_chunks += 1
+            count = self._found.records + self._defined_in_chunks
+            require(count, self._limits.records, "there are more than {} records", "records")
             self._take_definition(opcode, memoryview(chunk)[position + HEAD.size : following])
             position = following
         self._found.chunks.append(chunk)
@@ -218,6 +230,8 @@ class _Walk:
             raise ValueError(f"the metadata {metadata.name!r} come twice")
         if metadata.name in _OURS:
             self._found.metadata[metadata.name] = metadata.metadata
+        else:
+            self._found.others += 1
 
     def _take_attachment(self, body: memoryview) -> None:
         self._attached += len(body)
@@ -230,10 +244,7 @@ class _Walk:
         self._found.attachments.append(fields.attachment_of(body))
 
     def _take_definition(self, opcode: int, body: memoryview) -> None:
-        raw = bytes(body)
-        if (opcode, raw) in self._definitions:  # some writers repeat them in every chunk
-            return
-        self._definitions.add((opcode, raw))
+        """Some writers repeat the same one in every chunk."""
         if opcode == Opcode.SCHEMA:
             schema = fields.schema_of(body)
             if self._found.schemas.setdefault(schema.id, schema) != schema:

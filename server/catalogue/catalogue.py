@@ -6,6 +6,8 @@ import logging
 import threading
 from pathlib import Path
 
+from sqlalchemy.exc import OperationalError
+
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
 from daq.traces.catalogue import TraceSummary, summary_of
@@ -15,6 +17,13 @@ from server.store.experiments import ExperimentStore
 from server.store.traces import NewTrace, TraceStore
 
 log = logging.getLogger("server.catalogue")
+SHOWN = 200
+"""Characters of an error that the log shows."""
+
+
+def is_text(name: str) -> bool:
+    """Whether a name of a file can be written as UTF-8, as the database keeps it."""
+    return not any("\ud800" <= sign <= "\udfff" for sign in name)
 
 
 class Catalogue:
@@ -95,8 +104,19 @@ class Catalogue:
         return path
 
     def _take_in(self, path: Path) -> bool:
-        summary = self._summary(path)
-        return summary is not None and self._insert(path, summary)
+        """Whatever one file is or says, the others are taken in. Raises OperationalError: the database fails."""
+        try:
+            if not is_text(path.name):
+                log.warning("not in the catalogue: %r: its name is not UTF-8; rename it", str(path))
+                return False
+            summary = self._summary(path)
+            return summary is not None and self._insert(path, summary)
+        except OperationalError:
+            raise
+        except Exception as error:  # noqa: BLE001  # one file must not keep the service from starting
+            line = " ".join(str(error).split())[:SHOWN]
+            log.warning("not in the catalogue: %s: %s: %s", path, type(error).__name__, line)
+            return False
 
     def _summary(self, path: Path) -> TraceSummary | None:
         try:

@@ -87,6 +87,7 @@ class JobDesk:
             traces={number: parts.catalogue.path_of(number) for number in traces_of(request)},
             models={number: parts.models.path_of(number) for number in models_of(request) if number != MACHINE},
             names={number: parts.models.name_of(number) for number in models_of(request)},
+            limits=parts.catalogue.limits,
         )
 
         def prepare(identity: str) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 from typing import Any
 
+from daq.contracts.documents import parse_json
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import MACHINE, EffectChoice, ModelDetails, ModelParameter
@@ -16,6 +16,7 @@ from server.clock import Clock
 from server.problems import ProblemError
 from server.store.models import ModelStore, NewModel
 
+AS_FITTED = "send a file as `daq fit` writes it"
 LARGEST_MODEL = 16 << 20
 
 
@@ -58,10 +59,11 @@ class Models:
     def take_in_text(self, text: bytes, name: str, by: str) -> str:
         """A model from elsewhere. Raises a 422, also for one that brings a program of its own with it."""
         try:
-            data = json.loads(text)
-        except ValueError as error:
-            advice = "send a file as `daq fit` writes it"
-            raise ProblemError(422, "not-a-model", "the body is not JSON", advice) from error
+            data = parse_json(text.decode("utf-8"), "upload")
+        except UnicodeDecodeError as error:
+            raise ProblemError(422, "not-a-model", "the body is not text in UTF-8", AS_FITTED) from error
+        except SpecError as error:
+            raise ProblemError(422, "not-a-model", str(error), AS_FITTED) from error
         if _has_program(data):
             line = "this model has effects that are programs of a user: a service does not run those"
             raise ProblemError(422, "not-a-model", line, "use it with the command line")
@@ -72,7 +74,7 @@ class Models:
             return self.take_in(path, name, by, None)
         except SpecError as error:
             line = str(error).replace(str(path), "upload")
-            raise ProblemError(422, "not-a-model", line, "send a file as `daq fit` writes it") from error
+            raise ProblemError(422, "not-a-model", line, AS_FITTED) from error
         finally:
             path.unlink(missing_ok=True)
 

@@ -20,6 +20,7 @@ from daq.contracts.service.jobs import (
     JobRequest,
     ValidateRequest,
 )
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.reader import read_trace
 from server.jobs.headlines import of_comparison, of_diagnosis, of_fit, of_validation
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox
@@ -53,6 +54,8 @@ class Task(BaseModel):
     models: dict[str, Path]
     names: dict[str, str]
     """Names of models, for tables."""
+    limits: TraceLimits = DEFAULT_TRACE_LIMITS
+    """Of the traces that are read."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +217,7 @@ class _Worker:
         )
 
     def _traces(self, numbers: Sequence[str]) -> list[Trace]:
-        return [read_trace(self.task.traces[number]) for number in numbers]
+        return [read_trace(self.task.traces[number], self.task.limits) for number in numbers]
 
     def _model(self, number: str) -> Model:
         from model.machine_model.model import base_model

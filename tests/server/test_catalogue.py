@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import json
+import logging
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,6 +12,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import pytest
+from mcap.writer import Writer
 
 from daq.contracts.service.traces import TraceChange
 from daq.traces.catalogue import summary_of
@@ -102,3 +105,32 @@ def test_a_file_that_cannot_be_taken_away_keeps_its_row_and_tags(shelf: Shelf, m
             shelf.catalogue.remove(shelf.number)
     assert shelf.path.is_file()
     assert shelf.tags() == ("rig b",)
+
+
+def finished(path: Path, identity: str, *, samples: str, zone: str = "Z") -> None:
+    """A trace's metadata, with what its end says about samples."""
+    record = {"trace_id": identity, "created": f"2026-11-21T05:14:42{zone}", "software": "other", "source": "imported"}
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        writer.add_metadata("daq.record", {"record": json.dumps(record), "joints": "1", "signals": ""})
+        writer.add_metadata(
+            "daq.outcome", {"outcome": "complete", "counters": "{}", "samples": samples, "duration": "1"}
+        )
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def test_a_file_that_cannot_be_taken_in_keeps_no_other_out(shelf: Shelf, caplog: pytest.LogCaptureFixture) -> None:
+    folder = shelf.catalogue.folder
+    (folder / "a-loop.mcap").symlink_to("a-loop.mcap")
+    finished(folder / "b-many.mcap", "b" * 12, samples="9" * 30)
+    finished(folder / "c-zone.mcap", "c" * 12, samples="1", zone="")
+    finished(folder / os.fsdecode(b"d-\xff.mcap"), "d" * 12, samples="1")
+    finished(folder / "e.mcap", "e" * 12, samples="1")
+    caplog.set_level(logging.WARNING, "server.catalogue")
+    assert shelf.catalogue.bring_up_to_date() == 1
+    assert shelf.traces.get(ROBOT, "e" * 12).samples == 1
+    lines = [record.getMessage() for record in caplog.records]
+    assert len(lines) == 4
+    assert all("\n" not in line for line in lines)
+    assert "its name is not UTF-8" in lines[3]

@@ -14,6 +14,7 @@ from sqlalchemy.exc import OperationalError
 
 from daq.contracts.machine import load_machine
 from daq.contracts.service.jobs import CompareRequest, DiagnoseRequest, FitRequest, Job, JobRequest
+from daq.contracts.trace_limits import TraceLimits
 from model.machine_model.model import base_model
 from server.api.traces import delete_trace
 from server.catalogue.catalogue import Catalogue
@@ -21,7 +22,7 @@ from server.jobs.desk import JobDesk, JobParts
 from server.jobs.lanes import lane_of
 from server.jobs.mailbox import CANCEL, MODEL, Mailbox
 from server.jobs.models import Models
-from server.jobs.work import Ended
+from server.jobs.work import Ended, carry_out
 from server.problems import ProblemError
 from server.queue.states import Event
 from server.store.engine import Store
@@ -29,6 +30,7 @@ from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
 from server.store.models import ModelStore
 from server.store.traces import TraceStore
+from tests.daq.traces.samples import write
 from tests.server.clocks import HandClock
 from tests.server.test_store import _trace
 
@@ -400,3 +402,23 @@ def test_a_worker_that_ends_takes_no_job_of_the_other_lane_with_it(bench: Bench)
 def test_a_comparison_is_short_by_what_it_has_to_compute(models: int, lane: str) -> None:
     request = CompareRequest.model_construct(traces=(TRACE,) * 2, models=("machine",) * models)
     assert lane_of(request) == lane
+
+
+def test_a_job_reads_traces_within_the_limits_that_are_configured(bench: Bench) -> None:
+    path = bench.catalogue.folder / "1.mcap"
+    path.unlink()
+    write(path)
+    bench.catalogue.limits = TraceLimits(records=10)
+    bench.carry_out = carry_out
+    job = _submitted(bench)
+    bench.desk.start()
+    ended = bench.end_of(job)
+    assert ended.state == "failed"
+    assert "traces.limits.records" in ended.reason
+
+
+@pytest.mark.parametrize("text", [b"[" * 100_000, b'{"effects":' * 900 + b"1" + b"}" * 900, b"9" * 6000, b"\xff"])
+def test_a_model_made_to_do_harm_is_refused_in_one_line(bench: Bench, text: bytes) -> None:
+    with pytest.raises(ProblemError, match=r"^[^\n]{1,300}$") as refused:
+        bench.models.take_in_text(text, "x", "anna")
+    assert (refused.value.status, refused.value.kind) == (422, "not-a-model")

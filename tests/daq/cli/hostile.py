@@ -21,6 +21,7 @@ FILES: dict[str, bytes | None] = {
     "long-key": b".".join([b"robot"] * 5000) + b" = 1\n",
     "long-number": b'{"trajectory": ' + b"9" * 6000 + b"}",
     "long-number-toml": b"operator = " + b"9" * 6000 + b"\n",
+    "long-hexadecimal": b"operator = 0x" + b"f" * 6000 + b"\n",
     "list": b"[1, 2]",
     "null": b"null",
     "no-numbers": b'{"trajectory": NaN, "machine": NaN, "format": NaN}',

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -49,6 +51,22 @@ def test_a_machine_file_that_is_binary_is_not_called_missing(daq: CommandLine) -
     Path("machine.toml").write_bytes(b"\xff\xfe\x00")
     Path("daq.toml").write_text('[robot]\nmachine = "machine.toml"\n')
     daq("config", "check").complains(2, "machine file machine.toml", "not UTF-8 text (byte 0xff at 0)")
+
+
+@pytest.mark.parametrize("digits", [60, 600, 6000])
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        ("run spec {} --dry-run", "trajectory.kind = 0x{}"),
+        ("run spec {} --dry-run", "trajectory = {{ kind = 'ramp', amplitude = 0x{} }}"),
+        ("--config {} config check", "operator = 0x{}"),
+        ("--config {} config check", "server.port = 0x{}"),
+        ("teach program {}", "format = 0x{}"),
+    ],
+)
+def test_a_whole_number_that_python_does_not_write(daq: CommandLine, words: str, text: str, digits: int) -> None:
+    Path("number.toml").write_text(text.format("f" * digits))
+    refuses(daq(*words.format("number.toml").split()))
 
 
 def options_of_motions() -> list[tuple[str, str]]:
@@ -152,6 +170,14 @@ def test_the_defaults_shown_are_a_configuration(daq: CommandLine) -> None:
     defaults = load_settings()[0]
     Path("again.toml").write_text(said.out)
     assert load_settings(Path("again.toml"))[0] == defaults
+
+
+def test_a_service_of_no_port_does_not_start() -> None:
+    command = [sys.executable, "-c", "from daq.cli import main; main()", "--port", "nonsense", "serve"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=30)
+    assert ended.returncode == 2
+    (line,) = ended.stderr.splitlines()
+    assert "port 'nonsense': must begin with serial://, tcp:// or mock://" in line
 
 
 def test_the_configuration_is_checked_with_the_port_that_is_named(daq: CommandLine) -> None:

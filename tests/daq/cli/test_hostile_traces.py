@@ -45,7 +45,12 @@ def test_a_trace_made_to_do_harm_gets_one_line(daq: CommandLine, tmp_path: Path,
         ("-0.0,0\n0,0", "", "row 3, column 'time': 0.0 does not increase after -0.0"),
         ("0,\0", "", "row 2, column 'position_1'"),
         ("0," + "9" * 200_000, "", "is not CSV: field larger than field limit"),
-        ("0,0", "a = " + "[" * 5000, "is not TOML"),
+        ("0,0", "a = " + "[" * 5000, "nested more than 64 levels deep"),
+        ("0,0", "notes = " + "[" * 70 + "]" * 70, "nested more than 64 levels deep"),
+        ("0,0", "notes = 0x" + "f" * 6000, "a whole number has more than a thousand digits"),
+        ("0,0", "notes = 0x" + "f" * 600, "notes: Input should be a valid string (got 0xffff"),
+        ("0,0", ".".join(["a"] * 5000) + " = 1", "a key has more than 64 parts"),
+        ("0,0\n\n1,1\n\n1,2", "", "row 6, column 'time': 1.0 does not increase after 1.0"),
         ("0,0", "created = 9999-12-31T23:59:59-14:00", "created: Value error, a moment of the years 1970 to 2261"),
         ("0,0", "created = 2020-01-01T00:00:00", "created: 2020-01-01T00:00:00 has no time zone; write Z behind it"),
         ("0,0", "period = 1e-300", "period = 1e-300 s, allowed is 1e-06 to 86400 s"),
@@ -64,6 +69,10 @@ def test_a_csv_made_to_do_harm_gets_one_line(
 
 def test_what_is_no_file_is_not_waited_for(daq: CommandLine, tmp_path: Path) -> None:
     daq("traces", "import", "/dev/zero").complains(2, "/dev/zero", "it is no file")
+    daq("traces", "import", ".").complains(2, "Is a directory")
+    (tmp_path / "rig.csv").write_text("time,position_1\n0,0\n1,1\n")
+    (tmp_path / "rig.toml").symlink_to("/dev/zero")
+    daq("traces", "import", tmp_path / "rig.csv").complains(2, "rig.toml", "it is no file")
     daq("traces", "show", "a" * 5000).complains(2, "is not a file")
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import resource
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -43,3 +46,17 @@ def test_a_link_stays_a_link(tmp_path: Path) -> None:
         part.write_text("new")
     assert link.is_symlink()
     assert real.read_text() == "new"
+
+
+def test_output_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
+    with (tmp_path / "out").open("wb") as full:
+        ended = subprocess.run(
+            [sys.executable, "-c", "from daq.cli import main; main()", "--help"],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            cwd=tmp_path,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0)),
+        )
+    assert (ended.returncode, ended.stderr) == (1, "daq: File too large\n")

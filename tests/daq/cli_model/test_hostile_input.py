@@ -48,3 +48,8 @@ def test_a_number_that_nobody_means(daq: CommandLine, words: str, value: str) ->
     if "--load" in words and value == "0":
         return
     refuses(daq(*words.format(value, value).split()))
+
+
+def test_the_limits_that_are_configured_hold_for_a_csv(daq: CommandLine) -> None:
+    Path("daq.toml").write_text("[traces.limits]\nrecords = 20\n")
+    daq("simulate", "single.toml", "good.csv").complains(2, "good.csv", "traces.limits.records")

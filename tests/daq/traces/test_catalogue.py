@@ -88,3 +88,11 @@ def test_folders_without_traces(tmp_path: Path) -> None:
         find_trace(tmp_path, "last")
     with pytest.raises(TraceError, match="cannot be read: No such file"):
         list_traces(tmp_path / "absent")
+
+
+def test_a_link_to_itself_is_listed_with_its_problem(tmp_path: Path) -> None:
+    link = tmp_path / "x.mcap"
+    link.symlink_to(link)
+    (listed,) = list_traces(tmp_path)
+    assert (listed.state, listed.size) == ("unreadable", 0)
+    assert listed.problem == f"{link}: cannot be read: Too many levels of symbolic links"

@@ -121,7 +121,7 @@ def test_one_line_names_the_row_and_the_column(tmp_path: Path, text: str, compla
 @pytest.mark.parametrize(
     ("toml", "complaint"),
     [
-        ("joints = [", "rig.toml: is not TOML"),
+        ("joints = [", "rig.toml: not TOML"),
         ("joint = [1]", "rig.toml: joint: Extra inputs are not permitted"),
         ("joints = [0]", "rig.toml: joints.0: Input should be greater than or equal to 1"),
         ("joints = [2]", "rig.csv: row 1: column 'position_2' is missing"),

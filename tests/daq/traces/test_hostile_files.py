@@ -19,6 +19,8 @@ from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import layout
 from daq.traces.catalogue import list_traces
+from daq.traces.fields import CompressedChunk
+from daq.traces.inflate import inflate
 from daq.traces.reader import read_trace
 from daq.traces.salvage import salvage_folder
 from daq.traces.verify import verify
@@ -85,6 +87,41 @@ def test_a_chunk_is_never_inflated_past_what_it_declares(
     assert peak < 8 * A_MEGABYTE
 
 
+@pytest.mark.parametrize("compression", ["zstd", "lz4", ""])
+def test_a_chunk_that_declares_nothing_and_has_data_is_refused(
+    tmp_path: Path, sound: dict[str, Original], compression: str
+) -> None:
+    data = recompressed(sound["finished"].data, compression)
+    at = first_of(data, Opcode.CHUNK) + SIZE_IN_CHUNK
+    data = data[:at] + bytes(12) + data[at + 12 :]  # neither size nor checksum
+    assert "a chunk does not have the 0 bytes that it declares" in refused(tmp_path / "a.mcap", data)
+
+
+@pytest.mark.parametrize("packed", [b"", zstandard.compress(b"")])
+def test_a_chunk_of_nothing_is_nothing(packed: bytes) -> None:
+    assert inflate(CompressedChunk(0, 0, "zstd", memoryview(packed))) == b""
+
+
+def schemas(bodies: list[bytes]) -> bytes:
+    """Records of schemas, all of the same number, with something after their last field."""
+    return b"".join(
+        struct.pack("<BQ", Opcode.SCHEMA, 14 + len(body)) + struct.pack("<HIII", 9, 0, 0, 0) + body for body in bodies
+    )
+
+
+def test_definitions_in_chunks_count_as_records(tmp_path: Path, sound: dict[str, Original]) -> None:
+    many = recompressed(sound["finished"].data, "zstd", lambda chunk: schemas([b""] * 1000) + chunk)
+    (tmp_path / "b.mcap").write_bytes(many)
+    assert read_trace(tmp_path / "b.mcap").record.outcome == "complete"
+    line = refused(tmp_path / "a.mcap", many, TraceLimits(records=900))
+    assert "there are more than 900 records (traces.limits.records)" in line
+
+
+def test_a_definition_with_bytes_left_over_is_refused(tmp_path: Path, sound: dict[str, Original]) -> None:
+    more = recompressed(sound["finished"].data, "zstd", lambda chunk: schemas([b"12"]) + chunk)
+    assert "a schema has 2 bytes after its last field" in refused(tmp_path / "a.mcap", more)
+
+
 def test_a_bomb_of_two_gibibytes_is_refused_at_once(tmp_path: Path) -> None:
     """Fifty kB of chunks of 64 MiB, each as large as it declares: what they are together is limited."""
     plain = struct.pack("<BQHIQQ", Opcode.MESSAGE, 64 * A_MEGABYTE - HEAD, 1, 0, 0, 0).ljust(64 * A_MEGABYTE, b"\0")
@@ -112,6 +149,7 @@ def test_a_bomb_of_two_gibibytes_is_refused_at_once(tmp_path: Path) -> None:
         (ours(memory_map={"a": 1e308 * 10}), "its metadata is not that of a trace"),
         (ours(created="9999-12-31T23:59:59-14:00"), "a moment of the years 1970 to 2261 is expected"),
         (ours(created="0001-01-01T00:00:00+14:00"), "a moment of the years 1970 to 2261 is expected"),
+        (ours(created="2026-11-21T05:14:42"), "created = 2026-11-21T05:14:42 has no time zone"),
         (ours(trace_id="../../x"), "its number '../../x' is not letters, digits, - and _"),
         (ours(format="x"), "its metadata is not that of a trace: format"),
         (ours(format=10**400), "of a newer version"),

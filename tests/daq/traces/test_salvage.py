@@ -4,6 +4,7 @@ import os
 import random
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
 
 from daq.contracts.errors import TraceError
@@ -192,3 +194,22 @@ def test_a_killed_recording_keeps_everything_that_was_synced(tmp_path: Path, see
     trace = read_trace(path)
     assert trace.record.outcome == "interrupted"
     np.testing.assert_array_equal(trace.tick, np.arange(1, len(trace) + 1))
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        struct.pack("<BQ", Opcode.METADATA, 4 + 3 + 4) + struct.pack("<I", 3) + b"lab" + struct.pack("<I", 0),
+        struct.pack("<BQ", 0x80, 4) + b"mine",
+    ],
+    ids=["metadata", "record"],
+)
+def test_a_part_file_that_another_program_wrote_into_is_kept(tmp_path: Path, more: bytes) -> None:
+    part = tmp_path / "a.mcap.part"
+    data, _ = unfinished(part)
+    part.write_bytes(data + more)
+    salvaged = salvage(part)
+    assert salvaged.path is not None
+    assert salvaged.kept == tmp_path / "a.mcap.part.damaged"
+    assert salvaged.kept.read_bytes() == data + more
+    assert read_trace(salvaged.path).record.outcome == "interrupted"
