@@ -116,6 +116,24 @@ def test_a_stop_reaches_the_arm_while_the_event_loop_is_blocked_and_while_the_wh
         assert any(event["kind"] == "stop" and event["actor"] == "local" for event in events)
 
 
+def test_a_stop_with_a_token_reaches_the_arm_while_the_whole_service_hangs(tmp_path: Path, daq: CommandLine) -> None:
+    (tmp_path / "daq.toml").write_text('[server]\ntokens = "always"\n')
+    made = daq("token", "add", "anna", "--role", "operator")
+    assert made.code == 0, made.err
+    token = {"Authorization": f"Bearer {made.out.strip()}"}
+    with running_service(tmp_path, headers=token) as service:
+        service.until_connected()
+        stop = f"{_beside(service)}/stop"
+        service.process.send_signal(signal.SIGSTOP)
+        try:
+            assert httpx.post(stop, timeout=30).status_code == 401
+            assert httpx.post(stop, headers={"Authorization": "Bearer daq_wrong"}, timeout=30).status_code == 401
+            assert httpx.post(stop, headers=token, timeout=30).json()["confirmed"] is True
+        finally:
+            service.process.send_signal(signal.SIGCONT)
+        service.until_arm("stopped")
+
+
 def _every_other_door_is_open(service: Service, client: Client, daq: CommandLine) -> None:
     stopped = client.robot("ma2000").stop()
     assert stopped.confirmed, stopped
