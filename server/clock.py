@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from datetime import UTC, datetime
 from typing import Protocol
@@ -18,6 +19,10 @@ class Clock(Protocol):
         """s from an arbitrary start, never running backwards."""
         ...
 
+    def elapsed(self) -> float:
+        """The same, but it goes on while the computer sleeps."""
+        ...
+
 
 class SystemClock:
     """This computer's."""
@@ -29,3 +34,7 @@ class SystemClock:
     def monotonic(self) -> float:
         """`time.monotonic()`, the same for all processes of this computer."""
         return time.monotonic()
+
+    def elapsed(self) -> float:
+        """For how long a person's word holds: Linux counts the time for which the computer slept."""
+        return time.clock_gettime(time.CLOCK_BOOTTIME) if sys.platform == "linux" else time.monotonic()

@@ -14,17 +14,18 @@ class Attendance:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._until: float | None = None
-        """On the monotonic clock (s); None while nobody has said so, or somebody's leaving has been noticed."""
+        """On the clock that goes on while the computer sleeps (s); None while nobody has said so, or somebody's leaving
+        has been noticed."""
 
     def say(self) -> None:
         """An operator is there, for a minute more."""
-        self._until = self._clock.monotonic() + ATTENDANCE
+        self._until = self._clock.elapsed() + ATTENDANCE
 
     @property
     def left(self) -> float:
         """s for which the word still holds; 0 where it does not."""
         until = self._until
-        return 0.0 if until is None else max(0.0, until - self._clock.monotonic())
+        return 0.0 if until is None else max(0.0, until - self._clock.elapsed())
 
     def has_lapsed(self) -> bool:
         """True once, when the confirmed presence has expired."""

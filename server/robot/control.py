@@ -16,6 +16,8 @@ from server.problems import ProblemError, conflict
 
 LEASE_TIME = 10.0
 """s that a lease holds without a heartbeat: an assumption, longer than a page takes to load again."""
+LOOK_EVERY = 1.0
+"""s between two looks at a lease: a wait stands still while the computer sleeps, the lease does not."""
 HEARTBEAT_EVERY = 3.0
 """s between heartbeats that clients are asked for: two may be lost."""
 log = logging.getLogger("server.robot")
@@ -23,8 +25,8 @@ log = logging.getLogger("server.robot")
 
 @dataclass(frozen=True)
 class Lease:
-    """The control of a client. `expires` is on the monotonic clock (s): a wall clock that is set back lengthens
-    nothing."""
+    """The control of a client. `expires` is on the clock that goes on while the computer sleeps (s): a wall
+    clock that is set back lengthens nothing, nor does sleep."""
 
     secret: str
     name: str
@@ -63,7 +65,7 @@ class ControlDesk:
     def take(self, name: str, *, moves_real_arm: bool) -> ControlLease:
         """The control, for one client. Raises a 409 when somebody else has it."""
         with self._changed:
-            now = self._clock.monotonic()
+            now = self._clock.elapsed()
             if self._queue is not None:
                 line = "an experiment of the queue is running"
                 raise conflict(
@@ -84,7 +86,7 @@ class ControlDesk:
     def renew(self, secret: str) -> ControlLease:
         """The heartbeat. Raises a 409 when the lease has lapsed, or is another's."""
         with self._changed:
-            now = self._clock.monotonic()
+            now = self._clock.elapsed()
             lease = replace(self._require(secret, now), expires=now + LEASE_TIME)
             self._lease = lease
             self._changed.notify_all()
@@ -93,7 +95,7 @@ class ControlDesk:
     def give_back(self, secret: str) -> None:
         """Ends the lease. Raises a 409 when it is not this client's."""
         with self._changed:
-            name = self._require(secret, self._clock.monotonic()).name
+            name = self._require(secret, self._clock.elapsed()).name
             self._lease = None
             self._endings += 1
             self._changed.notify_all()
@@ -102,12 +104,12 @@ class ControlDesk:
     def require(self, secret: str | None) -> Lease:
         """The lease that allows a motion now. Raises a 409 when there is none, or it is another's."""
         with self._changed:
-            return self._require(secret, self._clock.monotonic())
+            return self._require(secret, self._clock.elapsed())
 
     def require_free_of_others(self, secret: str | None) -> None:
         """Raises a 409 when somebody else has the control: for what changes the robot without moving it."""
         with self._changed:
-            now = self._clock.monotonic()
+            now = self._clock.elapsed()
             held = self._lease is not None and self._lease.holds(now)
             if self._queue is not None:
                 raise conflict("control-held", "an experiment of the queue is running", "wait until it has ended")
@@ -134,7 +136,7 @@ class ControlDesk:
     def status(self) -> Control:
         """Who has it, without its secret."""
         with self._changed:
-            now = self._clock.monotonic()
+            now = self._clock.elapsed()
             if self._queue is not None:
                 return Control(holder="queue")
             if self._lease is None or not self._lease.holds(now):
@@ -176,9 +178,9 @@ class ControlDesk:
                 if self._closing:
                     return
                 lease = self._lease
-                left = None if lease is None else lease.expires - self._clock.monotonic()
+                left = None if lease is None else lease.expires - self._clock.elapsed()
                 if left is None or left > 0:
-                    self._changed.wait(left)
+                    self._changed.wait(None if left is None else min(left, LOOK_EVERY))
                     continue
                 assert lease is not None
                 self._lease = None

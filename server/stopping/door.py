@@ -17,8 +17,9 @@ from server.stopping.messages import NEWS, Begin, Known, Owned, Ready, Stopped
 
 READY_WITHIN = 30.0
 """s for the process to start, on a busy computer."""
-BEGIN_AGAIN_AFTER = 0.5
-"""s before a process that has ended by itself is started again."""
+BEGIN_AGAIN_AFTER, BEGIN_AGAIN_AT_MOST = 0.5, 8.0
+"""s before a process that has ended by itself is started again: the first time, and at most. Twice as long whenever one
+ends before it listens."""
 END_WITHIN = 3.0
 """s for requests under way when the service ends."""
 log = logging.getLogger("server.stop")
@@ -113,18 +114,34 @@ class StopDoor:
             self._process.stdin.close()
 
     def _listen(self) -> None:
+        after = BEGIN_AGAIN_AFTER
         while True:
             self._hear_all()
             code = self._process.wait()
+            after = BEGIN_AGAIN_AFTER if self._ready.is_set() else min(2 * after, BEGIN_AGAIN_AT_MOST)
+            self._ready.clear()
             with self._lock:
                 self._end_input()
-            if self._closing.wait(BEGIN_AGAIN_AFTER):
+            line = "the stop listener's process has ended (exit code %s): it is started again in %g s"
+            while not self._closing.is_set():
+                log.error(line, code, after)
+                if self._closing.wait(after) or self._start_again():
+                    break
+                after = min(2 * after, BEGIN_AGAIN_AT_MOST)
+            if self._closing.is_set():
                 return
-            log.error("the stop listener's process has ended (exit code %s): it is started again", code)
-            with self._lock:
-                if self._closing.is_set():
-                    return
+
+    def _start_again(self) -> bool:
+        """False where the operating system has no process to give: it may have one later."""
+        with self._lock:
+            if self._closing.is_set():
+                return True
+            try:
                 self._start()
+            except OSError:
+                log.exception("the stop listener's process cannot be started")
+                return False
+            return True
 
     def _hear_all(self) -> None:
         assert self._process.stdout is not None

@@ -153,8 +153,8 @@ def _handler(gate: StopGate, stops: Mapping[str, Stop], told: Told) -> type[Base
                 self._answer(problem.status, details_of(problem), MEDIA_TYPE, problem.headers)
                 return
             result = stops[robot]()
+            told(robot, result, caller)  # first: whoever asked may be gone, and the stop has been made
             self._answer(200, result, "application/json")
-            told(robot, result, caller)
 
         def do_OPTIONS(self) -> None:
             """Whether the service's page may ask, which is at another port and so of another origin."""

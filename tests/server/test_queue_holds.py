@@ -37,6 +37,15 @@ def test_a_control_that_lapses(bench: Bench) -> None:
     _is_held(bench, f"the control of anna has lapsed: {LOOK}")
 
 
+def test_no_word_outlasts_the_sleep_of_the_computer(bench: Bench) -> None:
+    bench.control.take("anna", moves_real_arm=True)
+    bench.queue.attend()
+    bench.clock.sleep(ATTENDANCE)
+    assert bench.control.status().holder == "nobody"
+    bench.robot.identity = REAL
+    assert bench.queue.status().attended_until is None
+
+
 def test_a_control_that_lapses_while_the_queue_looks_for_work(bench: Bench) -> None:
     bench.control.take("anna", moves_real_arm=True)
     bench.submit()

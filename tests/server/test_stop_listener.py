@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 import signal
 import socket
+import struct
+import subprocess
 import sys
 import threading
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 from urllib.parse import urlsplit
 
 import httpx
@@ -20,6 +23,7 @@ from sqlalchemy import text
 from daq.acquisition.stop_socket import FOLDER_VARIABLE
 from daq.client import Client
 from daq.config.service import ServiceSettings
+from daq.contracts.service.robot import StopResult
 from server.access.caller import LOCAL, Caller
 from server.access.digest import digest_of
 from server.access.origin import beside
@@ -110,6 +114,24 @@ def test_a_stop_reaches_the_arm_while_the_event_loop_is_blocked_and_while_the_wh
         events = service.robot.get("/events").json()["items"]
         assert events[0]["at"] >= events[1]["at"]
         assert any(event["kind"] == "stop" and event["actor"] == "local" for event in events)
+
+
+def test_a_stop_with_a_token_reaches_the_arm_while_the_whole_service_hangs(tmp_path: Path, daq: CommandLine) -> None:
+    (tmp_path / "daq.toml").write_text('[server]\ntokens = "always"\n')
+    made = daq("token", "add", "anna", "--role", "operator")
+    assert made.code == 0, made.err
+    token = {"Authorization": f"Bearer {made.out.strip()}"}
+    with running_service(tmp_path, headers=token) as service:
+        service.until_connected()
+        stop = f"{_beside(service)}/stop"
+        service.process.send_signal(signal.SIGSTOP)
+        try:
+            assert httpx.post(stop, timeout=30).status_code == 401
+            assert httpx.post(stop, headers={"Authorization": "Bearer daq_wrong"}, timeout=30).status_code == 401
+            assert httpx.post(stop, headers=token, timeout=30).json()["confirmed"] is True
+        finally:
+            service.process.send_signal(signal.SIGCONT)
+        service.until_arm("stopped")
 
 
 def _every_other_door_is_open(service: Service, client: Client, daq: CommandLine) -> None:
@@ -336,19 +358,23 @@ def test_no_stop_with_a_known_token_waits_for_a_database_that_does_not_answer() 
     never.close()
 
 
-def test_a_listener_that_is_killed_is_started_again_and_whoever_asks_meanwhile_waits(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "run"))
-    begin = Begin(
+def _begin(folder: Path) -> Begin:
+    return Begin(
         descriptor=-1,
         service_port=8300,
         open_on_loopback=True,
         names=(),
         urls={"ma2000": "mock://"},
         database_url="sqlite://",
-        sqlite=tmp_path / "none.sqlite",
+        sqlite=folder / "none.sqlite",
     )
+
+
+def test_a_listener_that_is_killed_is_started_again_and_whoever_asks_meanwhile_waits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "run"))
+    begin = _begin(tmp_path)
     with socket.create_server(("127.0.0.1", 0)) as listener, closing(StopDoor(listener, begin)) as door:
         stop = f"http://127.0.0.1:{listener.getsockname()[1]}/api/v1/robots/ma2000/stop"
         assert "no robot is connected" in httpx.post(stop, timeout=60).json()["text"]
@@ -362,6 +388,48 @@ def test_a_listener_that_is_killed_is_started_again_and_whoever_asks_meanwhile_w
         last = door.pid
     with pytest.raises(ProcessLookupError):
         os.kill(last, 0)
+
+
+def test_a_listener_that_cannot_be_started_again_at_once_is_started_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "run"))
+    monkeypatch.setattr("server.stopping.door.BEGIN_AGAIN_AFTER", 0.01)
+    begin, refused, popen = _begin(tmp_path), [1, 2], subprocess.Popen
+
+    def seldom(*words: Any, **options: Any) -> Any:
+        if refused:
+            refused.pop()
+            raise BlockingIOError(11, "Resource temporarily unavailable")
+        return popen(*words, **options)
+
+    with socket.create_server(("127.0.0.1", 0)) as listener, closing(StopDoor(listener, begin)) as door:
+        door.wait_ready()
+        monkeypatch.setattr("server.stopping.door.subprocess.Popen", seldom)
+        os.kill(door.pid, signal.SIGKILL)
+        stop = f"http://127.0.0.1:{listener.getsockname()[1]}/api/v1/robots/ma2000/stop"
+        assert "no robot is connected" in httpx.post(stop, timeout=60).json()["text"]
+        assert refused == []
+
+
+def test_a_stop_is_told_though_whoever_asked_has_gone(tmp_path: Path) -> None:
+    clock, heard, gone = HandClock(), threading.Event(), threading.Event()
+    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
+    gate = StopGate(KnownTokens(TokenStore(store), clock), True, (), 8300)
+
+    def stop() -> StopResult:
+        assert gone.wait(60)
+        return StopResult(delivered=True, confirmed=True, tick=1, seconds=0.0, note="", text="x" * 5_000_000)
+
+    with socket.create_server(("127.0.0.1", 0)) as door:
+        listener = StopListener(door, gate, {"ma2000": stop}, lambda *_: heard.set())
+        with socket.create_connection(door.getsockname()) as line:
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            line.sendall(b"POST /api/v1/robots/ma2000/stop HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        gone.set()
+        assert heard.wait(60)
+        listener.close()
+    store.close()
 
 
 # ---- where
