@@ -62,7 +62,7 @@ class ProgramStore:
                     raise _taken(program.name)
                 count = session.scalar(select(func.count()).select_from(ProgramRow).filter_by(robot=robot)) or 0
                 if count >= MOST_PROGRAMS:
-                    raise conflict("program-exists", f"there are {count} programs", "delete some of them first")
+                    raise conflict("too-many-programs", f"there are {count} programs", "delete some of them first")
                 row = ProgramRow(robot=robot, revision=0)
                 session.add(row)
             else:
