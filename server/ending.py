@@ -16,6 +16,8 @@ END_WITHIN = 4.2
 """s from the signal to the end of this process."""
 LAST_RESORT = 4.7
 """s after which the kernel ends it, even where its interpreter does not answer any more."""
+FORCED = 1
+"""Exit code of an end that is not in order, so that whoever looks after the service learns of it."""
 log = logging.getLogger("server")
 
 
@@ -43,4 +45,4 @@ class EndInTime:
         try:
             self._children()
         finally:
-            os._exit(0)
+            os._exit(FORCED)

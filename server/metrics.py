@@ -18,6 +18,7 @@ from server.jobs.lanes import LANES, lane_of
 from server.owner.messages import LiveSample, Report
 from server.problems import ProblemError
 from server.queue.room import free_room
+from server.store.database_errors import DamagedError
 
 if TYPE_CHECKING:
     from server.services import Services
@@ -134,7 +135,7 @@ class _StateOf(Collector):
             queued.add_metric((name,), queue.queued)
             paused.add_metric((name,), queue.paused)
             running.add_metric((name,), queue.running is not None)
-            with suppress(SQLAlchemyError):  # no figures while the database is away
+            with suppress(SQLAlchemyError, DamagedError):  # no figures while the database is away
                 counts = self._services.experiments.count_by_state(name)
                 for state in sorted(ENDS):
                     ended.add_metric((name, state), counts.get(state, 0))
@@ -143,7 +144,7 @@ class _StateOf(Collector):
     def _of_jobs(self) -> Iterable[Metric]:
         jobs = GaugeMetricFamily("daq_jobs_now", "Jobs that wait or are computed.", labels=("robot", "lane", "state"))
         for one in self._services.robots():
-            with suppress(SQLAlchemyError):
+            with suppress(SQLAlchemyError, DamagedError):
                 for state in WAITING_OR_RUNNING:
                     lanes = [lane_of(request) for request in self._services.jobs.requests(one.robot.name, state)]
                     for lane in LANES:

@@ -135,6 +135,7 @@ class Services:
         """Traces into the catalogue, robots connected, queues begun."""
         for one in self.robots():
             found = one.catalogue.bring_up_to_date()
+            one.catalogue.clear_uploads()
             log.info("catalogue of %s: %s new traces in %s", one.robot.name, found, one.catalogue.folder)
             one.queue.start()
             one.jobs.start()

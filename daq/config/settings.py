@@ -128,7 +128,12 @@ def load_settings(explicit: Path | None = None) -> tuple[Settings, Path | None]:
 
 def _parse(path: Path) -> Settings:
     what = f"configuration {path}"
-    return _validated(parse_toml(read_text(path, what), what), str(path))
+    data = parse_toml(read_text(path, what), what)
+    server = data.get("server")
+    given = server.get("unattended") if isinstance(server, dict) else None
+    if isinstance(given, str):  # only the environment has nothing but text
+        raise SpecError(f"{what}: server.unattended = {shown(given)}: must be true or false, without quotation marks")
+    return _validated(data, str(path))
 
 
 def _validated(data: dict[str, Any], origin: str) -> Settings:

@@ -54,6 +54,7 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
          "load it again, or keep yours under another name"),
     _met("put .*/programs/", 409, "program-exists", "there is a program 'pick' already",
          "choose another name, or delete that one"),
+    _met("put .*/programs/", 409, "too-many-programs", "there are 1000 programs", "delete some of them first"),
     _met(MOVES, 409, "control-needed", "only who has control of the robot can move it",
          "take control with POST …/control"),
     _met(f"{MOVES}|put .*/control|post .*/(control|reset|disconnect)$", 409, "control-held",

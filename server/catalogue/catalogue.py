@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import logging
+import shutil
 import threading
+import time
+from contextlib import suppress
 from pathlib import Path
 
 from sqlalchemy.exc import OperationalError
@@ -16,6 +19,10 @@ from server.problems import ProblemError, conflict, not_found
 from server.store.experiments import ExperimentStore
 from server.store.traces import NewTrace, TraceStore
 
+UPLOAD = ".upload-"
+"""Begins the name of a folder that an upload is written to."""
+UPLOAD_IS_OLD = 2 * 3600.0
+"""s after which nothing is written to it any more: its reader has an hour at most."""
 log = logging.getLogger("server.catalogue")
 SHOWN = 200
 """Characters of an error that the log shows."""
@@ -57,12 +64,22 @@ class Catalogue:
             known = self._traces.files()
             self._traces.mark_missing(known - there, missing=True)
             self._traces.mark_missing(known & there, missing=False)
-            return sum(self._take_in(self.folder / name) for name in sorted(there - known))
+            return sum(self._take_in(self.folder / name) is not None for name in sorted(there - known))
+
+    def clear_uploads(self) -> None:
+        """Takes away what uploads left that were interrupted. Young ones may be another service's on this folder."""
+        old = time.time() - UPLOAD_IS_OLD
+        for left in self.folder.glob(f"{UPLOAD}*"):
+            with suppress(OSError):  # another may be at it
+                if left.is_dir() and not left.is_symlink() and left.stat().st_mtime < old:
+                    shutil.rmtree(left)
+                    log.info("took away %s: its upload was interrupted", left)
 
     def add(self, path: Path) -> str | None:
         """Takes in one finished file. Returns its number; None when it is no trace, which the log tells."""
         with self._lock:
-            return summary.trace_id if (summary := self._summary(path)) and self._insert(path, summary) else None
+            summary = self._take_in(path)
+            return None if summary is None else summary.trace_id
 
     def move_in(self, source: Path, target: Path, summary: TraceSummary) -> bool:
         """Takes in a finished file from elsewhere on this disk, as `target` of the folder, which says `summary` about
@@ -79,6 +96,8 @@ class Catalogue:
             finally:
                 if not taken:
                     target.unlink(missing_ok=True)
+            if taken:  # whatever becomes of this, the trace is there: file and row
+                self._tell(summary)
             return taken
 
     def remove(self, identity: str) -> Path:
@@ -103,20 +122,28 @@ class Catalogue:
             raise not_found(f"file for trace {identity!r} any more", advice)
         return path
 
-    def _take_in(self, path: Path) -> bool:
+    def _take_in(self, path: Path) -> TraceSummary | None:
         """Whatever one file is or says, the others are taken in. Raises OperationalError: the database fails."""
         try:
             if not is_text(path.name):
                 log.warning("not in the catalogue: %r: its name is not UTF-8; rename it", str(path))
-                return False
+                return None
             summary = self._summary(path)
-            return summary is not None and self._insert(path, summary)
+            if summary is None or not self._insert(path, summary):
+                return None
         except OperationalError:
             raise
         except Exception as error:  # noqa: BLE001  # one file must not keep the service from starting
             line = " ".join(str(error).split())[:SHOWN]
             log.warning("not in the catalogue: %s: %s: %s", path, type(error).__name__, line)
-            return False
+            return None
+        self._tell(summary)
+        return summary
+
+    def _tell(self, summary: TraceSummary) -> None:
+        """Tells the experiment that the trace is of, where there is one."""
+        assert summary.trace_id is not None
+        self._experiments.traced(summary.trace_id, summary.outcome)
 
     def _summary(self, path: Path) -> TraceSummary | None:
         try:
@@ -155,5 +182,4 @@ class Catalogue:
         except ProblemError as error:
             log.warning("not in the catalogue: %s: %s", path, error)
             return False
-        self._experiments.traced(summary.trace_id, summary.outcome)
         return True

@@ -13,29 +13,34 @@ from daq.contracts.service.traces import CatalogueEntry
 from server.access.caller import Caller
 from server.bounded.messages import ReadUpload, UploadedTrace
 from server.bounded.workers import ExhaustedError
+from server.catalogue.catalogue import UPLOAD
 from server.problems import ProblemError, conflict
+from server.queue.room import require_room
 from server.services import RobotServices, Services
 
 KINDS = {"application/octet-stream": ".mcap", "text/csv": ".csv"}
+LOOK_EVERY = 4 << 20
+"""Bytes after which is looked again whether the disk has room."""
 ADVICE = "docs/traces.md tells what a trace looks like"
 
 
 async def store_upload(request: Request, one: RobotServices, found: Services, who: Caller) -> CatalogueEntry:
-    """Writes the body to a temporary file, then takes it in. Raises a 413, 415, 422, 409."""
+    """Writes the body to a temporary file, then takes it in. Raises a 413, 415, 422, 409, 507."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind not in KINDS:
         allowed = " or ".join(KINDS)
         raise ProblemError(415, "not-a-trace", f"Content-Type {kind!r:.100} is not supported", f"send {allowed}")
     one.catalogue.folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".upload-", dir=one.catalogue.folder) as folder:
+    await run_in_threadpool(require_room, one.catalogue.folder)
+    with tempfile.TemporaryDirectory(prefix=UPLOAD, dir=one.catalogue.folder) as folder:
         path = Path(folder) / f"upload{KINDS[kind]}"
         await _write_body(request, path, found.settings.server.upload_size << 20)
-        async with found.lanes.turn(who.name):
+        async with found.lanes.turn(who.name):  # not before: a body that never ends would keep it
             return await run_in_threadpool(_take_in, path, one, found, who)
 
 
 async def _write_body(request: Request, path: Path, largest: int) -> None:
-    size = 0
+    size, looked = 0, 0
     with path.open("wb") as stream:
         async for piece in request.stream():
             size += len(piece)
@@ -43,6 +48,9 @@ async def _write_body(request: Request, path: Path, largest: int) -> None:
                 line = f"an upload may have {largest >> 20} MB (server.upload_size)"
                 raise ProblemError(413, "too-large", line, "copy the file into the folder of traces instead")
             await run_in_threadpool(stream.write, piece)
+            if size - looked > LOOK_EVERY:  # others may upload, too
+                looked = size
+                await run_in_threadpool(require_room, path.parent)
     if size == 0:
         raise ProblemError(422, "not-a-trace", "the body is empty", "send a trace")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, defer
 
 from daq.contracts.service.base import Wire
 from daq.contracts.service.teaching import ProgramEntry
@@ -33,7 +33,8 @@ class ProgramStore:
 
     def all(self, robot: str) -> tuple[ProgramEntry, ...]:
         """Those of a robot, the one changed last first."""
-        query = select(ProgramRow).filter_by(robot=robot).order_by(ProgramRow.changed.desc(), ProgramRow.name)
+        query = select(ProgramRow).options(defer(ProgramRow.program)).filter_by(robot=robot)
+        query = query.order_by(ProgramRow.changed.desc(), ProgramRow.name)
         with self._store.reading() as session:
             return tuple(_entry(row) for row in session.scalars(query))
 
@@ -62,7 +63,7 @@ class ProgramStore:
                     raise _taken(program.name)
                 count = session.scalar(select(func.count()).select_from(ProgramRow).filter_by(robot=robot)) or 0
                 if count >= MOST_PROGRAMS:
-                    raise conflict("program-exists", f"there are {count} programs", "delete some of them first")
+                    raise conflict("too-many-programs", f"there are {count} programs", "delete some of them first")
                 row = ProgramRow(robot=robot, revision=0)
                 session.add(row)
             else:
@@ -73,6 +74,7 @@ class ProgramStore:
                     line = f"program {name!r} was changed by {row.changed_by} meanwhile (revision {row.revision})"
                     raise conflict("program-changed", line, "load it again, or keep yours under another name")
             row.name, row.program, row.revision = program.name, content, row.revision + 1
+            row.instructions = len(program.instructions)
             row.changed, row.changed_by = now, by
             session.flush()
             return _entry(row)
@@ -92,7 +94,7 @@ def _entry(row: ProgramRow) -> ProgramEntry:
         name=row.name,
         robot=row.robot,
         revision=row.revision,
-        instructions=len(row.program["instructions"]),
+        instructions=row.instructions,
         changed=row.changed,
         changed_by=row.changed_by,
     )

@@ -99,6 +99,8 @@ class ProgramRow(Table):
     robot: Mapped[str] = mapped_column(String(32), primary_key=True)
     name: Mapped[str] = mapped_column(String(64), primary_key=True)
     program: Mapped[dict[str, Any]]
+    instructions: Mapped[int]
+    """How many `program` has, so that a list reads no programs."""
     revision: Mapped[int]
     changed: Mapped[datetime]
     changed_by: Mapped[str]

@@ -19,7 +19,7 @@ from daq.traces.catalogue import summary_of
 from daq.traces.csv_table import import_csv
 from daq.traces.naming import trace_path
 from daq.traces.store import write_trace
-from server.catalogue.catalogue import Catalogue
+from server.catalogue.catalogue import UPLOAD, Catalogue
 from server.problems import ProblemError
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
@@ -134,3 +134,30 @@ def test_a_file_that_cannot_be_taken_in_keeps_no_other_out(shelf: Shelf, caplog:
     assert len(lines) == 4
     assert all("\n" not in line for line in lines)
     assert "its name is not UTF-8" in lines[3]
+
+
+def test_no_row_without_a_file_stays_where_its_experiment_cannot_be_told(
+    shelf: Shelf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shelf.catalogue.remove(shelf.number)
+
+    def fails(*_: object) -> NoReturn:
+        raise OSError("the disk is away")
+
+    monkeypatch.setattr(ExperimentStore, "traced", fails)
+    with pytest.raises(OSError, match="away"):
+        shelf.catalogue.move_in(shelf.copy, shelf.path, summary_of(shelf.copy))
+    assert shelf.traces.get(ROBOT, shelf.number).file == shelf.path.name
+    assert shelf.catalogue.path_of(shelf.number) == shelf.path
+
+
+def test_what_interrupted_uploads_left_is_taken_away_and_young_ones_stay(shelf: Shelf) -> None:
+    old, young = (shelf.catalogue.folder / f"{UPLOAD}{name}" for name in ("old", "young"))
+    for left in (old, young):
+        left.mkdir()
+        (left / "upload.mcap").write_bytes(b"half")
+    os.utime(old, (0, 0))
+    shelf.catalogue.clear_uploads()
+    assert not old.exists()
+    assert young.is_dir()
+    assert shelf.path.is_file()

@@ -98,6 +98,8 @@ def test_a_full_disk_refuses_new_experiments_and_says_so(api: httpx.Client, monk
     refused = api.post("experiments", json={"spec": SHORT})
     assert (refused.status_code, refused.json()["type"]) == (507, "docs/service.md#no-room")
     assert refused.json()["detail"] == "1 MB are free for traces, 20 MB stay free"
+    uploaded = api.post("traces", content="time\n0\n", headers={"Content-Type": "text/csv"})
+    assert (uploaded.status_code, uploaded.json()["type"]) == (507, "docs/service.md#no-room")
     ready = api.get(api.base_url.join("/readyz"))
     assert (ready.status_code, ready.json()["checks"]["traces"]) == (503, "1 MB are free, 20 MB stay free")
     assert [one["id"] for one in api.get("queue/experiments").json()] == [waiting]

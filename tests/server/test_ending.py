@@ -18,6 +18,7 @@ from websockets.sync.client import connect
 
 from benchmarks.hostile_files import bomb, sound_trace
 from benchmarks.service_process import child
+from server.ending import FORCED
 from tests.server.service import running_service
 
 WITHIN = 5.0
@@ -28,7 +29,7 @@ BEGIN = "import server.ending as e; e.END_WITHIN, e.LAST_RESORT = {}, {}; e.EndI
 @pytest.mark.parametrize(
     ("limits", "work", "code"),
     [
-        ((0.1, 60.0), "import threading; threading.Event().wait()", 0),
+        ((0.1, 60.0), "import threading; threading.Event().wait()", FORCED),
         # a search that holds the interpreter, and lets no other thread run
         ((0.1, 0.5), "import re; re.match('(a+)+$', 'a' * 60 + 'b')", -signal.SIGALRM),
     ],

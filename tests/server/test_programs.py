@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sqlalchemy import text
 
 from daq.teaching import Program
 from daq.teaching.program import Absolute, Wait, load_program
 from server.backup.database import copy_database
 from server.problems import ProblemError
+from server.store.database_errors import DamagedError
 from server.store.engine import Store
 from server.store.programs import MOST_PROGRAMS, ProgramStore
 from tests.daq.cli.invoke import CommandLine
@@ -116,6 +118,21 @@ def test_there_is_an_end_to_how_many_are_kept(
     _put(programs, clock, _program())
     with pytest.raises(ProblemError, match="there are 1 programs"):
         _put(programs, clock, _program("place"))
+
+
+def test_a_list_reads_no_programs_and_a_damaged_one_is_told(tmp_path: Path, clock: HandClock) -> None:
+    store = Store(f"sqlite:///{tmp_path / 'damaged.sqlite'}")
+    store.migrate()
+    programs = ProgramStore(store)
+    _put(programs, clock, _program())
+    (before,) = programs.all(ROBOT)
+    for damaged in ("[", "{}", "[]"):
+        with store.writing() as session:
+            session.execute(text("UPDATE programs SET program = :damaged"), {"damaged": damaged})
+        assert programs.all(ROBOT) == (before,)
+        with pytest.raises(DamagedError, match="table programs"):
+            programs.get(ROBOT, "pick")
+    store.close()
 
 
 @pytest.fixture

@@ -56,7 +56,8 @@ def test_a_disk_that_cannot_be_written_is_not_ready_and_only_who_may_see_the_rob
 
 
 def test_readiness_is_looked_at_once_for_all_who_ask_and_again_after_a_second() -> None:
-    clock, looks = HandClock(), []
+    clock = HandClock()
+    looks: list[int] = []
     readiness = Readiness(clock)
 
     def look() -> dict[str, str]:

@@ -101,12 +101,17 @@ def test_a_file_that_cannot_be_read_is_one_line(content: bytes) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("nearly", ["1", '"yes"', '"on"', "1.0", '"True"'])
+@pytest.mark.parametrize("nearly", ["1", '"yes"', '"on"', "1.0", '"True"', '"true"', '"false"'])
 def test_whether_an_arm_may_move_unattended_is_true_or_false(nearly: str) -> None:
     Path("daq.toml").write_text(f"[server]\nunattended = {nearly}\n", "utf-8")
     with pytest.raises(SpecError, match=r"server\.unattended = .*: must be true or false"):
         load_settings()
     Path("daq.toml").write_text("[server]\nunattended = true\n", "utf-8")
+    assert load_settings()[0].server.unattended is True
+
+
+def test_the_environment_says_in_text_whether_an_arm_may_move_unattended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DAQ_SERVER__UNATTENDED", "true")
     assert load_settings()[0].server.unattended is True
 
 

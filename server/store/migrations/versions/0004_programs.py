@@ -18,6 +18,7 @@ def upgrade() -> None:
         sa.Column("robot", sa.String(length=32), nullable=False),
         sa.Column("name", sa.String(length=64), nullable=False),
         sa.Column("program", sa.JSON(), nullable=False),
+        sa.Column("instructions", sa.Integer(), nullable=False),
         sa.Column("revision", sa.Integer(), nullable=False),
         sa.Column("changed", sa.DateTime(), nullable=False),
         sa.Column("changed_by", sa.String(length=200), nullable=False),
