@@ -21,7 +21,6 @@ def serve(
     """Serve experiments, traces and the dashboard to people and programs."""
     from daq.transport.url import parse_port_url
     from server import logs
-    from server.serve import serve as run
 
     logs.begin()  # first: what is wrong with the configuration is a line of the log, too
     call = invocation(context)
@@ -30,6 +29,8 @@ def serve(
         update={key: value for key, value in (("host", host), ("port", port)) if value is not None}
     )
     parse_port_url(call.port)  # a port that is none does not become one by trying again
+    from server.serve import serve as run
+
     robot = settings.robot.model_copy(update={"port": call.port})
     run(settings.model_copy(update={"server": section, "robot": robot}), _tell)
 

@@ -28,10 +28,16 @@ UNREADABLE = (ValueError, struct.error, *INFLATE_ERRORS)
 NOT_IN_CHUNKS = "a chunk holds something else than schemas, channels and whole messages"
 
 _DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
-_REBUILT = frozenset({
-    int(Opcode.HEADER), int(Opcode.CHUNK_INDEX), int(Opcode.MESSAGE_INDEX), int(Opcode.ATTACHMENT_INDEX),
-    int(Opcode.METADATA_INDEX), int(Opcode.SUMMARY_OFFSET),
-})  # fmt: skip
+_REBUILT = frozenset(
+    (
+        Opcode.HEADER,
+        Opcode.CHUNK_INDEX,
+        Opcode.MESSAGE_INDEX,
+        Opcode.ATTACHMENT_INDEX,
+        Opcode.METADATA_INDEX,
+        Opcode.SUMMARY_OFFSET,
+    )
+)
 """Records that say nothing which the others do not say."""
 _MESSAGE = struct.Struct("<BQHIQQ")
 _CRC = struct.Struct("<I")

@@ -25,11 +25,17 @@ READERS = {
     "restore {} --check": ".zip",
     "blind --folder trial --registration {}": ".toml",
 }
+NO_TOML = {"deep-objects", "long-number", "null", "no-numbers", "half-a-character"}
+"""Kinds that a parser of TOML refuses at their first character, as it does "list"."""
+NO_JSON = {"deep-toml", "long-key", "long-number-toml", "long-hexadecimal"}
+"""The same for JSON and "binary"."""
+LEFT_OUT = {".toml": NO_TOML, ".json": NO_JSON, ".zip": NO_TOML | NO_JSON | {"deep-json", "null", "latin1"}}
 MAPS = ("machine", "memory_map")
 
 
-@pytest.mark.parametrize("kind", FILES)
-@pytest.mark.parametrize("words", READERS)
+@pytest.mark.parametrize(
+    ("words", "kind"), [(words, kind) for words in READERS for kind in FILES if kind not in LEFT_OUT[READERS[words]]]
+)
 def test_a_file_that_nobody_means(daq: CommandLine, words: str, kind: str) -> None:
     file = hostile_file(kind, READERS[words])
     if words.startswith("--config") and kind == "empty":
@@ -39,7 +45,7 @@ def test_a_file_that_nobody_means(daq: CommandLine, words: str, kind: str) -> No
     refuses(daq(*words.format(file).split()))
 
 
-@pytest.mark.parametrize("kind", FILES)
+@pytest.mark.parametrize("kind", [kind for kind in FILES if kind not in NO_TOML])
 @pytest.mark.parametrize("key", MAPS)
 def test_a_file_that_the_configuration_names(daq: CommandLine, key: str, kind: str) -> None:
     file = hostile_file(kind, ".toml")
@@ -53,7 +59,7 @@ def test_a_machine_file_that_is_binary_is_not_called_missing(daq: CommandLine) -
     daq("config", "check").complains(2, "machine file machine.toml", "not UTF-8 text (byte 0xff at 0)")
 
 
-@pytest.mark.parametrize("digits", [60, 600, 6000])
+@pytest.mark.parametrize("digits", [60, 6000])
 @pytest.mark.parametrize(
     ("words", "text"),
     [
@@ -69,19 +75,32 @@ def test_a_whole_number_that_python_does_not_write(daq: CommandLine, words: str,
     refuses(daq(*words.format("number.toml").split()))
 
 
-def options_of_motions() -> list[tuple[str, str]]:
-    """(kind, option) of every number of every kind of motion, and of what all have in common."""
+def options_of_motions() -> dict[str, list[str]]:
+    """By kind of motion: every number that it has, the sine with those that all have in common."""
     common = ("settle", "hold", "repeats")
-    own = [(kind, name) for kind, model in KINDS.items() for name in model.model_fields]
-    found = [(kind, name) for kind, name in own if name not in ("kind", "back", "via", "phase")]
-    return [(kind, name.replace("_", "-")) for kind, name in [*found, *(("sine", name) for name in common)]]
+    found = {
+        kind: [name.replace("_", "-") for name in model.model_fields if name not in ("kind", "back", "via", "phase")]
+        for kind, model in KINDS.items()
+    }
+    found["sine"].extend(common)
+    return {kind: options for kind, options in found.items() if options}
 
 
-@pytest.mark.parametrize("value", NUMBERS)
-@pytest.mark.parametrize(("kind", "option"), options_of_motions())
+def numbers_of_motions() -> list[tuple[str, str, str]]:
+    """(kind, option, value): every option once at least, and every value once at least for every kind."""
+    found = []
+    for offset, (kind, options) in enumerate(options_of_motions().items()):
+        for number in range(max(len(options), len(NUMBERS))):
+            value = NUMBERS[(number + offset) % len(NUMBERS)]
+            allowed = [one for one in options if value != "-1" or one not in ("amplitude", "lift")]
+            wanted = options[number % len(options)]
+            if allowed:
+                found.append((kind, wanted if wanted in allowed else allowed[number % len(allowed)], value))
+    return found
+
+
+@pytest.mark.parametrize(("kind", "option", "value"), numbers_of_motions())
 def test_a_number_that_nobody_means(daq: CommandLine, kind: str, option: str, value: str) -> None:
-    if option in ("amplitude", "lift") and value == "-1":
-        return
     refuses(daq("run", kind, f"--{option}={value}", "--dry-run"))
 
 
