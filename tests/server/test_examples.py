@@ -82,6 +82,7 @@ def test_an_example_of_a_problem_says_what_to_do() -> None:
 
 def test_the_service_takes_every_example_of_a_body(described: dict[str, Any], service: Service) -> None:
     """What is named in one need not be there; whatever else speaks against it would make it a bad example."""
+    gains = service.robot.get("/gains").json()
     sent = 0
     effects = {effect["name"] for effect in service.robot.get("/effects").json()}
     for operation, part, content in _bodies(described):
@@ -94,6 +95,9 @@ def test_the_service_takes_every_example_of_a_body(described: dict[str, Any], se
             assert {one["name"] for one in chosen} <= effects, (operation, name)
             sent += 1
     assert sent >= 23
+    lease = {"Control-Lease": service.robot.post("/control", json={}).json()["lease"]}
+    assert service.robot.put("/gains", json=gains, headers=lease).status_code == 200  # as other tests expect them
+    assert service.robot.delete("/control", headers=lease).status_code == 204
 
 
 def _sent(service: Service, operation: str, body: Any) -> httpx.Response:

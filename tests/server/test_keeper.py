@@ -27,6 +27,7 @@ class SlowOwner:
         self.begun.set()
         assert self.go.wait(60)
         self.ended = ended
+        self.pid = 0
         self.closed = False
         self.made.append(self)
 

@@ -186,17 +186,18 @@ def test_the_listener_stops_and_does_nothing_else(service: Service) -> None:
     assert (answer.status_code, answer.json()["type"]) == (404, "docs/service.md#not-found")
 
 
-def test_a_stop_that_is_not_delivered_holds_the_queue_at_either_door(service: Service) -> None:
-    service.until_connected()
-    assert service.robot.post("/disconnect").status_code == 200
-    for stop in (f"{service.robot.base_url}stop", f"{_beside(service)}/stop"):
-        while not service.robot.get("/queue").json()["paused"]:  # first, because the connection has ended
-            assert service.process.poll() is None
-        assert service.robot.post("/queue/resume", json={}).json()["paused"] is False
-        assert httpx.post(stop, timeout=30).json()["delivered"] is False
-        while not (queue := service.robot.get("/queue").json())["paused"]:
-            assert service.process.poll() is None
-        assert queue["reason"].startswith("local asked for a stop")
+def test_a_stop_that_is_not_delivered_holds_the_queue_at_either_door(tmp_path: Path) -> None:
+    with running_service(tmp_path) as service:
+        service.until_connected()
+        assert service.robot.post("/disconnect").status_code == 200
+        for stop in (f"{service.robot.base_url}stop", f"{_beside(service)}/stop"):
+            while not service.robot.get("/queue").json()["paused"]:  # first, because the connection has ended
+                assert service.process.poll() is None
+            assert service.robot.post("/queue/resume", json={}).json()["paused"] is False
+            assert httpx.post(stop, timeout=30).json()["delivered"] is False
+            while not (queue := service.robot.get("/queue").json())["paused"]:
+                assert service.process.poll() is None
+            assert queue["reason"].startswith("local asked for a stop")
 
 
 @pytest.mark.parametrize(
