@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from model.discrepancy.observation import STEP, step_of_derivatives
+from model.discrepancy.output_error.observation import STEP, step_of_derivatives
 from model.effects.library import library
 from model.simulation.simulate import LONGEST_STEP as STEP_OF_FITS
 from tests.model.simulation.effect_cases import CASES, Bench

@@ -20,7 +20,7 @@ ROBOT = "ma2000"
 ANSWER_WITHIN = 100.0
 END_WITHIN = 15.0
 ENDS = ("done", "failed", "cancelled", "interrupted")
-COMMAND = [sys.executable, "-c", "from daq.cli import main; main()"]
+COMMAND = [sys.executable, "-c", "from daq_cli import main; main()"]
 
 
 @dataclass

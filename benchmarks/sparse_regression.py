@@ -37,7 +37,7 @@ from daq.contracts.errors import TraceError
 from daq.contracts.machine import BoardPid
 from daq.contracts.trace import Trace
 from daq.traces.reader import read_trace
-from model.discrepancy.torque_space.records import acts_until_next_sample
+from model.discrepancy.inverse_dynamics.records import acts_until_next_sample
 from model.fitting.options import HELD_BY_DEFAULT
 from model.machine_model import layout as at
 from model.machine_model.model import Model, base_model

@@ -18,7 +18,7 @@ settings.load_profile("repeatable")
 AGAINST_THE_CLOCK = (
     "contract",
     "daq/acquisition",
-    "daq/cli",
+    "daq_cli",
     "daq/client",
     "daq/transport",
     "mock/process",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from model.discrepancy.answer import SignalError, Step, Verdict
+from model.discrepancy.diagnosis import SignalError, Step, Verdict
 from model.discrepancy.thresholds import Thresholds
 
 SCATTER = 4.0

@@ -12,35 +12,41 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
-from model.discrepancy import reasons
-from model.discrepancy.answer import Candidate, Diagnosis, RemainingShape, SignalError, Step, Verdict, Where
-from model.discrepancy.case import Case, with_point
-from model.discrepancy.controller_check import (
+from model.discrepancy.candidates.decision import Added, decide
+from model.discrepancy.candidates.estimates import listed, only_probed
+from model.discrepancy.candidates.probing import Probed
+from model.discrepancy.candidates.ranking import Ranking, ranked
+from model.discrepancy.diagnosis import Candidate, Diagnosis, RemainingShape, SignalError, Step, Verdict, Where
+from model.discrepancy.experiment_design.next_experiment import Asked, Asker, rivals_of
+from model.discrepancy.explanation import reasons
+from model.discrepancy.explanation.notes import (
+    ERRORS_FOLLOW,
+    NOTHING_HELD_OUT,
+    on_tolerances,
+    on_unfinished,
+    on_what_is_stated,
+)
+from model.discrepancy.localisation.statistics import chance_significance
+from model.discrepancy.options import DiagnosisOptions, check_options
+from model.discrepancy.output_error.case import Case, with_point
+from model.discrepancy.output_error.controller_evidence import (
     ControllerFinding,
     check_controller,
     judged_by_records,
     with_findings,
     with_used_set_points,
 )
-from model.discrepancy.decision import Added, decide
-from model.discrepancy.estimates import listed, only_probed
-from model.discrepancy.following import FOLLOWING_FOR_ERRORS
-from model.discrepancy.holdout import HeldOut, held_out
-from model.discrepancy.last_fit import as_last_fitted
-from model.discrepancy.next_experiment import Asked, Asker, rivals_of
-from model.discrepancy.noise_floor import noise_floor
-from model.discrepancy.notes import ERRORS_FOLLOW, NOTHING_HELD_OUT, on_tolerances, on_unfinished, on_what_is_stated
-from model.discrepancy.observation import Observation, observed
-from model.discrepancy.options import DiagnosisOptions, check_options
-from model.discrepancy.probing import Probed
-from model.discrepancy.proved import proved_step
-from model.discrepancy.ranking import Ranking, ranked
-from model.discrepancy.refitting import Judged, Refitted, deeper, judge
-from model.discrepancy.search import Point, point_at, searched, settled
+from model.discrepancy.output_error.feedback_share import FOLLOWING_FOR_ERRORS
+from model.discrepancy.output_error.holdout import HeldOut, held_out
+from model.discrepancy.output_error.last_fit import as_last_fitted
+from model.discrepancy.output_error.noise_floor import noise_floor
+from model.discrepancy.output_error.observation import Observation, observed
+from model.discrepancy.output_error.proved import proved_step
+from model.discrepancy.output_error.refitting import Judged, Refitted, deeper, judge
+from model.discrepancy.output_error.search import Point, point_at, searched, settled
+from model.discrepancy.output_error.step import LAST_STEPS, step_of
 from model.discrepancy.thresholds import THRESHOLDS
-from model.discrepancy.turn import LAST_STEPS, step_of
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn
-from model.discrepancy.where_statistics import chance_significance
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
 
@@ -94,7 +100,9 @@ def diagnose(
     check_options(options, model)
     _refuse_shared(traces, holdout)
     if isinstance(model.machine.controller, NoController) or any(t.set_point is None for t in traces):
-        from model.discrepancy.torque_space.diagnose import diagnose_torques  # here: rigs with a controller need none
+        from model.discrepancy.inverse_dynamics.diagnose import (
+            diagnose_torques,  # here: rigs with a controller need none
+        )
 
         return diagnose_torques(model, traces, holdout, options, progress, cancel)
     progress(0.0, "checking the controller's own numbers")

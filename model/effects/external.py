@@ -23,7 +23,8 @@ EXTERNAL = (
         ),
     ),
     # A record that begins at another moment meets it at another phase. Held-out records get a phase of their own
-    # (`model.discrepancy.holdout`); those that are fitted together share one, which is right for one record alone.
+    # (`model.discrepancy.output_error.holdout`); those that are fitted together share one, which is right for one
+    # record alone.
     Effect(
         "periodic_disturbance",
         physics="τ = a sin(2πft) + b cos(2πft), t from the start of the record",

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
-from model.discrepancy.answer import Dependence, Phase, PhaseCell, Where
-from model.discrepancy.where_statistics import chance_significance
+from model.discrepancy.diagnosis import Dependence, Phase, PhaseCell, Where
+from model.discrepancy.localisation.statistics import chance_significance
 from model.reports.figures import COLOURS, QUIET, baseline, drawn, panels
 from model.reports.page import Picture
 from model.reports.units import shown_unit

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from model.comparison.compare import Comparison
-from model.discrepancy.answer import Acquired, Diagnosis, NextExperiment, RemainingShape, Step
-from model.discrepancy.candidate_order import in_order
-from model.discrepancy.clear_shape import FEWEST_BINS, clear_shape, filled_bins
+from model.discrepancy.candidates.candidate_order import in_order
+from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment, RemainingShape, Step
+from model.discrepancy.localisation.clear_shape import FEWEST_BINS, clear_shape, filled_bins
 from model.reports.diagnosis_map import map_picture
 from model.reports.diagnosis_pictures import evidence_picture, remaining_picture
 from model.reports.diagnosis_steps import error_blocks, step_sections, where_blocks

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from model.discrepancy.answer import Candidate, Dependence, FoundValue, SignalError, Step, Where
+from model.discrepancy.diagnosis import Candidate, Dependence, FoundValue, SignalError, Step, Where
 from model.reports.diagnosis_map import dependence_picture, map_picture
 from model.reports.diagnosis_pictures import error_picture, evidence_picture
 from model.reports.diagnosis_words import Compared, distortion, gap, gone, proved

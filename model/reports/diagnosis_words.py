@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from daq.contracts.machine import NoController
-from model.discrepancy.answer import Diagnosis, FoundValue, SignalError, Step
-from model.discrepancy.reasons_table import telling
+from model.discrepancy.diagnosis import Diagnosis, FoundValue, SignalError, Step
+from model.discrepancy.explanation.table import telling
 from model.reports.effect_names import capitalised, placed
 from model.reports.numbers import estimate
 from model.reports.units import shown_unit, with_unit

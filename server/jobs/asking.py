@@ -12,7 +12,7 @@ from daq.trajectories.asked import asked_experiments
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
-    from model.discrepancy.next_experiment import Asker, Experiment
+    from model.discrepancy.experiment_design.next_experiment import Asker, Experiment
 
 
 def asker(machine: Machine, budget: float | None = None) -> Asker:
@@ -21,13 +21,13 @@ def asker(machine: Machine, budget: float | None = None) -> Asker:
     Args:
         budget: s of robot time that are left; None for no limit.
     """
-    from model.discrepancy.next_experiment import Asker
+    from model.discrepancy.experiment_design.next_experiment import Asker
 
     return Asker(library(), lambda spec: planned(spec, machine), budget)
 
 
 def library() -> tuple[Experiment, ...]:
     """The experiments that may be asked for."""
-    from model.discrepancy.next_experiment import Experiment
+    from model.discrepancy.experiment_design.next_experiment import Experiment
 
     return tuple(Experiment(one.name, one.description, one.spec, one.general) for one in asked_experiments())

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.comparison.difference import differences
-from model.discrepancy.where import located
-from model.discrepancy.where_statistics import chance_significance
+from model.discrepancy.localisation.disagreement import located
+from model.discrepancy.localisation.statistics import chance_significance
 from model.fitting.records import noise_floor, records_of
 from model.simulation.simulate import Options, simulate
 from server.jobs.overlays import overlays
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from daq.contracts.trace import Trace
     from model.comparison.compare import Comparison
-    from model.discrepancy.answer import Diagnosis, Step
+    from model.discrepancy.diagnosis import Diagnosis, Step
     from model.machine_model.model import Model
 
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from model.comparison.agreement import JointAgreement
     from model.comparison.compare import Comparison
-    from model.discrepancy.answer import Candidate, Diagnosis, Step
+    from model.discrepancy.diagnosis import Candidate, Diagnosis, Step
     from model.fitting.result import FitResult
     from model.validation.criterion import Fidelity
 

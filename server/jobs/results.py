@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from model.comparison.agreement import ModelAgreement
 from model.comparison.difference import ParameterDifference
-from model.discrepancy.answer import Candidate, Diagnosis, Step, Where
+from model.discrepancy.diagnosis import Candidate, Diagnosis, Step, Where
 from model.fitting.result import FitResult
 from model.validation.criterion import Fidelity
 from model.validation.variation import TimeDomain

@@ -8,8 +8,8 @@ HEAVY = ["numba", "mujoco", "matplotlib", "fastapi", "scipy"]
 
 EVERY_SUBCOMMAND = """
 import importlib, json, pkgutil, sys
-import daq.cli
-modules = [module.name for module in pkgutil.walk_packages(daq.cli.__path__, "daq.cli.")]
+import daq_cli
+modules = [module.name for module in pkgutil.walk_packages(daq_cli.__path__, "daq_cli.")]
 for name in modules:
     if not name.endswith("__main__"):
         importlib.import_module(name)
@@ -21,5 +21,5 @@ def test_importing_the_command_line_and_every_subcommand_loads_no_heavy_library(
     program = [sys.executable, "-c", EVERY_SUBCOMMAND]
     run = subprocess.run(program, check=True, capture_output=True, text=True, timeout=60)
     modules, loaded = json.loads(run.stdout)
-    assert "daq.cli.command" in modules
+    assert "daq_cli.app.command" in modules
     assert [name for name in HEAVY if name in loaded] == []

@@ -52,6 +52,6 @@ def test_no_tracked_file_is_large() -> None:
 
 
 def test_the_floors_of_the_house_are_folders() -> None:
-    floors = ["firmware_protocol", "daq", "daq/contracts", "daq/cli", "mock_controller", "model", "server", "tests"]
+    floors = ["firmware_protocol", "daq", "daq/contracts", "daq_cli", "mock_controller", "model", "server", "tests"]
     tracked_folders = {folder for path in tracked_files() for folder in path.parents}
     assert [floor for floor in floors if ROOT / floor not in tracked_folders] == []

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from daq.cli.context import console
-from tests.daq.cli.invoke import CommandLine
+from daq_cli.app.context import console
+from tests.daq_cli.invoke import CommandLine
 
 
 def environment_in(folder: Path) -> dict[str, str]:

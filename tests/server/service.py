@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 
 import httpx
 
-DAQ = [sys.executable, "-c", "from daq.cli import main; main()"]
+DAQ = [sys.executable, "-c", "from daq_cli import main; main()"]
 MOCK = "mock://?pty=1&lock_step=1&seed=3"
 """In lock-step: what the arm does depends on no clock, however busy this computer is."""
 START_WITHIN = 100.0

@@ -26,7 +26,7 @@ from server.access.tokens import REMEMBERED_FOR, UNKNOWN_FOR, KnownTokens, Token
 from server.store.database_errors import DamagedError
 from server.store.engine import Store
 from server.store.tables import TokenRow
-from tests.daq.cli.invoke import CommandLine
+from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
 from tests.server.desk import anothers_desk
 from tests.server.service import Service, running_service

@@ -26,7 +26,7 @@ from server.store.lock import InUseError, sole_use
 from server.store.queues import QueueState, QueueStore
 from server.store.tables import TraceRow
 from server.store.traces import NewTrace, TraceStore
-from tests.daq.cli.invoke import CommandLine
+from tests.daq_cli.invoke import CommandLine
 from tests.server.service import Service
 
 NOW = datetime(2026, 1, 1, 12, tzinfo=UTC)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from daq.traces.reader import read_trace
-from tests.daq.cli.invoke import CommandLine, Said
+from tests.daq_cli.invoke import CommandLine, Said
 from tests.server.desk import anothers_desk, environment_in
 from tests.server.service import DAQ, Service
 

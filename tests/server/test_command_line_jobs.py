@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from daq.cli.remote.jobs import standing_of
 from daq.contracts.service.jobs import DiagnoseRequest, FitRequest, Job, WaitsBehind
+from daq_cli.robot.remote.jobs import standing_of
 from model.machine_model.model_file import load_model
-from tests.daq.cli.invoke import CommandLine, Said
+from tests.daq_cli.invoke import CommandLine, Said
 from tests.server.desk import anothers_desk
 from tests.server.service import Service
 

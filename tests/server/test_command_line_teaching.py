@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from daq.teaching.program import Program, load_program
-from tests.daq.cli.invoke import CommandLine
-from tests.daq.cli.person import at_a_terminal
+from tests.daq_cli.invoke import CommandLine
+from tests.daq_cli.person import at_a_terminal
 from tests.server.desk import anothers_desk
 from tests.server.service import Service
 

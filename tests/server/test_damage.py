@@ -17,7 +17,7 @@ from server.store.address import masked
 from server.store.database_errors import DamagedError, advice_of
 from server.store.engine import Store
 from server.store.tables import QueueRow
-from tests.daq.cli.invoke import CommandLine
+from tests.daq_cli.invoke import CommandLine
 from tests.server.inside import service_inside
 
 FILE = "service.sqlite"

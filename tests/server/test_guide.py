@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.daq.cli.invoke import CommandLine
+from tests.daq_cli.invoke import CommandLine
 from tests.server.desk import anothers_desk
 from tests.server.service import Service
 

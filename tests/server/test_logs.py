@@ -53,7 +53,7 @@ def test_every_line_is_json_whoever_writes_it() -> None:
 
 
 def test_what_is_wrong_with_the_configuration_is_a_line_of_json() -> None:
-    daq = "import sys; sys.argv = ['daq', '--config', 'nothing.toml', 'serve']; from daq.cli import main; main()"
+    daq = "import sys; sys.argv = ['daq', '--config', 'nothing.toml', 'serve']; from daq_cli import main; main()"
     (line,) = _told(daq)
     assert line["text"].startswith("daq: ")
     assert "nothing.toml" in line["text"]

@@ -17,7 +17,7 @@ from server.problems import ProblemError
 from server.store.database_errors import DamagedError
 from server.store.engine import Store
 from server.store.programs import MOST_PROGRAMS, ProgramStore
-from tests.daq.cli.invoke import CommandLine
+from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
 from tests.server.desk import anothers_desk
 from tests.server.service import Service

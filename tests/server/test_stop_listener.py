@@ -36,7 +36,7 @@ from server.stopping.listener import StopListener
 from server.stopping.messages import Begin
 from server.stopping.tokens import UNKNOWN_FOR, StopTokens, TokensCannotBeReadError, reader_of
 from server.store.engine import Store
-from tests.daq.cli.invoke import CommandLine
+from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
 from tests.server.desk import anothers_desk
 from tests.server.service import Service, running_service
@@ -59,7 +59,7 @@ def with_a_fault(services, gate):
     return app
 
 server.serve.make_app = with_a_fault
-from daq.cli import main
+from daq_cli import main
 main()
 """
 """`daq` with a coroutine in its service that does not give the event loop back."""

@@ -7,10 +7,10 @@ import numpy as np
 from daq.contracts.experiment import ExperimentSpec, SlowRamp
 from daq.contracts.trace import Trace
 from model.comparison.compare import Comparison, compare
-from model.discrepancy.answer import Candidate, Diagnosis, FoundValue, NextExperiment, SignalError, Step
-from model.discrepancy.reasons import reason
-from model.discrepancy.remaining import shapes
-from model.discrepancy.where import located
+from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, NextExperiment, SignalError, Step
+from model.discrepancy.explanation.reasons import reason
+from model.discrepancy.localisation.disagreement import located
+from model.discrepancy.localisation.unexplained_torque import shapes
 from model.fitting.records import noise_floor, records_of
 from model.machine_model.model import Model
 from model.simulation.simulate import Options, simulate

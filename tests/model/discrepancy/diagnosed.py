@@ -6,7 +6,7 @@ from pathlib import Path
 
 from daq.contracts.machine import load_machine
 from daq.trajectories.presets import preset
-from model.discrepancy.answer import Diagnosis
+from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.workflow import diagnose
 from model.machine_model.model import base_model

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from model.discrepancy.answer import Candidate, SignalError, Step, Where
+from model.discrepancy.diagnosis import Candidate, SignalError, Step, Where
 from model.discrepancy.thresholds import Thresholds
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn
 

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from model.comparison.compare import TraceSignals
-from model.discrepancy.answer import Candidate, PhaseCell, Where
+from model.discrepancy.diagnosis import Candidate, PhaseCell, Where
 from model.reports import diagnosis_map, diagnosis_pictures
 from model.reports.diagnosis_map import by_shade, map_picture, shade_limits
 from model.reports.diagnosis_pictures import evidence_picture, log_ticks, shown_candidates

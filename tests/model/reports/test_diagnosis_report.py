@@ -7,7 +7,7 @@ import re
 import pytest
 
 from model.comparison.compare import Comparison
-from model.discrepancy.answer import Acquired, Diagnosis, SignalError
+from model.discrepancy.diagnosis import Acquired, Diagnosis, SignalError
 from model.reports.diagnosis_report import diagnosis_page, diagnosis_report
 from model.reports.diagnosis_words import TORQUES, compared, gap, gone, headline
 from model.reports.page import Picture, Report, Table, Text, html

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 import typer.main
 
-from daq.cli.lazy import SUBCOMMANDS
 from daq.contracts.effects import effect_names
 from daq.contracts.machine import load_machine, parse_machine
+from daq_cli.app.lazy import SUBCOMMANDS
 
 ROOT = Path(__file__).parents[3]
 PAGES = [ROOT / "docs" / name for name in ("modelling.md", "own-machine.md")]

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
-from daq.cli.compare import _tell
-from daq.cli.validate import _print_in_time
 from daq.contracts.machine import Machine, load_machine
+from daq_cli.commands.compare import _tell
+from daq_cli.commands.validate import _print_in_time
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.comparison.compare import Comparison
-from model.discrepancy.answer import SignalError
+from model.discrepancy.diagnosis import SignalError
 from model.reports.comparison_report import comparison_report
 from model.reports.diagnosis_pictures import error_picture
 from model.reports.page import Table

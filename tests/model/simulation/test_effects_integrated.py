@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from model.discrepancy.observation import STEP as STEP_OF_DIAGNOSES
+from model.discrepancy.output_error.observation import STEP as STEP_OF_DIAGNOSES
 from model.effects.library import library
 from model.simulation.simulate import LONGEST_STEP as STEP_OF_FITS
 from tests.model.simulation.effect_cases import CASES, Bench, Case

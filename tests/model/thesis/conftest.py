@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from daq.cli.thesis import recorded_ramp
 from daq.contracts.trace import Trace
+from daq_cli.commands.thesis import recorded_ramp
 from model.thesis.reproduction import Reproduction, reproduce_thesis
 
 DEFAULT_SEED = 1991

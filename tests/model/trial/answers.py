@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from daq.contracts.machine import load_machine
-from model.discrepancy.answer import (
+from model.discrepancy.diagnosis import (
     Candidate,
     Diagnosis,
     FoundValue,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from model.discrepancy.answer import Diagnosis
+from model.discrepancy.diagnosis import Diagnosis
 from model.trial.score import Score, score, score_of_failure
 from model.trial.truth import Truth
 from tests.model.trial.answers import MACHINE, answer, candidate, found, remaining, seen, step, truth

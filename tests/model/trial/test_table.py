@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from model.discrepancy.answer import Diagnosis
+from model.discrepancy.diagnosis import Diagnosis
 from model.trial.cases import as_csv
 from model.trial.markdown import as_markdown
 from model.trial.rates import rate

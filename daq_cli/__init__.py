@@ -1,0 +1,19 @@
+"""The command line: the top of the house. One file a subcommand; heavy libraries are imported where they are used."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+
+def main() -> None:
+    """Entry point of `daq`. A stop is asked for before anything else is even imported."""
+    if sys.argv[1:2] == ["stop"] and not {"-h", "--help"} & set(sys.argv):
+        from daq_cli.app import early_stop
+
+        early_stop.ask()
+    # Matrices here are thin: a second thread in each product costs a fifth of a diagnosis. Simulations share the cores.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from daq_cli.app.command import main as run
+
+    run()

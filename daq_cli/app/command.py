@@ -1,0 +1,152 @@
+"""The `daq` command: global options, the list of subcommands, and what every error ends with."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+from daq.contracts.errors import DaqError, SpecError
+from daq_cli.app.context import Invocation
+from daq_cli.app.lazy import HERE, LazyGroup
+from firmware_protocol.errors import ProtocolError
+
+EXIT_PROGRAM_FAULT = 1
+EXIT_WRONG_INPUT = 2
+WRONG_NAMES = frozenset({
+    errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS,
+})  # fmt: skip
+"""What the operating system says of files that were named wrongly; the rest is its own trouble."""
+LONGEST_LINE = 800
+"""Characters of an error; a command line may hold a megabyte."""
+EXIT_INTERRUPTED = 130
+"""As shells report a process that Ctrl-C has ended."""
+
+SERVER_VARIABLE = "DAQ_SERVER"
+UsageError: type[Exception] = typer.BadParameter.__bases__[0]
+"""What typer raises for a command line that it does not understand; it has no public name there."""
+
+app = typer.Typer(
+    name="daq",
+    cls=LazyGroup,
+    help="Run experiments on a TQ MA2000 robot arm, or on its mock, and keep every trace.",
+    no_args_is_help=True,
+    rich_markup_mode=None,  # importing rich costs more than everything else that `daq --help` does
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"daq {version('ma2000-daq')}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    context: typer.Context,
+    config_file: Annotated[
+        Path | None, typer.Option("--config", help="Configuration file (default: ./daq.toml, then the user's).")
+    ] = None,
+    port: Annotated[
+        str | None,
+        typer.Option(help="Robot's port: serial:///dev/ttyUSB0?baud=115200, tcp://host:port or mock://."),
+    ] = None,
+    server: Annotated[
+        str | None,
+        typer.Option(envvar=SERVER_VARIABLE, help="A service that has the robot: http://host:8300. Token: DAQ_TOKEN."),
+    ] = None,
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and end.")
+    ] = False,
+) -> None:
+    """Options that go before the subcommand."""
+    del version
+    by_default = getattr(context.get_parameter_source("server"), "name", "") == "ENVIRONMENT"
+    if server is not None and port is not None:
+        if not by_default:
+            raise SpecError("--port and --server: the server has the robot at its own port; give one of them")
+        server = None
+    if server is not None and context.invoked_subcommand in HERE:
+        if not by_default:
+            raise SpecError(f"--server: `daq {context.invoked_subcommand}` has nothing to do with a server's robot")
+        server = None
+    context.obj = Invocation(config_file=config_file, port_option=port, server=server, server_by_default=by_default)
+
+
+def main() -> None:
+    """Entry point: errors that are the user's end in one line on standard error and a documented exit code."""
+    _print_whatever_files_are_called()
+    try:
+        exit_code = app(prog_name="daq", standalone_mode=False)
+        _flush()  # now, while what keeps it from being written is still an error
+    except DaqError as error:
+        fail(str(error), error.exit_code)
+    except ProtocolError as error:
+        fail(str(error), EXIT_WRONG_INPUT)
+    except UsageError as error:
+        _show_usage_error(error)
+    except (KeyboardInterrupt, typer.Abort):
+        fail("interrupted", EXIT_INTERRUPTED)
+    except MemoryError:
+        fail("the computer has not enough memory for this", EXIT_PROGRAM_FAULT)
+    except BrokenPipeError:
+        # `daq traces ls | head`: whoever read has enough. Python would complain at exit.
+        _drop_output()
+        raise SystemExit(EXIT_PROGRAM_FAULT) from None
+    except OSError as error:
+        # Where nobody knew better: a name that is too long, a folder that may not be read, a full disk.
+        file = "" if error.filename is None else f"{error.filename}: "
+        _drop_output()
+        code = EXIT_WRONG_INPUT if error.errno in WRONG_NAMES else EXIT_PROGRAM_FAULT
+        fail(f"{file}{error.strerror or error}", code)
+    # typer hands back either an exit code or what the command returned.
+    raise SystemExit(exit_code if isinstance(exit_code, int) else 0)
+
+
+def _flush() -> None:
+    """Raises OSError. Python has no standard output where the shell has closed it (`>&-`)."""
+    out: io.TextIOBase | None = sys.stdout  # type: ignore[assignment]
+    if out is not None:
+        out.flush()
+
+
+def _drop_output() -> None:
+    """What could not be written is not tried again at exit, where Python would complain in its own words."""
+    try:
+        _flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _print_whatever_files_are_called() -> None:
+    """Names of files need not be UTF-8, nor terminals able to show a degree sign: neither may end a command."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="surrogateescape" if sys.stdout.encoding.lower() == "utf-8" else "replace")
+
+
+def _show_usage_error(error: Any) -> NoReturn:
+    """A command line that cannot be understood: one line, and where help is; the help itself where nothing was said."""
+    message = error.format_message().strip()
+    if type(error).__name__ == "NoArgsIsHelpError":
+        print(message, file=sys.stderr)
+        raise SystemExit(EXIT_WRONG_INPUT)
+    path = "daq" if error.ctx is None else error.ctx.command_path
+    fail(f"{message} (see `{path} --help`)", EXIT_WRONG_INPUT)
+
+
+def fail(message: str, exit_code: int) -> NoReturn:
+    """One line on standard error, then the end. A long one is cut in its middle: what is allowed stands at the end."""
+    line = " ".join(message.split())
+    if len(line) > LONGEST_LINE:
+        line = f"{line[: LONGEST_LINE // 2]} … {line[-LONGEST_LINE // 2 :]}"
+    print("daq: " + "".join(one if one.isprintable() else ascii(one)[1:-1] for one in line), file=sys.stderr)
+    raise SystemExit(exit_code)

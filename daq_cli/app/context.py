@@ -1,0 +1,138 @@
+"""What every subcommand needs: the settings, the port, the consent to move a real arm, and how results are printed."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from daq.config import Settings
+    from daq.contracts.machine import Machine
+    from daq.contracts.trace_limits import TraceLimits
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")]
+YesOption = Annotated[bool, typer.Option("--yes", help="Consent to moving a real arm without being asked.")]
+
+
+@cache
+def console() -> Console:
+    """For people: progress, questions, remarks, on standard error. Results go to standard output.
+
+    Text is printed as it is: square brackets in a path or a message are no markup.
+    """
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
+
+
+def printable(text: str) -> str:
+    """Text of a file that somebody else may have made, without what would command the terminal."""
+    return "".join(sign if sign.isprintable() or sign == "\n" else "\N{REPLACEMENT CHARACTER}" for sign in text)
+
+
+def print_table(table: Table, width: int | None = None) -> None:
+    """A table of results on standard output, its text as it is."""
+    from rich.console import Console
+
+    Console(highlight=False, markup=False, width=width).print(table)
+
+
+@dataclass
+class Invocation:
+    """One call of `daq`: what was said before the subcommand. Settings are read when they are first needed."""
+
+    config_file: Path | None = None
+    port_option: str | None = None
+    server: str | None = None
+    """URL of a service that has the robot; None for a robot at this computer."""
+    server_by_default: bool = False
+    """Whether it is DAQ_SERVER that says so, and not the command line."""
+    told: bool = field(default=False, repr=False)
+
+    @cached_property
+    def settings(self) -> Settings:
+        """The settings. Raises SpecError."""
+        from daq.config import load_settings
+
+        return load_settings(self.config_file)[0]
+
+    @property
+    def port(self) -> str:
+        """The port of the command line or the configuration; the mock by default, which is then said aloud."""
+        if self.port_option is not None:
+            return self.port_option
+        if self.settings.robot.port is None and not self.told:
+            self.told = True
+            console().print("No robot is configured: using the mock controller (no arm moves). See `daq config show`.")
+        return self.settings.port
+
+    @cached_property
+    def machine(self) -> Machine:
+        """The robot's machine file with the limits that hold for it: configured here, or at the server.
+
+        Raises SpecError, ServiceError, ServiceNotReachedError.
+        """
+        if self.server is None:
+            return self.settings.machine()
+        from daq_cli.robot.remote.robot import remote_robot
+
+        with remote_robot(self) as robot:
+            return robot.machine()
+
+    def find_trace(self, folder: Path, wanted: str) -> Path:
+        """The file of a trace: by path, number, name or `last`, in `folder`; at the server, fetched into `folder`.
+
+        Raises TraceError, ServiceError, ServiceNotReachedError.
+        """
+        if self.server is None or os.path.isfile(wanted):
+            from daq.traces.catalogue import find_trace
+
+            return find_trace(folder, wanted, self.trace_limits)
+        from daq_cli.robot.remote.traces import fetched_trace
+
+        return fetched_trace(self, folder, wanted)
+
+    @property
+    def memory_map_text(self) -> str | None:
+        """Text of the configured memory map; None for the one that ships. Raises SpecError."""
+        path = self.settings.robot.memory_map
+        if path is None:
+            return None
+        from daq.config.robot_files import load_memory_map
+        from daq.contracts.documents import read_text
+
+        load_memory_map(path)
+        return read_text(path, f"memory map {path}")
+
+    @property
+    def trace_folder(self) -> Path:
+        """Where traces are kept."""
+        return self.settings.traces.folder
+
+    @property
+    def trace_limits(self) -> TraceLimits:
+        """How large a trace may be that is read."""
+        return self.settings.traces.limits
+
+
+def invocation(context: typer.Context) -> Invocation:
+    """The invocation that the callback made."""
+    found = context.find_object(Invocation)
+    assert found is not None
+    return found
+
+
+def print_json(data: Any) -> None:
+    """Data on standard output, as one JSON document."""
+    json.dump(data, sys.stdout, indent=2, ensure_ascii=False, default=str)
+    sys.stdout.write("\n")

@@ -1,0 +1,76 @@
+"""Subcommands that are imported when they are used, so that `daq --help` starts fast."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+import typer.core
+import typer.main
+
+SUBCOMMANDS: dict[str, tuple[str, str]] = {
+    "run": ("daq_cli.commands.run", "Run an experiment and record its trace."),
+    "stop": ("daq_cli.commands.stop", "Stop every moving robot, at once."),
+    "reset": ("daq_cli.commands.reset", "End the freeze of a stop; nothing moves."),
+    "status": ("daq_cli.commands.status", "What the robot and its link say now."),
+    "ports": ("daq_cli.commands.ports", "Serial ports that could be a robot."),
+    "gains": ("daq_cli.commands.gains", "Show or set the controller's PID gains."),
+    "io": ("daq_cli.commands.process_io", "Process inputs and outputs, and the gripper."),
+    "teach": ("daq_cli.commands.teach", "Jog, lead by the nose, steps, and playing back."),
+    "calibrate": ("daq_cli.commands.calibrate", "Find what the machine really does."),
+    "serve": ("daq_cli.commands.serve", "Serve experiments and traces to people and programs."),
+    "queue": ("daq_cli.commands.queue", "The queue of a server's robot: show, pause, resume."),
+    "token": ("daq_cli.commands.token", "Tokens of the service: make, list, revoke."),
+    "backup": ("daq_cli.commands.backup", "Everything that a service keeps, in one file."),
+    "restore": ("daq_cli.commands.restore", "Bring a backup back."),
+    "traces": ("daq_cli.commands.traces", "List, show, plot, convert and verify traces."),
+    "config": ("daq_cli.commands.config", "Show and check the configuration."),
+    "mock": ("daq_cli.commands.mock", "Start a mock controller that others can connect to."),
+    "fit": ("daq_cli.commands.fit", "A model's parameters from traces."),
+    "validate": ("daq_cli.commands.validate", "What must move for a model to explain traces."),
+    "sensitivity": ("daq_cli.commands.sensitivity", "Which parameter moves which joint's response, and when."),
+    "simulate": ("daq_cli.commands.simulate", "What a model does where a trace was recorded."),
+    "compare": ("daq_cli.commands.compare", "Several models beside the same traces."),
+    "diagnose": ("daq_cli.commands.diagnose", "Name the effect that a model lacks, add it, show the gap shrink."),
+    "design": ("daq_cli.commands.design", "Experiments that make parameters best known."),
+    "thesis": ("daq_cli.commands.thesis", "The 1991 source reproduced, ours beside the published."),
+    "blind": ("daq_cli.commands.blind", "Effects hidden in the mock, diagnosed blindly, scored."),
+    "demo": ("daq_cli.commands.demo", "The ramp step on the mock, from command to plot."),
+}
+
+HERE = frozenset({
+    "ports", "serve", "token", "backup", "restore", "config", "mock", "simulate", "sensitivity", "design", "thesis",
+    "blind", "demo",
+})  # fmt: skip
+"""Subcommands that are about this computer alone: `--server` is refused, DAQ_SERVER does not concern them."""
+
+
+class LazyGroup(typer.core.TyperGroup):
+    """Lists subcommands by name and one line; imports the one that is called."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        for name, (_, line) in SUBCOMMANDS.items():
+            self.add_command(typer.core.TyperCommand(name, help=line))
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """In the order of the table, which is the order of use."""
+        del ctx
+        return list(SUBCOMMANDS)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that `args` names, imported now."""
+        if args and args[0] in SUBCOMMANDS:
+            module = import_module(SUBCOMMANDS[args[0]][0])
+            command = typer.main.get_command(module.app)
+            command.name = args[0]
+            _without_rich(command)
+            self.add_command(command, args[0])
+        return super().resolve_command(ctx, args)
+
+
+def _without_rich(command: Any) -> None:
+    """Help of every level looks alike, and none of it loads rich."""
+    command.rich_markup_mode = None
+    for sub in getattr(command, "commands", {}).values():
+        _without_rich(sub)

@@ -1,0 +1,36 @@
+"""`daq backup`: everything that a service keeps, in one file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from daq_cli.app.context import JsonOption, console, invocation, print_json
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def backup(
+    context: typer.Context,
+    file: Annotated[Path, typer.Argument(help="Where the backup goes, a .zip file that is not there yet.")],
+    json: JsonOption = False,
+) -> None:
+    """Copy the service's database, traces, models and results into one file; the service may go on meanwhile."""
+    from daq_cli.models.model_progress import shown_progress
+    from server.backup.places import places_of
+    from server.backup.write import back_up
+    from server.clock import SystemClock
+
+    places = places_of(invocation(context).settings)
+    with shown_progress("backup") as tell:
+        made = back_up(places, file, SystemClock().utc(), tell)
+    if json:
+        print_json({"file": file, **made.model_dump(mode="json", exclude={"files"}), "bytes": made.size,
+                    "traces": made.count("traces"), "models": made.count("models")})  # fmt: skip
+        return
+    for name in made.left_out:
+        console().print(f"left out, deleted meanwhile: {name}", markup=False)
+    print(f"{file}: {made.count('traces')} traces, {made.count('models')} models, {made.size / 1e6:.1f} MB")

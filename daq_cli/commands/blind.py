@@ -1,0 +1,125 @@
+"""`daq blind`: hides effects in the mock, diagnoses blindly, reveals and scores."""
+
+from __future__ import annotations
+
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import load_machine
+from daq_cli.app.context import JsonOption, console, print_json
+
+if TYPE_CHECKING:
+    from daq_cli.trial.campaign import Campaign
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def blind(
+    context: typer.Context,
+    folder: Annotated[Path, typer.Option(help="Where everything is kept; a trial that was broken off goes on there.")],
+    seeds: Annotated[str | None, typer.Option(help="Numbers of arms: FIRST:LAST, or with commas.")] = None,
+    cases: Annotated[int | None, typer.Option(min=1, help="No more than so many of them, kinds mixed.")] = None,
+    kinds: Annotated[
+        str, typer.Option(help="Of clean, single, open-set, pair, shared, wrong-priors.")
+    ] = "clean,single,open-set",
+    loads: Annotated[
+        str, typer.Option(help="Loads that the arms carry, in turn: nominal, light, heavy.")
+    ] = "nominal,nominal,nominal,light,heavy",
+    experiment: Annotated[
+        Literal["diagnostic", "ramp"], typer.Option(help="The 55 s set, or the ramp step alone, 8 s.")
+    ] = "diagnostic",
+    acquire: Annotated[
+        bool, typer.Option("--acquire", help="Let the diagnosis ask for experiments: 60 s more at most.")
+    ] = False,
+    registration: Annotated[
+        Path | None, typer.Option(help="A registered trial: its cases, its experiments, seeds that its commit draws.")
+    ] = None,
+    run: Annotated[str, typer.Option(help="Which of the registered trial's runs.")] = "diagnostic",
+    shard: Annotated[str, typer.Option(help="I/K: of K processes that share the folder, the I-th.")] = "1/1",
+    processes: Annotated[int, typer.Option(min=1, help="Cases at once.")] = 1,
+    until: Annotated[
+        Literal["detect", "record", "diagnose", "score"], typer.Option(help="The last stage to do.")
+    ] = "score",
+    hashes: Annotated[
+        bool, typer.Option("--hashes", help="Print what a registration has to hold; run nothing.")
+    ] = False,
+    json: JsonOption = False,
+) -> None:
+    """Hide effects in the mock, diagnose blindly, reveal, and score."""
+    from daq_cli.trial.campaign import Campaign
+    from daq_cli.trial.folder import TrialFolder
+    from daq_cli.trial.registered import to_register
+
+    if hashes:
+        print(to_register())
+        return
+    index, count = _shard(shard)
+    if registration is not None:
+        if seeds is not None:
+            raise SpecError("--seeds and --registration: name one of them; a registered trial draws its own")
+        if cases is not None:
+            raise SpecError("--cases and --registration: a registered run has the cases that it registers, all of them")
+        if own := [n for n in ("kinds", "loads", "experiment", "acquire") if _asked_for(context, n)]:
+            raise SpecError(f"--{own[0]} and --registration: a registered run has what it registers, and nothing else")
+        chosen, experiment, acquire, drawn = _registered(registration, run)
+    else:
+        if seeds is None:
+            raise SpecError("--seeds or --registration: one of them is needed")
+        chosen, drawn = _chosen(seeds, kinds, loads, cases), None
+    suffix = "" if count == 1 else f"-{index}of{count}"
+    kept = TrialFolder.open(folder, experiment, acquire, drawn, suffix)
+    mine = kept.in_order(chosen)[index - 1 :: count]
+    campaign = Campaign(kept, load_machine("ma2000"), until=until)
+    left = campaign.run(mine, processes, lambda number, said: console().print(f"{number}/{len(mine)}  {said}"))
+    _show(campaign, folder, as_json=json)
+    if left:
+        console().print(f"{left} cases are not done; the same command goes on with them")
+        raise typer.Exit(5)
+
+
+def _asked_for(context: typer.Context, option: str) -> bool:
+    source = context.get_parameter_source(option)
+    return source is not None and source.name == "COMMANDLINE"
+
+
+def _chosen(seeds: str, kinds: str, loads: str, cases: int | None) -> list[int]:
+    from model.trial.arms import KINDS, LOADS, arms, parse_choice, parse_numbers, some_of
+
+    found = arms(parse_numbers(seeds), parse_choice(kinds, KINDS, "kind"), parse_choice(loads, LOADS, "load"))
+    return found if cases is None else some_of(found, cases)
+
+
+def _registered(path: Path, run: str) -> tuple[list[int], Literal["diagnostic", "ramp"], bool, dict[str, str]]:
+    """Seeds, experiment, whether more may be asked for, and where all that comes from."""
+    from daq_cli.trial.registered import read_registration
+
+    registration, commit = read_registration(path, run)
+    chosen = registration.run(run)
+    origin = {"file": path.name, "sha256": sha256(path.read_bytes()).hexdigest(), "run": run, "commit": commit}
+    return registration.arms(run, commit), chosen.experiment, chosen.acquire, origin
+
+
+def _shard(text: str) -> tuple[int, int]:
+    index, _, count = text.partition("/")
+    if not (index.isdecimal() and count.isdecimal() and 1 <= int(index) <= int(count)):
+        raise SpecError(f"shard {text!r}: write I/K with 1 ≤ I ≤ K, such as 1/2")
+    return int(index), int(count)
+
+
+def _show(campaign: Campaign, folder: Path, *, as_json: bool) -> None:
+    from model.trial.cases import as_csv
+    from model.trial.markdown import as_markdown
+
+    table = campaign.table()
+    (folder / "cases.csv").write_text(as_csv(campaign.scores()), "utf-8")
+    (folder / "table.json").write_text(table.model_dump_json(indent=1) + "\n", "utf-8")
+    (folder / "table.md").write_text(as_markdown(table), "utf-8")
+    if as_json:
+        print_json(table.model_dump(mode="json"))
+    else:
+        print(as_markdown(table))

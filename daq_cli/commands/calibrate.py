@@ -1,0 +1,59 @@
+"""`daq calibrate`: what the machine really does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from daq_cli.app import completion
+from daq_cli.app.context import JsonOption, YesOption, invocation, print_json
+
+app = typer.Typer(add_completion=False, help="Find what the machine really does.", no_args_is_help=True)
+
+
+@app.callback()
+def calibrations() -> None:
+    """Find what the machine really does."""
+
+
+@app.command()
+def gain(
+    context: typer.Context,
+    joints: Annotated[
+        str, typer.Option(help="Joints to measure: 1-3, 1,3 or 2.", autocompletion=completion.joints)
+    ] = "1-3",
+    trace: Annotated[
+        str | None,
+        typer.Option(
+            help="Use this trace instead of moving: a file, a number, `last`.", autocompletion=completion.traces
+        ),
+    ] = None,
+    folder: Annotated[Path | None, typer.Option(help="Where the trace goes (default: configured folder).")] = None,
+    yes: YesOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Find the actual proportional gain from errors and powers at several postures, as the source did (section 6.5)."""
+    from daq.calibration import gain_experiment, gains_from_trace
+    from daq.contracts.experiment import parse_joints
+    from daq.traces.reader import read_trace
+    from daq_cli.robot.run_result import acquire_whole
+
+    call = invocation(context)
+    wanted = parse_joints(joints)
+    place = folder or call.trace_folder
+    if trace is None:
+        path = acquire_whole(call, gain_experiment(wanted), call.machine, place, yes).trace
+    else:
+        path = call.find_trace(place, trace)
+    measured = read_trace(path, call.trace_limits)
+    # counts and radians of a trace belong to the calibration that it was made with, whatever is configured by now
+    machine = measured.record.machine or call.machine
+    found = [one for one in gains_from_trace(measured, machine) if one.joint in wanted]
+    if json:
+        print_json({"trace": path, "gains": [one.as_data() for one in found]})
+        return
+    for one in found:
+        print(one)
+    print(f"trace: {path}")

@@ -1,0 +1,126 @@
+"""`daq compare`: several models beside the same traces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import shipped_machines
+from daq_cli.app.context import JsonOption, console, invocation, print_json, print_table
+from daq_cli.models.model_input import (
+    MODEL_HELP,
+    EffectFileOption,
+    ReportOption,
+    TraceFolderOption,
+    load_effects,
+    model_labels,
+    read_model,
+    read_traces,
+)  # fmt: skip
+from daq_cli.robot.remote.jobs import numbers_of, require_no_programs
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from model.comparison.agreement import ModelAgreement
+    from model.comparison.difference import ParameterDifference
+    from model.machine_model.model import Model
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def compare(
+    context: typer.Context,
+    names: Annotated[
+        list[str], typer.Argument(metavar="MODEL MODEL... TRACE...", help=f"Models, then traces. {MODEL_HELP}")
+    ],
+    report: ReportOption = None,
+    folder: TraceFolderOption = None,
+    effect_file: EffectFileOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Simulate the same traces with two or more models: whose error is smaller, where, and where the models differ.
+
+    A trace counts as held out when none of the models says that it was fitted to it.
+    """
+    from daq_cli.models.model_progress import shown_progress
+    from model.comparison.compare import compare
+    from model.comparison.difference import differences
+
+    call = invocation(context)
+    require_no_programs(effect_file, call)
+    load_effects(effect_file)
+    models, traces = _told_apart(names)
+    if len(models) < 2:
+        raise SpecError(f"{len(models)} model named: name at least two models (.json, .toml, ma2000), then traces")
+    found = read_traces(call, folder, traces)
+    read = [read_model(name) for name in models]
+    if call.server is not None:
+        from daq_cli.robot.remote.compare import compare_at_server
+
+        there = compare_at_server(call, models, read, numbers_of(call, traces, found), report)
+        _tell(there.models, there.differences, as_json=json)
+        return
+    held_out = _held_out(read, [t.record.trace_id for t in found])
+    with shown_progress("comparing") as tell:
+        comparison = compare(list(zip(model_labels(models), read, strict=True)), found, held_out, progress=tell)
+    differing = differences(read)
+    _tell(comparison.models, differing, as_json=json)
+    if report is not None:
+        from model.reports.comparison_report import comparison_report
+        from model.reports.page import write_report
+
+        console().print(f"report: {write_report(comparison_report(comparison, differing), report)}")
+
+
+def _told_apart(names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Models are what ends in .json or .toml and machines that ship; everything else is a trace."""
+    models = [n for n in names if n.endswith((".json", ".toml")) or n in shipped_machines()]
+    return models, [n for n in names if n not in models]
+
+
+def _held_out(models: Sequence[Model], traces: Sequence[str]) -> list[str] | None:
+    fitted = {trace for model in models for trace in model.lineage.traces}
+    return [trace for trace in traces if trace not in fitted] if fitted else None
+
+
+def _tell(models: Sequence[ModelAgreement], differing: Sequence[ParameterDifference], *, as_json: bool) -> None:
+    from daq_cli.models.agreement_table import agreement_data, print_agreement
+    from model.reports.units import squared
+
+    if as_json:
+        print_json({
+            "models": agreement_data(models),
+            "mean_squared_error": _errors(models),
+            "differences": [d.model_dump(mode="json") for d in differing],
+        })  # fmt: skip
+        return
+    print_agreement(models)
+    unit = squared(joint.unit for model in models for trace in model.traces for joint in trace.joints)
+    for label, by_kind in _errors(models).items():
+        told = ", ".join(f"{kind.replace('_', ' ')} {e:.4g} {unit}" for kind, e in by_kind.items() if e is not None)
+        print(f"{label}: mean squared error summed over the joints, {told}")
+    _print_differences(differing, [model.label for model in models])
+
+
+def _errors(models: Sequence[ModelAgreement]) -> dict[str, dict[str, float | None]]:
+    return {
+        m.label: {"in_sample": m.mean_squared_error("in_sample"), "held_out": m.mean_squared_error("held_out")}
+        for m in models
+    }
+
+
+def _print_differences(differing: Sequence[ParameterDifference], labels: Sequence[str]) -> None:
+    from rich.table import Table
+
+    table = Table(box=None, header_style="bold")
+    table.add_column("parameter")
+    for label in (*labels, "in expected deviations"):
+        table.add_column(label, justify="right")
+    for d in differing:
+        values = ("–" if v is None else f"{v:.5g} {d.unit}" for v in d.values)
+        table.add_row(d.name, *values, "–" if d.deviations is None else f"{d.deviations:.2f}")
+    print_table(table, 120)

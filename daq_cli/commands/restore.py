@@ -1,0 +1,54 @@
+"""`daq restore`: a backup, back to where the configuration has everything."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from daq.contracts.errors import SpecError
+from daq_cli.app.context import JsonOption, console, invocation, print_json
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def restore(
+    context: typer.Context,
+    file: Annotated[Path, typer.Argument(help="A file that `daq backup` has made.")],
+    check: Annotated[bool, typer.Option("--check", help="Read every byte of it, and change nothing.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Put aside what is there: into folders before-restore-….")
+    ] = False,
+    json: JsonOption = False,
+) -> None:
+    """Bring back the database, traces, models and results of a backup. The service must not run."""
+    from daq_cli.models.model_progress import shown_progress
+    from server.backup.manifest import verify
+    from server.backup.places import places_of
+    from server.backup.restore import restore as bring_back
+    from server.clock import SystemClock
+
+    if file.exists() and not file.is_file():
+        raise SpecError(f"{file}: is no file, so no backup")
+    put_aside: list[str] = []
+    if check:
+        with shown_progress("checking") as tell:
+            found = verify(file, tell)
+        what = "is as it was written"
+    else:
+        places = places_of(invocation(context).settings)
+        with shown_progress("restore") as tell:
+            done = bring_back(file, places, SystemClock().utc(), tell, overwrite=overwrite)
+        put_aside = [str(folder) for folder in done.put_aside]
+        found, what = done.manifest, "was brought back"
+    if json:
+        counted = {"bytes": found.size, "traces": found.count("traces"), "models": found.count("models")}
+        told = found.model_dump(mode="json", exclude={"files"})
+        print_json({"file": file, "restored": not check, "put_aside": put_aside, **told, **counted})
+        return
+    for folder in put_aside:
+        console().print(f"put aside what was there: {folder}", markup=False)
+    counts = f"{found.count('traces')} traces, {found.count('models')} models, {found.size / 1e6:.1f} MB"
+    print(f"{file} of {found.created:%Y-%m-%d %H:%M:%S %Z} {what}: {counts}")

@@ -1,0 +1,243 @@
+"""`daq run`: one subcommand a kind of trajectory, its options made from the kind's own fields."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from pathlib import Path
+from types import NoneType
+from typing import Annotated, Any, get_args
+
+import typer
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from daq.contracts import experiment
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import ExperimentSpec, parse_joints, parse_spec
+from daq_cli.app import completion
+from daq_cli.app.context import JsonOption, YesOption, invocation, print_json
+from daq_cli.app.quantities import parse_angle, parse_gains, parse_per_joint_angles
+
+app = typer.Typer(add_completion=False, help="Run an experiment and record its trace.", no_args_is_help=True)
+
+KINDS: dict[str, type[BaseModel]] = {
+    "ramp": experiment.Ramp,
+    "step": experiment.Step,
+    "staircase": experiment.Staircase,
+    "slow-ramp": experiment.SlowRamp,
+    "sine": experiment.Sine,
+    "multisine": experiment.Multisine,
+    "cubic": experiment.Cubic,
+    "via": experiment.Via,
+    "pick-and-place": experiment.PickAndPlace,
+}
+_IN_SHORT = {
+    "ramp": "Equal increments, all joints arriving together.",
+    "step": "The whole amplitude in one set point.",
+    "staircase": "Equal steps up, and down again.",
+    "slow-ramp": "Constant low speed, with reversals.",
+    "sine": "A sine about the start posture.",
+    "multisine": "Many sines at once, with seeded phases.",
+    "cubic": "Cubic in time, at rest at both ends.",
+    "via": "Cubic segments through via points.",
+    "pick-and-place": "4-3-4: lifted off, over, and set down.",
+}
+_HELP = {
+    "duration": "Seconds.",
+    "period": "Seconds.",
+    "dwell": "Seconds on each step.",
+    "steps": "Number of steps one way.",
+    "back": "Down again afterwards.",
+    "reversals": "Changes of direction.",
+    "cycles": "Periods of the sine.",
+    "lowest": "Lowest frequency in Hz.",
+    "highest": "Highest frequency in Hz.",
+    "tones": "Number of sines.",
+    "seed": "Of the phases.",
+    "lift": "Metres of the lift-off and set-down points above the ends.",
+    "pick": "Seconds up to the lift-off point.",
+    "travel": "Seconds from the lift-off to the set-down point.",
+    "place": "Seconds down from the set-down point.",
+}
+_ANGLES = {"phase": "degrees", "speed": "degrees/s"}
+
+JointsOption = Annotated[str, typer.Option(help="Joints that move: 1-3, 1,3 or 2.", autocompletion=completion.joints)]
+StartOption = Annotated[str | None, typer.Option(help="Start angles, such as 1=180,2=45 (degrees).")]
+GainsOption = Annotated[str | None, typer.Option(help="Gains P/I/D, such as 1=2/0/0,2=2/0/0 (each 0-20).")]
+SettleOption = Annotated[float, typer.Option(help="Seconds held before the motion, recorded.")]
+HoldOption = Annotated[float, typer.Option(help="Seconds held after the motion, recorded.")]
+RepeatsOption = Annotated[int, typer.Option(help="How often the motion is made.")]
+RecordOption = Annotated[str | None, typer.Option(help="Joints to record (default: all the line has room for).")]
+NameOption = Annotated[str | None, typer.Option(help="A name for the experiment.")]
+OperatorOption = Annotated[str | None, typer.Option(help="Who runs it.")]
+NotesOption = Annotated[str, typer.Option(help="Anything worth knowing later.")]
+FolderOption = Annotated[Path | None, typer.Option(help="Where the trace goes (default: configured folder).")]
+DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Check and show the motion; connect to nothing.")]
+
+COMMON: dict[str, tuple[Any, Any]] = {
+    "joints": (JointsOption, "1-3"),
+    "start": (StartOption, None),
+    "gains": (GainsOption, None),
+    "settle": (SettleOption, 0.5),
+    "hold": (HoldOption, 2.0),
+    "repeats": (RepeatsOption, 1),
+    "record": (RecordOption, None),
+    "name": (NameOption, None),
+    "operator": (OperatorOption, None),
+    "notes": (NotesOption, ""),
+}
+EXECUTION: dict[str, tuple[Any, Any]] = {
+    "folder": (FolderOption, None),
+    "dry_run": (DryRunOption, False),
+    "yes": (YesOption, False),
+    "json": (JsonOption, False),
+}
+
+
+def _option(name: str, field: FieldInfo) -> tuple[Any, Any]:
+    """Type and default of the option that stands for a field of a trajectory."""
+    default = field.get_default()
+    if name == "amplitude":
+        return Annotated[str, typer.Option(help="Degrees, or one a joint: 1=21.6,2=-10.")], f"{_degrees(default)}"
+    if name == "points":
+        text = "Degrees from the start, a point after the other: 10;20 or, one a joint, 1=10,2=5;1=20,2=0."
+        return Annotated[str, typer.Option(help=text)], inspect.Parameter.empty
+    if name == "times":
+        return Annotated[
+            str, typer.Option(help="Seconds at which the points are passed: 1,2.5.")
+        ], inspect.Parameter.empty
+    if name in _ANGLES:
+        return Annotated[str, typer.Option(help=f"In {_ANGLES[name]}.")], f"{_degrees(default)}"
+    kind = field.annotation
+    if NoneType in get_args(kind):
+        raise TypeError(f"trajectory field {name}: optional fields have no option")
+    return Annotated[kind, typer.Option(help=_HELP.get(name, ""))], default
+
+
+def _degrees(radians: float) -> float:
+    return round(math.degrees(radians), 6)
+
+
+def _trajectory(kind: type[BaseModel], values: dict[str, Any]) -> dict[str, Any]:
+    data: dict[str, Any] = {"kind": kind.model_fields["kind"].default}
+    for name in kind.model_fields:
+        if name == "amplitude":
+            data[name] = parse_per_joint_angles(values[name], name)
+        elif name == "points":
+            data[name] = [parse_per_joint_angles(point, "point") for point in values[name].split(";")]
+        elif name == "times":
+            data[name] = [part.strip() for part in values[name].split(",")]
+        elif name in _ANGLES:
+            data[name] = parse_angle(values[name].removesuffix("/s"), name)
+        elif name != "kind":
+            data[name] = values[name]
+    return data
+
+
+def spec_from_options(trajectory: dict[str, Any], values: dict[str, Any], operator: str | None) -> ExperimentSpec:
+    """The experiment that the common options describe. Raises SpecError."""
+    data: dict[str, Any] = {"trajectory": trajectory, "joints": parse_joints(values["joints"])}
+    if values["start"] is not None:
+        start = parse_per_joint_angles(values["start"], "start")
+        if not isinstance(start, dict):
+            raise SpecError(f"start {values['start']!r}: write joint=angle pairs like 1=180,2=45")
+        data["start"] = start
+    if values["gains"] is not None:
+        data["gains"] = parse_gains(values["gains"])
+    if values["record"] is not None:
+        data["record"] = parse_joints(values["record"])
+    for name in ("settle", "hold", "repeats", "name", "notes"):
+        data[name] = values[name]
+    data["operator"] = values["operator"] or operator
+    return parse_spec(data)
+
+
+def _carry_out(context: typer.Context, spec: ExperimentSpec, values: dict[str, Any]) -> None:
+    from daq_cli.robot.run_result import carry_out
+
+    carry_out(
+        invocation(context),
+        spec,
+        folder=values["folder"],
+        dry_run=values["dry_run"],
+        consent=values["yes"],
+        as_json=values["json"],
+    )
+
+
+def _command(kind: type[BaseModel]) -> Callable[..., None]:
+    """The function behind `daq run KIND`: typer reads its signature, which is made from the kind's fields."""
+
+    def command(context: typer.Context, **values: Any) -> None:
+        operator = invocation(context).settings.operator
+        _carry_out(context, spec_from_options(_trajectory(kind, values), values, operator), values)
+
+    own = {name: _option(name, field) for name, field in kind.model_fields.items() if name != "kind"}
+    options = {**own, **COMMON, **EXECUTION}
+    parameters = [inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context)]
+    parameters += [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+        for name, (annotation, default) in options.items()
+    ]
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {p.name: p.annotation for p in parameters}
+    command.__doc__ = kind.__doc__
+    return command
+
+
+for _name, _kind in KINDS.items():
+    app.command(_name, short_help=_IN_SHORT[_name])(_command(_kind))
+
+
+@app.command("spec")
+def from_file(
+    context: typer.Context,
+    file: Annotated[Path, typer.Argument(help="An experiment as JSON or TOML, angles in rad.")],
+    folder: FolderOption = None,
+    dry_run: DryRunOption = False,
+    yes: YesOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Run an experiment from a file: any kind, also paths and sequences."""
+    from daq_cli.models.spec_file import read_spec
+
+    _carry_out(context, read_spec(file), {"folder": folder, "dry_run": dry_run, "yes": yes, "json": json})
+
+
+@app.command("preset")
+def by_name(
+    context: typer.Context,
+    name: Annotated[
+        str, typer.Argument(help="Name of a preset; none lists them.", autocompletion=completion.presets)
+    ] = "",
+    folder: FolderOption = None,
+    dry_run: DryRunOption = False,
+    yes: YesOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Run an experiment that has a name, such as `diagnostic`; without a name, list them."""
+    from daq.trajectories.presets import PRESETS, preset
+
+    if not name:
+        if json:
+            print_json([{"name": known, "description": one.description} for known, one in PRESETS.items()])
+            return
+        for known, one in PRESETS.items():
+            print(f"{known:14s} {one.description}")
+        return
+    values = {"folder": folder, "dry_run": dry_run, "yes": yes, "json": json}
+    _carry_out(context, preset(name).spec, values)
+
+
+@app.command()
+def diagnostic(
+    context: typer.Context,
+    folder: FolderOption = None,
+    dry_run: DryRunOption = False,
+    yes: YesOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Run the set of about 55 s that tells hidden effects apart (the preset of that name)."""
+    by_name(context, "diagnostic", folder, dry_run, yes, json)

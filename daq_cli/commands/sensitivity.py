@@ -1,0 +1,124 @@
+"""`daq sensitivity`: which parameter moves which joint's response, how much, and when."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from daq.contracts.errors import SpecError
+from daq_cli.app.context import JsonOption, console, invocation, print_json, print_table
+from daq_cli.app.output_file import check_folder, replacing
+from daq_cli.models.effect_choice import patterns
+from daq_cli.models.model_input import (
+    MODEL_HELP,
+    EffectFileOption,
+    ReportOption,
+    TraceFolderOption,
+    load_effects,
+    model_label,
+    read_model,
+    read_traces,
+)
+
+if TYPE_CHECKING:
+    from daq.contracts.machine import Machine
+    from model.analysis.sensitivity import SensitivityCurves
+
+app = typer.Typer(add_completion=False)
+
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def _file(path: Path | None) -> Path | None:
+    """Refuses another kind of file, and one that cannot be made, before anything is computed."""
+    if path is not None:
+        if path.suffix not in (".csv", *PICTURES):
+            raise SpecError(f"--output {path}: curves are written as .csv, or as a picture ({', '.join(PICTURES)})")
+        check_folder(path, "--output")
+    return path
+
+
+@app.command()
+def sensitivity(
+    context: typer.Context,
+    model: Annotated[str, typer.Argument(help=MODEL_HELP)],
+    trace: Annotated[
+        str, typer.Argument(help="A file (.mcap, .csv), the beginning of a trace's number or name, `last`.")
+    ],
+    parameters: Annotated[
+        str | None, typer.Option(help="Names or patterns (default: those that were fitted, else all uncertain).")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", callback=_file, help="The curves: .csv, or .png, .svg, .pdf.")
+    ] = None,
+    open_loop: Annotated[
+        bool, typer.Option("--open-loop", help="Apply the recorded drive: no controller makes up for a change.")
+    ] = False,
+    report: ReportOption = None,
+    folder: TraceFolderOption = None,
+    effect_file: EffectFileOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Show how each joint's reading changes along a trace when a parameter is off by what may be expected.
+
+    The change is exact to first order, and each parameter changes alone. A parameter whose curve stays within the noise
+    of a reading cannot be found from this trace; two whose curves have one shape cannot be told apart.
+    """
+    from daq_cli.models.model_progress import shown_progress
+    from model.analysis.sensitivity import sensitivity_curves
+    from model.simulation.simulate import Options
+    from model.validation.names import names_to_validate
+
+    load_effects(effect_file)
+    (read,) = read_traces(invocation(context), folder, [trace])
+    chosen = read_model(model)
+    names = names_to_validate(chosen, patterns(parameters))
+    with shown_progress("sensitivities") as tell:
+        tell(0.0, f"{len(names)} parameters")
+        found = sensitivity_curves(chosen, read, names, options=Options(loop="open" if open_loop else "closed"))
+    if json:
+        print_json(found.model_dump(mode="json"))
+    else:
+        print(f"{model_label(model)} ({found.model}), {found.trace}: largest change of each joint's reading, and when")
+        _print(found, chosen.machine)
+    if output is not None:
+        _write(found, chosen.machine, output)
+        console().print(f"curves: {output}")
+    if report is not None:
+        from model.reports.page import write_report
+        from model.reports.sensitivity_report import sensitivity_report
+
+        page = sensitivity_report(model_label(model), found, chosen.machine)
+        console().print(f"report: {write_report(page, report)}")
+
+
+def _print(found: SensitivityCurves, machine: Machine) -> None:
+    from rich.table import Table
+
+    from model.reports.sensitivity_report import largest_change
+
+    table = Table(box=None, header_style="bold")
+    for name in ("parameter", "changes by", *(f"joint {joint}" for joint in found.joints)):
+        table.add_column(name, justify="left" if name == "parameter" else "right")
+    for curve in found.curves:
+        moved = [largest_change(found, curve, k, machine) for k in range(len(found.joints))]
+        table.add_row(curve.name, f"{curve.expected:.3g} {curve.unit}", *moved)
+    print_table(table, 160)
+
+
+def _write(found: SensitivityCurves, machine: Machine, path: Path) -> None:
+    """Raises SpecError when the file cannot be written."""
+    if path.suffix in PICTURES:
+        from model.reports.sensitivity_report import save_curves
+
+        with replacing(path) as part:
+            save_curves(found, machine, part, path.suffix.removeprefix("."))
+        return
+    with replacing(path) as part, part.open("w", newline="", encoding="utf-8") as stream:
+        rows = csv.writer(stream, lineterminator="\n")
+        rows.writerow(["time", *(f"{c.name}@joint{joint}" for c in found.curves for joint in found.joints)])
+        series = [values for c in found.curves for values in c.by_joint]
+        rows.writerows([f"{t:.6f}", *(f"{v[k]:.9g}" for v in series)] for k, t in enumerate(found.time))

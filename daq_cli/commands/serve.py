@@ -1,0 +1,45 @@
+"""`daq serve`: the service, until a signal ends it."""
+
+from __future__ import annotations
+
+import logging
+from typing import Annotated
+
+import typer
+
+from daq_cli.app.context import invocation
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def serve(
+    context: typer.Context,
+    host: Annotated[str | None, typer.Option(help="Address to listen at (default: configured, 127.0.0.1).")] = None,
+    port: Annotated[int | None, typer.Option(min=0, max=65535, help="Port to listen at; 0 for any free one.")] = None,
+) -> None:
+    """Serve experiments, traces and the dashboard to people and programs."""
+    from daq.transport.url import parse_port_url
+    from server import logs
+
+    logs.begin()  # first: what is wrong with the configuration is a line of the log, too
+    call = invocation(context)
+    settings = call.settings
+    section = settings.server.model_copy(
+        update={key: value for key, value in (("host", host), ("port", port)) if value is not None}
+    )
+    parse_port_url(call.port)  # a port that is none does not become one by trying again
+    from server.serve import serve as run
+
+    robot = settings.robot.model_copy(update={"port": call.port})
+    run(settings.model_copy(update={"server": section, "robot": robot}), _tell)
+
+
+def _tell(address: str) -> None:
+    from server.page import NOT_BUILT, is_built
+
+    log = logging.getLogger("server")
+    log.info("serving %s (Ctrl-C ends it)", address)
+    if not is_built():
+        log.warning(NOT_BUILT)
+    print(address, flush=True)

@@ -1,0 +1,127 @@
+"""`daq simulate`: what a model does with the set points, or the drive, of recorded traces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from daq.contracts.errors import SpecError
+from daq_cli.app.context import JsonOption, console, invocation, print_json
+from daq_cli.app.csv_output import check_csv, write_csv
+from daq_cli.app.output_file import check_folder
+from daq_cli.models.model_input import (
+    MODEL_HELP,
+    EffectFileOption,
+    ReportOption,
+    TraceFolderOption,
+    TracesArgument,
+    load_effects,
+    model_label,
+    read_model,
+    read_traces,
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    from daq.contracts.trace import Trace
+    from model.machine_model.model import Model
+    from model.simulation.simulate import Options
+
+app = typer.Typer(add_completion=False)
+
+OutputOption = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", help="The simulated trace: .csv, .mcap, or a picture (.png, .svg, .pdf)."),
+]
+
+
+@app.command()
+def simulate(
+    context: typer.Context,
+    model: Annotated[str, typer.Argument(help=MODEL_HELP)],
+    traces: TracesArgument,
+    output: OutputOption = None,
+    open_loop: Annotated[
+        bool, typer.Option("--open-loop", help="Apply the recorded drive instead of closing the loop.")
+    ] = False,
+    no_rounding: Annotated[
+        bool, typer.Option("--no-rounding", help="Leave readings and power unrounded, as no board does.")
+    ] = False,
+    report: ReportOption = None,
+    folder: TraceFolderOption = None,
+    effect_file: EffectFileOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Simulate traces from their recorded set points, and show what is left between measured and simulated.
+
+    Nothing is fitted. A machine is taken as its file has it, with the friction it states.
+    """
+    from daq_cli.models.agreement_table import agreement_data, print_agreement
+    from daq_cli.models.model_progress import shown_progress
+    from model.comparison.compare import compare
+    from model.simulation.simulate import Options
+
+    call = invocation(context)
+    load_effects(effect_file)
+    found = read_traces(call, folder, traces)
+    if output is not None and len(found) != 1:
+        raise SpecError(f"--output {output}: is for one trace, {len(found)} are named")
+    if output is not None:
+        check_folder(output, "--output")
+        if output.suffix == ".csv":
+            check_csv(output)
+    chosen = read_model(model)
+    options = Options(loop="open" if open_loop else "closed", quantise=not no_rounding)
+    with shown_progress("simulating") as tell:
+        comparison = compare([(model_label(model), chosen)], found, options=options, progress=tell)
+    if json:
+        print_json({"model": chosen.identity, "agreement": agreement_data(comparison.models)[0]})
+    else:
+        print(f"measured − simulated, {model_label(model)} ({chosen.identity}), nothing fitted:")
+        print_agreement(comparison.models)
+    if output is not None:
+        console().print(f"simulated trace: {_written(_simulated(chosen, found[0], options), output)}")
+    if report is not None:
+        from model.reports.comparison_report import comparison_report
+        from model.reports.page import write_report
+
+        console().print(f"report: {write_report(comparison_report(comparison), report)}")
+
+
+def _simulated(model: Model, trace: Trace, options: Options) -> Trace:
+    """The trace that the model would have left."""
+    from daq.contracts.trace import Trace
+    from model.simulation.simulate import simulate
+
+    run = simulate(model, trace, options)
+    columns = [trace.column(j) for j in run.joints]
+    record = trace.record.model_copy(
+        update={
+            "trace_id": f"{trace.record.trace_id}-simulated",
+            "source": "imported",
+            "software": f"{trace.record.software}; simulated with model {model.identity}",
+            "notes": f"simulated with model {model.identity} from trace {trace.record.trace_id}",
+            "counters": {},
+        }
+    )
+    made = Trace(
+        record, run.joints, trace.time, run.at_samples(run.reading), error=run.at_samples(run.error),
+        drive=run.at_samples(run.drive), velocity=run.at_samples(run.velocity), tick=trace.tick,
+    )  # fmt: skip
+    if trace.set_point is None:
+        return replace(made, error=None)
+    return replace(made, set_point=trace.set_point[:, columns])
+
+
+def _written(trace: Trace, path: Path) -> Path:
+    if path.suffix == ".csv":
+        return write_csv(trace, path)
+    if path.suffix == ".mcap":
+        from daq.traces.store import write_trace
+
+        return write_trace(trace, path)
+    from daq.traces.plot import plot_trace
+
+    return plot_trace(trace, path)

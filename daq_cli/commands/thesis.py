@@ -1,0 +1,74 @@
+"""`daq thesis`: the 1991 source reproduced, ours beside the published."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from daq_cli.app import completion
+from daq_cli.app.context import Invocation, JsonOption, console, invocation, print_json
+from daq_cli.models.model_input import ReportOption, read_traces
+
+if TYPE_CHECKING:
+    from daq.contracts.trace import Trace
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def thesis(
+    context: typer.Context,
+    trace: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Use this trace of the ramp instead of a new one. May be repeated.", autocompletion=completion.traces
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the mock's noise.")] = 1991,
+    nelder_mead: Annotated[
+        bool, typer.Option("--nelder-mead/--no-nelder-mead", help="Fit as the source did, too; takes minutes.")
+    ] = True,
+    folder: Annotated[Path | None, typer.Option(help="Keep the new trace here (default: it is not kept).")] = None,
+    report: ReportOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Reproduce the source: its sums recomputed, its four models fitted, its figures and control runs.
+
+    The trace is of the mock's arm, which has the complete friction of table 7.9, recorded in lock-step as any
+    experiment is; the measured traces of 1991 are lost.
+    """
+    from daq_cli.models.model_progress import shown_progress
+    from model.thesis.reproduction import reproduce_thesis
+    from model.thesis.text import as_text
+
+    traces = read_traces(invocation(context), folder, trace) if trace else [recorded_ramp(seed, folder)]
+    with shown_progress("reproducing") as tell:
+        found = reproduce_thesis(
+            traces, ("nelder_mead", "least_squares") if nelder_mead else ("least_squares",), progress=tell
+        )
+    if json:
+        print_json(found.model_dump(mode="json"))
+    else:
+        print(as_text(found))
+    if report is not None:
+        from model.reports.page import write_report
+        from model.reports.thesis_report import thesis_report
+
+        console().print(f"report: {write_report(thesis_report(found), report)}")
+
+
+def recorded_ramp(seed: int, folder: Path | None = None) -> Trace:
+    """The ramp of section 6.5 on a mock of its own, in lock-step: the same seed gives the same record."""
+    from daq.contracts.experiment import ExperimentSpec
+    from daq.contracts.machine import load_machine
+    from daq.traces.reader import read_trace
+    from daq_cli.robot.run_result import acquire_whole
+
+    spec = ExperimentSpec(name="thesis-ramp", notes="made by `daq thesis`")
+    call = Invocation(port_option=f"mock://?seed={seed}&lock_step=1")
+    with TemporaryDirectory() as temporary:
+        finished = acquire_whole(call, spec, load_machine("ma2000"), folder or Path(temporary), consent=False)
+        return read_trace(finished.trace)

@@ -1,0 +1,71 @@
+"""`daq token`: who may use the service from elsewhere."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from daq.contracts.documents import shown
+from daq.contracts.errors import SpecError
+from daq_cli.app.context import Invocation, JsonOption, console, invocation, print_json
+
+if TYPE_CHECKING:
+    from server.access.tokens import TokenStore
+
+app = typer.Typer(add_completion=False, help="Tokens of the service: make, list, revoke.", no_args_is_help=True)
+
+NameArgument = Annotated[str, typer.Argument(help="Whose it is: a person or a program.")]
+
+
+@app.command()
+def add(
+    context: typer.Context,
+    name: NameArgument,
+    role: Annotated[
+        Literal["viewer", "operator"], typer.Option(help="A viewer may look, and stop the robot.")
+    ] = "viewer",
+) -> None:
+    """Make a token. It is shown this once; only its hash is kept."""
+    from server.clock import SystemClock
+
+    _require_name(name)
+    token = _tokens(invocation(context)).add(name, role, SystemClock().utc())
+    console().print(f"token of {name} ({role}); it is not shown again:")
+    print(token)
+
+
+@app.command()
+def ls(context: typer.Context, json: JsonOption = False) -> None:
+    """List tokens by name."""
+    found = _tokens(invocation(context)).all()
+    if json:
+        print_json([{"name": t.name, "role": t.role, "created": t.created, "revoked": t.revoked} for t in found])
+        return
+    for token in found:
+        state = "" if token.revoked is None else f"   revoked {token.revoked:%Y-%m-%d}"
+        print(f"{token.name:20} {token.role:9} {token.created:%Y-%m-%d}{state}")
+
+
+@app.command()
+def revoke(context: typer.Context, name: NameArgument) -> None:
+    """Revoke a token: it opens nothing any more, within two seconds."""
+    from server.clock import SystemClock
+
+    _require_name(name)
+    _tokens(invocation(context)).revoke(name, SystemClock().utc())
+    print(f"token of {name} revoked")
+
+
+def _require_name(name: str) -> None:
+    if not 1 <= len(name) <= 64 or not name.isprintable():
+        raise SpecError(f"token {shown(name)}: a name has 1 to 64 printable characters")
+
+
+def _tokens(call: Invocation) -> TokenStore:
+    from server.access.tokens import TokenStore
+    from server.store.engine import Store
+
+    store = Store(call.settings.server.database_url)
+    store.migrate()
+    return TokenStore(store)

@@ -1,0 +1,288 @@
+"""`daq traces`: what has been recorded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from daq.contracts.errors import SpecError, TraceError
+from daq_cli.app import completion
+from daq_cli.app.context import Invocation, JsonOption, console, invocation, print_json, print_table, printable
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from daq.contracts.trace import Trace, TraceRecord
+    from daq.traces.catalogue import TraceSummary
+    from daq.traces.salvage import Salvaged
+
+app = typer.Typer(add_completion=False, help="List, show, plot, convert and verify traces.", no_args_is_help=True)
+
+TraceArgument = Annotated[
+    str,
+    typer.Argument(
+        help="A file, the beginning of a trace's number or name, or `last`.", autocompletion=completion.traces
+    ),
+]
+FolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (default: the configured one).")]
+
+EXIT_NOT_TRUSTWORTHY = 5
+SHOWN_DIGITS = 8
+"""Of a trace's number in the list, which then fits into 80 columns; the beginning of a number names the trace."""
+
+
+def _folder(call: Invocation, folder: Path | None) -> Path:
+    return folder or call.trace_folder
+
+
+def _path(context: typer.Context, wanted: str, folder: Path | None) -> Path:
+    call = invocation(context)
+    return call.find_trace(_folder(call, folder), wanted)
+
+
+def _read(context: typer.Context, wanted: str, folder: Path | None) -> tuple[Path, Trace]:
+    from daq.traces.reader import read_trace
+
+    path = _path(context, wanted, folder)
+    return path, read_trace(path, invocation(context).trace_limits)
+
+
+@app.command("ls")
+def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOption = False) -> None:
+    """List traces, the oldest first."""
+    summaries, place = _summaries(invocation(context), folder)
+    if json:
+        print_json([summary.model_dump(mode="json") for summary in summaries])
+        return
+    if not summaries:
+        print(f"no traces in {place}")
+        return
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, header_style="bold")
+    for title in ("number", "recorded (UTC)", "what", "joints", "samples", "s", "outcome"):
+        table.add_column(title, no_wrap=True)
+    for one in summaries:
+        moment = one.created.strftime("%Y-%m-%d %H:%M") if one.created else "?"
+        ended = one.outcome or one.state
+        table.add_row(
+            printable((one.trace_id or one.path.name)[:SHOWN_DIGITS]),
+            moment,
+            printable(f"{one.name or one.kind or one.source or one.problem}"),
+            joints_text(one.joints),
+            "?" if one.samples is None else str(one.samples),
+            "?" if one.duration is None else f"{one.duration:.2f}",
+            Text(ended, "green" if ended == "complete" else "bold red"),
+        )
+    print_table(table)
+
+
+def _summaries(call: Invocation, folder: Path | None) -> tuple[Sequence[TraceSummary], str]:
+    """Traces and where they are."""
+    if call.server is not None:
+        from daq_cli.robot.remote.traces import summaries_at_server
+
+        return summaries_at_server(call), call.server
+    from daq.traces.catalogue import list_traces
+
+    place = _folder(call, folder)
+    return list_traces(place, call.trace_limits) if place.is_dir() else (), str(place)
+
+
+def joints_text(joints: tuple[int, ...]) -> str:
+    """`1-3` where joints follow each other, else `1,3`."""
+    if len(joints) > 1 and joints == tuple(range(joints[0], joints[-1] + 1)):
+        return f"{joints[0]}-{joints[-1]}"
+    return ",".join(map(str, joints))
+
+
+@app.command()
+def show(
+    context: typer.Context, trace: TraceArgument = "last", folder: FolderOption = None, json: JsonOption = False
+) -> None:
+    """Show what a trace says about itself, and its figures by joint."""
+    from daq.traces.summary import joint_figures
+
+    path, found = _read(context, trace, folder)
+    figures = joint_figures(found)
+    if json:
+        data = found.record.model_dump(mode="json", exclude={"machine", "memory_map"})
+        print_json({"path": path, "record": data, "samples": len(found), "missing": found.missing,
+                    "joints": [figure.model_dump() for figure in figures]})  # fmt: skip
+        return
+    record = found.record
+    what = record.spec.trajectory.kind if record.spec else "import"
+    print(printable(f"{record.trace_id}: {what} on {record.robot} ({record.source}), {_ended(record)}"))
+    print(printable(f"recorded {record.created:%Y-%m-%d %H:%M:%S %Z} with {record.software}"))
+    print(f"{len(found)} samples on joints {', '.join(map(str, found.joints))}, {found.missing} missing")
+    if record.operator or record.notes:
+        print(printable(f"operator {record.operator or '?'}: {record.notes}"))
+    print_figures(found)
+    for event in found.events:
+        print(printable(f"  {event.time:8.2f} s  {event.kind.replace('_', ' ')}: {event.message}"))
+    print(printable(f"file: {path}"))
+
+
+def print_figures(trace: Trace) -> None:
+    """The figures of every joint that moved, as a table on standard output."""
+    from rich.table import Table
+
+    from daq.traces.summary import joint_figures
+
+    table = Table(box=None, header_style="bold")
+    for title in (
+        "joint",
+        "from",
+        "to",
+        "overshoot",
+        "rise time",
+        "largest error",
+        "error at the end",
+        "largest drive",
+    ):
+        table.add_column(title, justify="right")
+    for one in joint_figures(trace):
+        if not one.moved:
+            continue
+        rise = "–" if one.rise_time is None else f"{one.rise_time:.2f} s"
+        drive = "–" if one.largest_drive is None else f"{one.largest_drive:.1f} {trace.record.drive_unit or ''}"
+        cells = (one.start, one.end, one.overshoot)
+        table.add_row(str(one.joint), *(_angle(value, one.unit) for value in cells), rise,
+                      _angle(one.largest_error, one.unit), _angle(one.final_error, one.unit), drive)  # fmt: skip
+    print_table(table)
+
+
+def _angle(value: float | None, unit: str) -> str:
+    return "–" if value is None else f"{value:.2f}{'' if unit == '°' else ' '}{unit}"
+
+
+def _ended(record: TraceRecord) -> str:
+    return record.outcome or ("outcome not stated" if record.source == "imported" else "unfinished")
+
+
+@app.command()
+def plot(
+    context: typer.Context,
+    trace: TraceArgument = "last",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="A .png, .svg, .pdf or .html file.")] = None,
+    folder: FolderOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Draw a trace: set point and position, error and drive of every joint."""
+    from daq.traces.plot import plot_trace
+
+    path, found = _read(context, trace, folder)
+    _tell_file(path, plot_trace(found, output or path.with_suffix(".png")), as_json=json)
+
+
+@app.command("export")
+def export(
+    context: typer.Context,
+    trace: TraceArgument = "last",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="A .csv file; a .toml is put beside it.")
+    ] = None,
+    folder: FolderOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Write a trace as plain CSV, with a TOML file for what columns cannot say."""
+    from daq_cli.app.csv_output import write_csv
+
+    path, found = _read(context, trace, folder)
+    _tell_file(path, write_csv(found, output or path.with_suffix(".csv")), as_json=json)
+
+
+def _tell_file(made_from: Path, file: Path, *, as_json: bool) -> None:
+    if as_json:
+        print_json({"trace": made_from, "file": file})
+    else:
+        print(printable(str(file)))
+
+
+@app.command("import")
+def import_(
+    context: typer.Context,
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="A .csv file: time, then set_point_N, position_N, drive_N, velocity_N. "
+            "A .toml of its name says what columns cannot: drive_unit, machine, robot."
+        ),
+    ],
+    folder: FolderOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Take in a trace of another rig or tool."""
+    from daq.traces.csv_table import import_csv
+    from daq.traces.naming import trace_path
+    from daq.traces.store import write_trace
+
+    call = invocation(context)
+    if call.server is not None:
+        from daq_cli.robot.remote.traces import upload
+
+        upload(call, file, as_json=json)
+        return
+    place = _folder(call, folder)
+    found = import_csv(file, call.trace_limits)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise TraceError(f"{place}: cannot be made: {error.strerror}") from error
+    made = write_trace(found, trace_path(place, found.record))
+    if json:
+        print_json({"trace": found.record.trace_id, "made_from": file, "file": made, "server": None})
+    else:
+        print(made)
+
+
+@app.command("verify")
+def check(
+    context: typer.Context, trace: TraceArgument = "last", folder: FolderOption = None, json: JsonOption = False
+) -> None:
+    """Check a trace from its checksums to its signals; ends with 5 when it is not to be trusted."""
+    from daq.traces.verify import verify
+
+    found = verify(_path(context, trace, folder), invocation(context).trace_limits)
+    if json:
+        print_json(found.model_dump(mode="json") | {"trustworthy": found.trustworthy})
+    else:
+        for finding in found.findings:
+            print(printable(f"{finding.level}: {finding.message}"))
+        print("trustworthy" if found.trustworthy else "NOT to be trusted")
+    if not found.trustworthy:
+        raise typer.Exit(EXIT_NOT_TRUSTWORTHY)
+
+
+@app.command()
+def salvage(context: typer.Context, folder: FolderOption = None, json: JsonOption = False) -> None:
+    """Finish the traces that a crash left without an end; they are marked as interrupted."""
+    from daq.traces.salvage import salvage_folder
+
+    call = invocation(context)
+    if call.server is not None:
+        raise SpecError("--server: `daq traces salvage` is for this computer's traces; a service salvages its own")
+    results = salvage_folder(_folder(call, folder), call.trace_limits)
+    if json:
+        print_json([vars(result) for result in results])
+        return
+    for result in results:
+        print(printable(_salvage_line(result)))
+    if not results:
+        console().print("nothing to salvage")
+    if any(result.path is None for result in results):
+        raise typer.Exit(EXIT_NOT_TRUSTWORTHY)
+
+
+def _salvage_line(result: Salvaged) -> str:
+    if result.path is None:
+        return f"{result.part}: {result.problem}"
+    line = f"{result.path}: salvaged from {result.part.name}"
+    if result.kept is None:
+        return line
+    if result.dropped_bytes == 0:
+        return f"{line}; what another program had put into it is in {result.kept.name}"
+    return f"{line} up to its damage; the {result.dropped_bytes} bytes after it are in {result.kept.name}"

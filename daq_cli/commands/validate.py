@@ -1,0 +1,158 @@
+"""`daq validate`: what would have to move, when, and against what, for a model to explain traces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from daq_cli.app.context import JsonOption, console, invocation, print_json, print_table
+from daq_cli.models.effect_choice import patterns
+from daq_cli.models.model_input import (
+    MODEL_HELP,
+    EffectFileOption,
+    ReportOption,
+    TraceFolderOption,
+    TracesArgument,
+    load_effects,
+    model_label,
+    read_model,
+    read_traces,
+)
+from daq_cli.robot.remote.jobs import numbers_of, require_no_programs
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from daq.contracts.machine import Machine
+    from model.validation.criterion import Fidelity
+    from model.validation.variation import TimeDomain
+
+app = typer.Typer(add_completion=False)
+
+CURVE_POINTS = 21
+
+
+@app.command()
+def validate(
+    context: typer.Context,
+    model: Annotated[str, typer.Argument(help=MODEL_HELP)],
+    traces: TracesArgument,
+    parameters: Annotated[
+        str | None, typer.Option(help="Names or patterns (default: those that were fitted, else all uncertain).")
+    ] = None,
+    output: Annotated[
+        list[int] | None, typer.Option("--joint", help="Joints whose errors count (default: all). May be repeated.")
+    ] = None,
+    damping_ratio: Annotated[float, typer.Option(help="ζ of the associate system (section 7.2.2).")] = 0.5,
+    report: ReportOption = None,
+    folder: TraceFolderOption = None,
+    effect_file: EffectFileOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Validate a model by distortion: Σλ² says whether expected deviations explain what the model misses.
+
+    The time-domain form says of every parameter how it would have to vary with time, and what that goes with.
+    """
+    from daq_cli.models.model_progress import shown_progress
+    from model.simulation.simulate import Options
+    from model.validation.conventions import in_convention
+    from model.validation.fidelity import validate_by_distortion
+    from model.validation.names import names_to_validate
+    from model.validation.time_domain import vary_in_time
+
+    call = invocation(context)
+    require_no_programs(effect_file, call)
+    load_effects(effect_file)
+    found = read_traces(call, folder, traces)
+    chosen = read_model(model)
+    if call.server is not None:
+        from daq_cli.robot.remote.validate import validate_at_server
+
+        numbers = numbers_of(call, traces, found)
+        done = validate_at_server(call, chosen, model, numbers, patterns(parameters), output, damping_ratio, report)
+        _tell(done.fidelity, done.three_sigma, done.time_domain, chosen.machine, as_json=json)
+        return
+    names = names_to_validate(chosen, patterns(parameters))
+    with shown_progress("validating") as tell:
+        fidelity = validate_by_distortion(
+            chosen, found, names, outputs=output, damping_ratio=damping_ratio, curve_points=CURVE_POINTS,
+            options=Options(quantise=False), progress=lambda f, text: tell(0.7 * f, text),
+        )  # fmt: skip
+        in_time = []
+        for number, trace in enumerate(found):
+            tell(0.7 + 0.3 * number / len(found), f"variation with time: {trace.record.trace_id}")
+            in_time.append(vary_in_time(chosen, trace, names))
+    three = in_convention(fidelity, chosen, "three_sigma")
+    _tell(fidelity, three, in_time, chosen.machine, as_json=json)
+    if report is not None:
+        from model.reports.page import write_report
+        from model.reports.validation_report import validation_report
+
+        page = validation_report(model_label(model), (fidelity, three), in_time, chosen.machine)
+        console().print(f"report: {write_report(page, report)}")
+
+
+def _tell(
+    fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], machine: Machine, *, as_json: bool
+) -> None:
+    if as_json:
+        print_json({
+            "fidelity": fidelity.model_dump(mode="json"),
+            "three_sigma": {"sum_of_contributions": three.sum_of_contributions},
+            "time_domain": [one.model_dump(mode="json") for one in in_time],
+        })  # fmt: skip
+    else:
+        _print(fidelity, three, in_time, machine)
+
+
+def _print(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], machine: Machine) -> None:
+    from rich.table import Table
+
+    table = Table(box=None, header_style="bold")
+    for name in ("parameter", "value", "doubles the error at", "σ needed", "τ′ expected", "λ²", "unit"):
+        table.add_column(name, justify="left" if name in ("parameter", "unit") else "right")
+    for p in fidelity.parameters:
+        down = "–" if p.change_down is None else f"−{p.change_down:.3g}"
+        up = "–" if p.change_up is None else f"+{p.change_up:.3g}"
+        needed = "very large" if p.required is None else f"{p.required:.3g}"
+        table.add_row(
+            p.name, f"{p.value:.5g}", f"{down} / {up}", needed, f"{p.expected:.3g}", f"{p.contribution:.4f}", p.unit
+        )
+    print_table(table, 140)
+    verdict = "no more than" if fidelity.explains else "more than"
+    print(
+        f"\nΣλ² = {fidelity.sum_of_contributions:.4f} (τ′ = â/(3√2), the source's), "
+        f"{three.sum_of_contributions:.4f} (τ′ = â/3); at 1 what is left is explained: it is {verdict} what is expected"
+    )
+    for note in fidelity.notes:
+        print(f"  {note}")
+    for one in in_time:
+        print(f"\n{one.trace}, variation with time (accelerations smoothed over {1e3 * one.smoothing:.0f} ms):")
+        _print_in_time(one, machine)
+
+
+def _print_in_time(one: TimeDomain, machine: Machine) -> None:
+    from rich.table import Table
+
+    from model.reports.units import joint_unit
+
+    table = Table(box=None, header_style="bold")
+    for name in ("parameter", "σ of α(t)", "τ′", "beyond noise", "explains, constant", "varying", "goes with"):
+        table.add_column(name, justify="left" if name in ("parameter", "goes with") else "right")
+    for v in one.parameters:
+        strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in v.against if c.significant][:2]
+        table.add_row(
+            v.name, f"{v.deviation:.3g}", f"{v.expected:.3g}", f"{100 * v.significant:.0f} %",
+            f"{100 * v.alone_constant:.0f} %", f"{100 * v.alone_varying:.0f} %", ", ".join(strongest),
+        )  # fmt: skip
+    print_table(table, 160)
+    for j in one.joints:
+        strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in j.against if c.significant][:3]
+        unit = f"{joint_unit(machine, j.joint)}/s²"
+        print(
+            f"  joint {j.joint}: acceleration residual rms {j.rms:.3g} {unit}, {j.in_floors:.2g} × the noise floor"
+            f" ({j.noise:.3g})" + (f", goes with {', '.join(strongest)}" if strongest else "")
+        )
+    for note in one.notes:
+        print(f"  {note}")

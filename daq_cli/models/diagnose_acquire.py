@@ -1,0 +1,115 @@
+"""`daq diagnose --acquire`: run what the diagnosis asks for, diagnose again, until nothing is left to ask."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from daq.contracts.errors import DaqError, SpecError
+from daq_cli.app.context import Invocation, console
+from daq_cli.models.diagnose_asking import as_run, next_to_run, time_left
+from daq_cli.robot.run_result import acquire
+from server.jobs.asking import asker
+
+if TYPE_CHECKING:
+    from daq.contracts.machine import Machine
+    from daq.contracts.trace import Trace
+    from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment
+    from model.discrepancy.experiment_design.next_experiment import Asker
+
+Diagnose = Callable[["Sequence[Trace]", "Asker"], "Diagnosis"]
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a diagnosis that ran what it asked for has ended.
+
+    found: the latest answer. traces: what it rests on. failure: why a run that was asked for could not be begun, or
+    used; None where none failed. Nothing that was found before is lost to it.
+    """
+
+    found: Diagnosis
+    traces: list[Trace]
+    failure: DaqError | None = None
+
+
+def acquired(
+    call: Invocation, machine: Machine, traces: Sequence[Trace], folder: Path | None, budget: float, consent: bool,
+    diagnose: Diagnose,
+) -> Ended:  # fmt: skip
+    """The answer after all that was asked for has been run, as far as that could be.
+
+    `next_to_run` says when it ends; `budget`: s of robot time; `machine`: that of the model in doubt. Planned for, and
+    moved, is the configured one, within the limits that hold for it now. Raises SpecError for another machine, and what
+    connecting raises, before anything is computed; what fails after the first answer is told beside it.
+    """
+    arm = call.machine
+    _check_same_machine(arm, machine)
+    _check_reached(call)
+    runs: list[Acquired] = []
+    every = list(traces)
+    failure: DaqError | None = None
+    found = diagnose(every, asker(arm, budget))
+    while failure is None and (asked := next_to_run(found, runs, budget)) is not None:
+        left = time_left(runs, budget)
+        console().print(f"ask     {asked.name}, {asked.duration:.0f} s of {left:.0f} s: {asked.reason}")
+        try:
+            run, trace = _run(call, arm, asked, folder or call.trace_folder, consent)
+            runs.append(run)
+            if run.outcome == "complete":
+                found = diagnose([*every, trace], asker(arm, time_left(runs, budget)))
+                every.append(trace)
+            else:
+                console().print(f"{run.outcome}: no more is asked for; its trace is {run.file}", style="red")
+        except DaqError as error:
+            failure = error
+    return Ended(found.model_copy(update={"acquired": tuple(runs)}), every, failure)
+
+
+def _check_reached(call: Invocation) -> None:
+    """That there is a robot to run on, before minutes are spent on what it is to do: greeted, and let go again, as
+    `daq status` does; of a mock, that it starts with its options. Raises what connecting raises."""
+    if call.server is not None:
+        from daq_cli.robot.remote.robot import connected_status, remote_robot
+
+        with remote_robot(call) as robot:
+            connected_status(robot)
+        return
+    from daq.config.robot_files import load_memory_map
+    from daq.driver import Controller
+
+    with Controller.connect(call.port, load_memory_map(call.settings.robot.memory_map)):
+        pass
+
+
+def _run(call: Invocation, arm: Machine, asked: NextExperiment, folder: Path, consent: bool) -> tuple[Acquired, Trace]:
+    from daq.traces.reader import read_trace
+
+    finished = acquire(call, asked.spec, arm, folder, consent)
+    trace = read_trace(finished.trace)
+    return as_run(asked, trace, finished.trace, finished.outcome), trace
+
+
+def _check_same_machine(arm: Machine, machine: Machine) -> None:
+    """Raises SpecError when the configured arm is another machine than the traces', or reads its joints otherwise."""
+    if arm.name != machine.name:
+        raise SpecError(
+            f"--acquire: the traces were made on {machine.name}, the configured robot is {arm.name}; "
+            "configure the one that the traces are of"
+        )
+    here, there = _readings(arm), _readings(machine)
+    if differing := sorted(joint for joint in here | there if here.get(joint) != there.get(joint)):
+        raise SpecError(
+            f"--acquire: the configured {arm.name} has another sensor than in the traces on joint "
+            f"{', '.join(map(str, differing))}; record new traces, or configure the machine file of these"
+        )
+
+
+def _readings(machine: Machine) -> dict[int, tuple[object, ...] | None]:
+    """By joint what makes an angle of its sensor's counts; None for a joint without a sensor."""
+    return {
+        number: None if s is None else (s.bits, s.range.value, s.at_zero.value, s.direction, s.measures)
+        for number, s in enumerate((joint.sensor for joint in machine.joints), start=1)
+    }

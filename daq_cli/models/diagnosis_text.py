@@ -1,0 +1,162 @@
+"""A diagnosis as text for a terminal: the verdict first, then where, what, added, shown, asked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import wrap
+from typing import TYPE_CHECKING
+
+from daq_cli.models.diagnosis_candidates import best_of, candidates_lines, effect_on
+from model.discrepancy.explanation.notes import is_warning
+from model.discrepancy.localisation.clear_shape import clear_shape
+from model.reports.units import shown_unit
+
+if TYPE_CHECKING:
+    from model.discrepancy.diagnosis import Diagnosis, FoundValue, NextExperiment, RemainingShape, SignalError, Step
+
+WIDTH = 100
+INDENT = 9
+VERDICTS = {
+    "nothing-significant": "NOTHING SIGNIFICANT",
+    "named": "NAMED",
+    "ambiguous": "AMBIGUOUS",
+    "unknown-effect": "UNKNOWN EFFECT",
+}
+
+
+def answer_text(found: Diagnosis) -> str:
+    """The whole answer."""
+    lines = _filled(VERDICTS[found.verdict], _headline(found), len(VERDICTS[found.verdict]) + 2)
+    for note in filter(is_warning, found.notes):
+        lines += ["", *_filled("WARNING", note)]
+    for number, step in enumerate(found.steps, start=1):
+        lines += ["", *([f"step {number} of {len(found.steps)}"] if len(found.steps) > 1 else [])]
+        lines += _step(step, found.steps[: number - 1])
+    if not found.steps:
+        lines += ["", *_without_steps(found)]
+    if left := _left(found):
+        lines += ["", *left]
+    if found.next_experiment is not None:
+        lines += ["", *_filled("ask", _asked(found.next_experiment))]
+    for note in found.notes:
+        lines += [] if is_warning(note) else ["", *_filled("note", note)]
+    lines += ["", f"Took {found.seconds:.1f} s, for {found.robot_seconds:.0f} s of motion"]
+    return "\n".join(lines)
+
+
+def _headline(found: Diagnosis) -> str:
+    adopted = [s for s in found.steps if s.adopted and s.effect is not None]
+    if found.verdict == "named" and adopted:
+        return "; ".join(effect_on(s.effect or "", s.joints) for s in adopted)
+    if found.verdict == "ambiguous" and found.steps and found.steps[-1].group:
+        return "one of " + ", ".join(effect_on(c.effect, c.joints) for c in found.steps[-1].group)
+    if found.verdict == "nothing-significant":
+        if any(s.effect is not None for s in found.steps):
+            return "nothing that the held-out traces confirm"
+        return "the model explains these traces within their noise and its tolerances"
+    return "none of the known effects explains what is left"
+
+
+def _step(step: Step, earlier: Sequence[Step]) -> list[str]:
+    lines = _filled("where", step.where.summary)
+    lines += _filled("what", step.reason)
+    lines += [" " * INDENT + line for line in candidates_lines(step, earlier)]
+    if step.parameters:
+        lines += _filled("added" if step.adopted else "tried", "")
+        lines += [f"{'':{INDENT}}{name} = {_value(v)}" for name, v in step.parameters.items()]
+    if not step.adopted and step.effect is not None:
+        lines += _filled("", f"not taken into the model: {step.rejected_because or 'the held-out error did not fall'}")
+    return lines + _shown(step)
+
+
+def _without_steps(found: Diagnosis) -> list[str]:
+    """The proof of an answer in which nothing was added: what is left, what was tried against it, the errors."""
+    places = [] if found.where is None else [found.where.summary]
+    if found.verdict == "unknown-effect":
+        named = found.where is not None and found.where.joint is not None
+        places = [place for place in places if named and place not in found.summary] + [found.summary]
+    lines = [line for k, place in enumerate(places) for line in _filled("" if k else "where", place)]
+    if best := best_of(found.candidates, found.significant):
+        lines += _filled("what", best)
+    return lines + _errors(found.rmse_fit, found.rmse_holdout, "model as given → with its tolerances fitted (noise)")
+
+
+def _left(found: Diagnosis) -> list[str]:
+    """What none of the known effects explains, unless it was said already."""
+    told = found.verdict == "unknown-effect"
+    lines = _filled("left", found.summary) if told and found.steps else []
+    if found.remaining:
+        clear = clear_shape(found.remaining)
+        shape = _shape(clear or found.remaining[0], clear=clear is not None)
+        if not (told and _share(clear or found.remaining[0]) in found.summary):
+            lines += _filled("" if lines else "left", shape)
+    return lines
+
+
+def _shape(shape: RemainingShape, *, clear: bool) -> str:
+    torques = [t for t in shape.torque if t is not None]
+    told = (
+        f"a torque at joint {shape.joint} of {min(torques):.3g} to {max(torques):.3g} {shape.torque_unit} against "
+        f"{shape.against} would explain {_share(shape)}"
+    )
+    return told if clear else f"no clear shape: the best, {told}"
+
+
+def _share(shape: RemainingShape) -> str:
+    return f"{100 * shape.explained:.0f} % of what is left"
+
+
+def _shown(step: Step) -> list[str]:
+    lines = _errors(step.rmse_fit, step.rmse_holdout, "before → after (noise)")
+    if step.excess_removed_holdout is not None:
+        lines += _filled("", _removed(step.excess_removed_holdout))
+    if step.sum_lambda2_before is not None and step.sum_lambda2_after is not None:
+        lines += _filled("", f"Σλ² {_plain(step.sum_lambda2_before)} → {_plain(step.sum_lambda2_after)}")
+    return lines
+
+
+def _plain(number: float) -> str:
+    """Three digits, and no powers of ten where the number is large."""
+    return f"{number:.0f}" if abs(number) >= 100 else f"{number:.3g}"
+
+
+def _errors(fitted: Sequence[SignalError], held: Sequence[SignalError], columns: str) -> list[str]:
+    lines: list[str] = []
+    for label, errors in (("fitted to", fitted), ("held out", held)):
+        if errors:
+            lines += _filled("" if lines else "shown", f"rms error on traces {label}, {columns}")
+            lines += [f"{'':{INDENT}}  {_error(e)}" for e in errors]
+    return lines
+
+
+def _removed(share: float) -> str:
+    """Noise scatters: an error a little below its floor is no more than all of it."""
+    if share < 0:
+        return f"the held-out variance beyond noise has grown by {-100 * share:.1f} %"
+    told = "all" if share >= 1.0 else f"{100 * share:.1f} %"
+    return f"{told} of the held-out variance beyond noise is gone"
+
+
+def _error(e: SignalError) -> str:
+    factor, unit = shown_unit(e.unit)
+    return f"joint {e.joint}  {e.before * factor:8.4f} → {e.after * factor:8.4f} {unit}  ({e.floor * factor:.4f})"
+
+
+def _asked(experiment: NextExperiment) -> str:
+    told = f"{experiment.name}, {experiment.duration:.1f} s on the arm: {experiment.reason}"
+    apart = f"{experiment.predicted_separation:.1f} standard deviations"
+    if not experiment.separates or apart in experiment.reason:
+        return told
+    return f"{told}; it would tell {' and '.join(experiment.separates)} apart by {apart}"
+
+
+def _value(value: FoundValue) -> str:
+    unit = "" if value.unit == "1" else f" {value.unit}"
+    if value.low is None or value.high is None:
+        return f"{value.value:.4g}{unit} (not bounded by these traces)"
+    return f"{value.value:.4g}{unit} (95 %: {value.low:.4g} to {value.high:.4g})"
+
+
+def _filled(label: str, text: str, indent: int = INDENT) -> list[str]:
+    """Text beside a label, wrapped."""
+    return wrap(text, WIDTH, initial_indent=f"{label:<{indent}}", subsequent_indent=" " * indent) or [label]

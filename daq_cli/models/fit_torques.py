@@ -1,0 +1,63 @@
+"""`daq fit --torques`: parameters from recorded torques, without simulation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from daq_cli.app.context import console, print_json, print_table
+from daq_cli.app.output_file import replacing
+from daq_cli.models.parameter_table import print_parameters
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from daq.contracts.trace import Trace
+    from model.fitting.options import FitOptions
+    from model.machine_model.model import Model
+    from model.torque_space.fit import TorqueFit
+
+MOST_DRAWN = 6
+"""Traces in the report's pictures."""
+
+
+def fit_recorded_torques(
+    begin: Model, traces: Sequence[Trace], held_out: Sequence[Trace], options: FitOptions, out: Path, *,
+    as_json: bool, report: Path | None,
+) -> None:  # fmt: skip
+    """Fit, save the model, and print what came of it. Raises SpecError and TraceError as the fit does."""
+    from daq_cli.models.model_progress import shown_progress
+    from model.machine_model.model_file import save_model
+    from model.torque_space.fit import fit_torques
+
+    with shown_progress("fitting torques") as tell:
+        found = fit_torques(begin, traces, held_out, options, progress=tell)
+    with replacing(out) as part:
+        save_model(found.model, part)
+    if as_json:
+        print_json(found.model_dump(mode="json", exclude={"model"}) | {"model": found.model.identity, "file": out})
+    else:
+        _print(found)
+        console().print(f"model {found.model.identity}: {out}")
+    if report is not None:
+        from model.reports.page import write_report
+        from model.reports.torque_report import torque_report
+        from model.torque_space.curves import torque_curves
+
+        curves = [torque_curves(found.model, t, found.cutoff) for t in (*traces, *held_out)[:MOST_DRAWN]]
+        console().print(f"report: {write_report(torque_report(found, curves), report)}")
+
+
+def _print(found: TorqueFit) -> None:
+    from rich.table import Table
+
+    print_parameters(found.parameters)
+    for combination in found.identifiability.undetermined:
+        print(f"  not determined: {combination.text}")
+    errors = Table("trace", "", "left of the torque", "rms by joint", box=None, header_style="bold")
+    for one in found.errors:
+        rms = ", ".join(f"{left:.3f} of {torque:.3f}" for left, torque in zip(one.rms, one.torque, strict=True))
+        errors.add_row(one.trace, "held out" if one.held_out else "in sample", f"{100 * one.share:.1f} %", rms)
+    print_table(errors, 120)
+    print(f"left of the torque, all together: in sample {100 * found.in_sample:.1f} %", end="")
+    print("" if found.held_out is None else f", held out {100 * found.held_out:.1f} %")

@@ -1,0 +1,197 @@
+"""Models, machines and traces as the command line names them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import Machine, load_machine, shipped_machines
+from daq_cli.app import completion
+from daq_cli.app.context import Invocation, console
+from daq_cli.app.output_file import check_folder
+
+if TYPE_CHECKING:
+    from daq.contracts.trace import Trace
+    from model.machine_model.model import Model
+
+TracesArgument = Annotated[
+    list[str],
+    typer.Argument(
+        help="Files (.mcap, .csv), beginnings of traces' numbers or names, or `last`.", autocompletion=completion.traces
+    ),
+]
+TraceFolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (default: the configured one).")]
+
+
+def _page(path: Path | None) -> Path | None:
+    """Refuses another kind of file, and one that cannot be made, before anything is computed."""
+    if path is not None:
+        if path.suffix != ".html":
+            raise SpecError(f"report {path}: is written as .html")
+        check_folder(path, "report")
+    return path
+
+
+ReportOption = Annotated[
+    Path | None, typer.Option("--report", callback=_page, help="Write a self-contained page, an .html file.")
+]
+
+
+def _model_file(path: Path | None) -> Path | None:
+    """Refuses another kind of file, and one that cannot be made, before anything is computed."""
+    if path is not None:
+        if path.suffix != ".json":
+            raise SpecError(f"--out {path}: a model is written as .json")
+        check_folder(path, "--out")
+    return path
+
+
+OutOption = typer.Option("--out", "-o", callback=_model_file, help="Where the model that is made goes, a .json file.")
+HoldoutOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--holdout", help="A trace to judge by, not fitted to. May be repeated.", autocompletion=completion.traces
+    ),
+]
+
+EffectFileOption = Annotated[
+    list[Path] | None,
+    typer.Option("--effect-file", help="An effect of your own (.py, docs/own-effect.md). May be repeated."),
+]
+
+MODEL_HELP = "A model (.json, as `daq fit` writes it), a machine file (.toml), or a machine that ships (ma2000)."
+
+
+def read_model(name: str) -> Model:
+    """The model that a .json file holds, or that a machine describes with the friction its file states.
+
+    Raises SpecError with one line.
+    """
+    from model.machine_model.model import base_model
+    from model.machine_model.model_file import load_model
+
+    if name not in shipped_machines() and Path(name).suffix != ".toml":
+        return load_model(Path(name))
+    return base_model(load_machine(name))
+
+
+def load_effects(files: Sequence[Path] | None) -> None:
+    """Effects of the user's own, from files that the command line names. Raises SpecError with one line."""
+    if files:
+        from model.effects.effect_files import load_effect_file
+
+        for file in files:
+            load_effect_file(file)
+
+
+def model_label(name: str) -> str:
+    """What a model is called in tables: its file's name, or the machine's."""
+    return Path(name).stem
+
+
+def model_labels(names: Sequence[str]) -> list[str]:
+    """Labels that differ: whole names where file names are alike."""
+    labels = [model_label(name) for name in names]
+    return labels if len(set(labels)) == len(labels) else list(names)
+
+
+def read_traces(call: Invocation, folder: Path | None, names: Sequence[str]) -> list[Trace]:
+    """Traces by file, number, name or `last`; CSV files are read as they are. Raises TraceError, SpecError."""
+    from daq.traces.csv_table import import_csv
+    from daq.traces.reader import read_trace
+
+    place = folder or call.trace_folder
+    if not names:
+        raise SpecError("no traces named: at least one is needed")
+    found = []
+    for name in names:
+        if Path(name).suffix == ".csv" and Path(name).is_file():
+            trace = import_csv(Path(name), call.trace_limits)
+        else:
+            trace = read_trace(call.find_trace(place, name), call.trace_limits)
+        found.append(trace)
+    return found
+
+
+def machine_of(traces: Sequence[Trace], call: Invocation, names: Sequence[str] = ()) -> Machine:
+    """The machine that the traces were made on; the configured one where they do not say, which is then said aloud.
+
+    Limits may differ: the last trace's are taken.
+
+    Args:
+        names: what the command line calls the traces, in order; without them, their own numbers.
+
+    Raises SpecError when the machines differ otherwise, and for a trace that names none and lacks a joint of it.
+    """
+    machines = [t.record.machine for t in traces if t.record.machine is not None]
+    called = list(dict.fromkeys(machine.name for machine in machines))
+    if len(called) > 1:
+        raise SpecError(f"the traces were made on different machines: {', '.join(called)}; one at a time")
+    for machine in machines[1:]:
+        if place := _difference(_described(machines[0]), _described(machine)):
+            raise SpecError(
+                f"the traces were made on different machines that are both called {machine.name}: {place} differs; "
+                "one at a time, or name the machine or model to use"
+            )
+    taken = machines[-1] if machines else call.machine
+    unnamed = [
+        (name, t) for name, t in zip(_names(traces, names), traces, strict=True) if t.record.machine is None
+    ]  # fmt: skip
+    for name, trace in unnamed:
+        if lacking := [joint for joint in taken.modelled_joints if joint not in trace.joints]:
+            raise SpecError(
+                f"{name}: names no machine, and has no joint {_listed(lacking)} of {taken.name}, "
+                f"{'that of the other traces' if machines else 'the configured one'}; name its machine or model with "
+                "--model"
+            )
+    if unnamed and not machines:
+        files = ", ".join(name for name, _ in unnamed)
+        console().print(f"{files}: no machine is named there: taken for the configured {taken.name} (else say --model)")
+    return taken
+
+
+def check_made_for(machine: Machine, traces: Sequence[Trace], names: Sequence[str]) -> None:
+    """Raises SpecError, with the file as the command line calls it, for a trace that cannot be of this machine."""
+    speeds = [j for j in machine.modelled_joints if (s := machine.joint(j).sensor) and s.measures == "velocity"]
+    for name, trace in zip(_names(traces, names), traces, strict=True):
+        own = trace.record.machine
+        if own is not None and own.name != machine.name:
+            raise SpecError(f"{name}: was made on {own.name}, the model describes {machine.name}")
+        if lacking := [joint for joint in machine.modelled_joints if joint not in trace.joints]:
+            raise SpecError(
+                f"{name}: has no joint {_listed(lacking)}, which the model of {machine.name} moves; it has "
+                f"{', '.join(map(str, trace.joints))}"
+            )
+        if speeds and trace.velocity is None:
+            raise SpecError(
+                f"{name}: has no velocity, which the sensors of {machine.name} measure; is it of another machine?"
+            )
+
+
+def _names(traces: Sequence[Trace], names: Sequence[str]) -> list[str]:
+    return list(names) if names else [f"trace {t.record.trace_id}" for t in traces]
+
+
+def _listed(joints: Sequence[int]) -> str:
+    return " or ".join(map(str, joints))
+
+
+def _described(machine: Machine) -> dict[str, Any]:
+    """What a machine file says of the machine: not what people call it, nor where it may go."""
+    return machine.model_dump(exclude={"title", "notes", "limits", "rest_posture"})
+
+
+def _difference(one: Any, other: Any, place: str = "") -> str:
+    """Where two descriptions first differ, such as `joints.2.link.mass.value`; empty where they agree. The sources of
+    numbers are words, and may differ."""
+    if isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other):
+        one, other = dict(enumerate(one, start=1)), dict(enumerate(other, start=1))
+    if isinstance(one, dict) and isinstance(other, dict):
+        keys = [key for key in one | other if key != "source"]
+        found = (_difference(one.get(key), other.get(key), f"{place}.{key}".lstrip(".")) for key in keys)
+        return next((where for where in found if where), "")
+    return "" if one == other else place

@@ -1,0 +1,1 @@
+"""A robot at this computer's port, or at a service."""

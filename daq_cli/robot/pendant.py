@@ -1,0 +1,86 @@
+"""What the keys of `daq teach jog` mean, and the line that shows which joint they drive and how fast."""
+
+from __future__ import annotations
+
+import math
+import sys
+
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import Machine
+from daq.teaching.jog import JOG_SPEED, JogCommand, top_speed
+from daq_cli.app.keyboard import LEFT, RIGHT
+
+HELP = "1-6 joint   ← → drive while held   + - speed   o c gripper   p keep this posture   q end   Ctrl-C stop"
+FASTER, SLOWER = 1.25, 0.8
+
+
+def require_jog_speed(speed: float) -> float:
+    """`speed` (rad/s) when keys may begin with it. Raises SpecError, in degrees/s."""
+    if not 0 < speed <= JOG_SPEED:
+        raise SpecError(
+            f"jog speed of {math.degrees(speed):.4g}°/s: allowed are above 0 and up to {math.degrees(JOG_SPEED):.0f}°/s"
+        )
+    return speed
+
+
+class Pendant:
+    """Which joint, which way, how fast (rad/s). A joint is never driven faster than its own limit."""
+
+    def __init__(self, machine: Machine, speed: float) -> None:
+        self.joint = 1
+        self.wish = speed
+        self.ended = False
+        self.keep = False
+        self.gripper: bool | None = None
+        self._machine = machine
+        self._command: JogCommand | None = None
+
+    @property
+    def speed(self) -> float:
+        """Of the chosen joint, in rad/s."""
+        return min(self.wish, top_speed(self._machine.limits, self.joint))
+
+    def command(self, typed: str, now: float) -> JogCommand | None:
+        """The newest command after the keys `typed` at `now` (s, the samples' clock); the one before when they drive
+        nothing."""
+        direction = typed.count(RIGHT) - typed.count(LEFT)
+        for key in typed.replace(RIGHT, "").replace(LEFT, ""):
+            if key in "123456" and int(key) <= len(self._machine.joints):
+                self.joint, self._command = int(key), None
+            elif key in "+-":
+                self.wish = min(JOG_SPEED, self.wish * (FASTER if key == "+" else SLOWER))
+            elif key in "oc":
+                self.gripper = key == "c"
+            elif key == "p":
+                self.keep = True
+            elif key == "q":
+                self.ended = True
+        if direction:
+            self._command = JogCommand({self.joint: math.copysign(self.speed, direction)}, now)
+        return self._command
+
+
+class StatusLine:
+    """One line at the foot of the terminal (standard error), written again only when it changes."""
+
+    def __init__(self) -> None:
+        self._shown = ""
+
+    def show(self, pendant: Pendant) -> None:
+        """The joint that the keys drive, and how fast."""
+        line = f"joint {pendant.joint}   {math.degrees(pendant.speed):.1f}°/s"
+        if line != self._shown:
+            sys.stderr.write(f"\r{line:<{len(self._shown)}}")
+            sys.stderr.flush()
+            self._shown = line
+
+    def tell(self, line: str) -> None:
+        """A line of its own; the status comes again below it."""
+        self.close()
+        print(line, file=sys.stderr)
+
+    def close(self) -> None:
+        """Leaves the line."""
+        if self._shown:
+            print(file=sys.stderr)
+            self._shown = ""

@@ -1,0 +1,156 @@
+"""An experiment through the service's queue, as the person who waits for it sees it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from daq.client import Robot, ServiceNotReachedError
+from daq.contracts.errors import SafetyError, TraceError
+from daq.contracts.service.experiments import ENDS
+from daq.contracts.service.live import EventMessage, LiveMessage, ProgressMessage, QueueMessage, RecordEventMessage
+from daq_cli.app.context import Invocation
+from daq_cli.app.stop_keys import StopKeys
+from daq_cli.robot.remote.companion import Companion
+from daq_cli.robot.remote.robot import connected_status, remote_robot, require_word
+from daq_cli.robot.run_result import AcquisitionFailedError, ShownRun, shown_run
+
+if TYPE_CHECKING:
+    from daq.acquisition.messages import Finished
+    from daq.client import LiveStream
+    from daq.contracts.experiment import ExperimentSpec
+    from daq.contracts.service.experiments import Experiment
+    from daq.contracts.service.robot import RobotStatus
+
+EXIT_CODES = {"failed": 4, "cancelled": 6, "interrupted": 3}
+"""Of an experiment that has left no trace."""
+LOOK_EVERY = 2.0
+"""s without news after which the experiment is looked at."""
+LOOKS_IN_VAIN = 5
+"""After so many the service counts as lost."""
+
+
+def acquire_remotely(call: Invocation, spec: ExperimentSpec, folder: Path, consent: bool) -> Finished:
+    """Queues `spec`, follows it to its end, and fetches its trace into `folder`.
+
+    Ctrl-C takes it back, or stops the arm where it runs. Raises AcquisitionFailedError, and what the service refuses.
+    """
+    with remote_robot(call) as robot:
+        status = connected_status(robot)
+        _require_open_queue(call, status)
+        real = require_word(status, consent)
+        if real:
+            _require_open_queue(call, robot.status())  # the question may have stood there for minutes
+            robot.queue.resume(moves_real_arm=True)
+        with StopKeys() as keys, robot.live("events", "queue") as stream:
+            experiment = robot.experiments.submit(spec)
+            with Companion(robot, experiment.id, attends=real) as companion, shown_run(spec) as shown:
+                keys.stops(companion.press)
+                try:
+                    ended = _Follower(robot, experiment.id, shown).follow(stream)
+                finally:
+                    keys.stops(lambda: None)
+        return _finished(robot, ended, folder)
+
+
+def _require_open_queue(call: Invocation, status: RobotStatus) -> None:
+    """What lies in a queue that is paused would begin when somebody else resumes it."""
+    if status.queue.paused:
+        raise SafetyError(
+            f"the queue of {status.robot} is paused ({status.queue.reason}): nothing was queued; when it is safe, "
+            f"`daq --server {call.server} queue resume`"
+        )
+
+
+class _Follower:
+    """Follows one experiment through the stream; through questions alone when the stream is lost."""
+
+    def __init__(self, robot: Robot, experiment: str, shown: ShownRun) -> None:
+        self._robot = robot
+        self._experiment = experiment
+        self._shown = shown
+        self._record_ended = False
+
+    def follow(self, stream: LiveStream) -> Experiment:
+        """To its end. Raises AcquisitionFailedError when the service is lost meanwhile."""
+        ended: Experiment | None = None
+        try:
+            while ended is None:
+                frame = stream.next_frame(LOOK_EVERY)
+                news = [self._is_news(message) for message in frame.messages] if frame is not None else [True]
+                if any(news):
+                    ended = self._look(0)
+            while ended.outcome is not None and not self._record_ended:
+                # The end was asked for, and was quicker than what is still on its way.
+                if (frame := stream.next_frame(LOOK_EVERY)) is None:
+                    break
+                for message in frame.messages:
+                    self._is_news(message)
+        except ServiceNotReachedError:
+            return ended or self._ask_until_ended()
+        return ended
+
+    def _ask_until_ended(self) -> Experiment:
+        for attempt in range(LOOKS_IN_VAIN):
+            try:
+                while True:
+                    if (ended := self._look(LOOK_EVERY)) is not None:
+                        return ended
+            except ServiceNotReachedError as error:
+                if attempt == LOOKS_IN_VAIN - 1:
+                    line = f"{error}; experiment {self._experiment} is the service's now, and so is its trace"
+                    raise AcquisitionFailedError(line, error.exit_code) from error
+        raise AssertionError("the last attempt returns or raises")
+
+    def _look(self, wait: float) -> Experiment | None:
+        """The experiment when it has ended."""
+        found = self._robot.experiments.get(self._experiment, wait)
+        if found.progress is not None:
+            self._shown.progress(found.progress, found.progress_text)
+        return found if found.state in ENDS else None
+
+    def _is_news(self, message: LiveMessage) -> bool:
+        """Shows what is to be shown; whether the experiment's state has changed."""
+        match message:
+            case EventMessage():
+                return message.event.experiment == self._experiment
+            case ProgressMessage() if message.experiment == self._experiment:
+                self._shown.progress(message.fraction, message.text)
+            case RecordEventMessage() if message.experiment == self._experiment:
+                self._shown.event(message.kind, message.time, message.message)
+                self._record_ended = message.kind == "end"
+            case QueueMessage() if message.status.running != self._experiment:
+                self._shown.progress(0.0, _waiting(message))
+            case _:
+                pass
+        return False
+
+
+def _waiting(message: QueueMessage) -> str:
+    status = message.status
+    if status.paused:
+        return f"waiting: the queue is paused: {status.reason}"
+    if status.running is not None:
+        return f"waiting: experiment {status.running} runs"
+    return f"waiting: {status.waiting_for}" if status.waiting_for else "queued"
+
+
+def _finished(robot: Robot, ended: Experiment, folder: Path) -> Finished:
+    from daq.acquisition.messages import Finished
+
+    if ended.outcome is None or ended.trace is None:
+        line = f"experiment {ended.id} {ended.state}: {ended.reason or 'no reason is known'}"
+        raise AcquisitionFailedError(line, EXIT_CODES.get(ended.state, 1))
+    details = robot.traces.get(ended.trace)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise TraceError(f"{folder}: cannot be made: {error.strerror}; the trace stays at the service") from error
+    return Finished(
+        outcome=ended.outcome,
+        trace=robot.traces.download(ended.trace, folder / Path(details.entry.file).name),
+        samples=details.entry.samples or 0,
+        missing=details.missing_samples,
+        counters=details.record.counters,
+        reason=ended.reason,
+    )

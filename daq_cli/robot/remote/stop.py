@@ -1,0 +1,60 @@
+"""A stop of a server's robot: asked for under its likely name, before anything else is asked."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from daq.acquisition.stop_socket import StopAnswer
+from daq.client import Client
+from daq.client.stopping import NoSuchRobot
+from daq.contracts.errors import DaqError
+from daq.contracts.service.robot import StopResult
+from daq_cli.app.context import Invocation
+from daq_cli.robot.remote.robot import TOKEN_VARIABLE
+
+DEFAULT_ROBOT = "ma2000"
+NAMES_WITHIN = 1.0
+"""s for a service to name its robots: whoever stops must soon know what became of it."""
+
+
+def stop_at_server(call: Invocation) -> list[StopAnswer]:
+    """Stops the robot that goes by the configured name; where there is none of that name, all that the service has.
+
+    Never raises: what is not known is in the answers.
+    """
+    assert call.server is not None
+    name = _likely_name(call)
+    try:
+        with Client(call.server, os.environ.get(TOKEN_VARIABLE) or None) as client:
+            first = client.robot(name).stop()
+            others = _others(client, name, first) if isinstance(first, NoSuchRobot) else []
+            return [_answer(one, call.server, client.robot(one).stop()) for one in others] or [
+                _answer(name, call.server, first)
+            ]
+    except DaqError as error:
+        return [StopAnswer(robot=name, port=call.server, delivered=False, confirmed=False, text=str(error))]
+
+
+def _likely_name(call: Invocation) -> str:
+    """A configuration that cannot be read is no reason not to stop."""
+    try:
+        return call.settings.robot.name
+    except DaqError:
+        return DEFAULT_ROBOT
+
+
+def _others(client: Client, name: str, first: StopResult) -> list[str]:
+    """Names of the robots of a service that has none of this name, which is said first."""
+    print(f"{first.note}: {client.url} is asked to stop the robots that it has", file=sys.stderr, flush=True)
+    try:
+        names = [one.robot for one in client.robots(within=NAMES_WITHIN)]
+    except DaqError:
+        return []
+    return [] if name in names else names
+
+
+def _answer(robot: str, url: str, found: StopResult) -> StopAnswer:
+    return StopAnswer(
+        robot=robot, port=url, delivered=found.delivered, confirmed=found.confirmed, tick=found.tick, text=found.note
+    )

@@ -1,0 +1,54 @@
+"""An experiment on an arm that keeps a secret, recorded in lock-step as `daq run` records any."""
+
+from __future__ import annotations
+
+import secrets
+import shutil
+import tempfile
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from daq.acquisition.messages import Finished, Job
+from daq.acquisition.parent import Acquisition
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.machine import Machine
+from daq_cli.trial.mock_side import TrialStageError
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A trace under a random name, and how the run ended."""
+
+    file: Path
+    outcome: str
+    reason: str
+    duration: float
+    """s of robot time."""
+
+
+def record(seed: int, run: str, spec: ExperimentSpec, machine: Machine, folder: Path) -> Recorded:
+    """Runs `spec` on the arm of a seed. `run` draws the noise: another run of the same arm has another one.
+
+    Neither the seed nor its noise is in the trace or its name (a test looks). Raises TrialStageError.
+    """
+    noise = int(sha256(f"noise {seed} {run}".encode()).hexdigest()[:7], 16)
+    with tempfile.TemporaryDirectory(prefix="trial-") as place:
+        job = Job(
+            url=f"mock://?lock_step=1&secret={seed}&seed={noise}",
+            machine=machine,
+            limits=machine.limits,
+            spec=spec,
+            folder=Path(place),
+            robot=f"trial-{secrets.token_hex(4)}",  # its stop socket: runs go on beside each other
+        )
+        finished = None
+        with Acquisition(job) as process:
+            for report in process:
+                finished = report
+        if not isinstance(finished, Finished):
+            raise TrialStageError(f"nothing was recorded: {getattr(finished, 'message', 'no report')}")
+        kept = folder / f"{secrets.token_hex(6)}.mcap"
+        shutil.move(finished.trace, kept)
+    period = machine.controller.period.value if machine.controller.kind != "none" else 0.0
+    return Recorded(kept, finished.outcome, finished.reason, finished.samples * period)

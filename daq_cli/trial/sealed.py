@@ -1,0 +1,97 @@
+"""Diagnosis as a process that is given trace files, a model, what it may ask for, and nothing else."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from daq_cli.trial.mock_side import TrialStageError
+from model.discrepancy.diagnosis import Diagnosis
+from model.machine_model.model import Model
+from model.machine_model.model_file import save_model
+
+MODEL, ANSWER, HELD_OUT = "model.json", "answer.json", "held-out.mcap"
+ASKING = "asking.json"
+"""There where more may be asked for: `budget`, the s of robot time that are left for it."""
+TIME_LIMIT = 1800.0
+"""s after which a diagnosis counts as failed: generous, for a machine that has much else to do."""
+_KEPT_VARIABLES = ("PATH", "HOME", "LANG", "LC_ALL", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE", "VIRTUAL_ENV")
+_KEPT_BEGINNINGS = ("NUMBA_", "OMP_", "OPENBLAS_", "MKL_")
+DIAGNOSER = (sys.executable, "-m", "daq_cli.trial.diagnoser")
+
+
+class DiagnosisFailedError(TrialStageError):
+    """A diagnosis that gave no answer, which is a wrong one."""
+
+
+@dataclass(frozen=True)
+class SealedAnswer:
+    """An answer as bytes, with their SHA-256, and the seconds that the process took."""
+
+    text: bytes
+    seconds: float
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the answer as it was given."""
+        return sha256(self.text).hexdigest()
+
+    def read(self) -> Diagnosis:
+        """The answer. Raises DiagnosisFailedError for what is none."""
+        try:
+            return Diagnosis.model_validate_json(self.text)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(str(part) for part in first["loc"])
+            raise DiagnosisFailedError(f"what the diagnosis gave is no answer: {where}: {first['msg']}") from error
+
+
+def diagnose_sealed(
+    traces: Sequence[Path], holdout: Path | None, model: Model, diagnoser: Sequence[str] = DIAGNOSER,
+    budget: float | None = None,
+) -> SealedAnswer:  # fmt: skip
+    """Starts `diagnoser` in a new folder with copies of the traces and the model; its answer.
+
+    Arguments are those of `diagnoser` alone; the environment is what any program needs to run. `budget`: s of robot
+    time for what it may ask for; None: it may not ask. Raises DiagnosisFailedError.
+    """
+    with tempfile.TemporaryDirectory(prefix="diagnosis-") as name:
+        place = Path(name)
+        for number, trace in enumerate(traces, start=1):
+            shutil.copyfile(trace, place / f"trace-{number}.mcap")
+        if holdout is not None:
+            shutil.copyfile(holdout, place / HELD_OUT)
+        save_model(model, place / MODEL)
+        if budget is not None:
+            (place / ASKING).write_text(json.dumps({"budget": budget}) + "\n", "utf-8")
+        begun = time.monotonic()
+        try:
+            done = subprocess.run(
+                diagnoser, cwd=place, env=_environment(), stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                check=False, timeout=TIME_LIMIT, start_new_session=True,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            raise DiagnosisFailedError(f"no answer within {TIME_LIMIT:g} s") from None
+        seconds = time.monotonic() - begun
+        answer = place / ANSWER
+        if done.returncode or not answer.exists():
+            words = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
+            raise DiagnosisFailedError(f"the diagnosis ended with code {done.returncode}: {words}")
+        return SealedAnswer(answer.read_bytes(), seconds)
+
+
+def _environment() -> dict[str, str]:
+    return {
+        key: value for key, value in os.environ.items() if key in _KEPT_VARIABLES or key.startswith(_KEPT_BEGINNINGS)
+    }

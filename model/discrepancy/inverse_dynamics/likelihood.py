@@ -1,0 +1,113 @@
+"""How probable residual torques are, joint by joint, over the stretches in which the joint moves.
+
+Weights are equal within a joint, as in least squares on the inverse dynamics (Gautier 1997). Whitening would be better
+statistics for noise alone. What is left of a real machine is mostly not noise: it is large and slow, and whitening it
+away leaves the fit to the fastest part of the motion, where accelerations are known worst. That neighbours say the same
+is answered for in the count of independent samples instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.discrepancy.inverse_dynamics.records import TorqueRecord
+from model.fitting.whitening import autocovariance
+
+Floats = NDArray[np.float64]
+Stretch = tuple[int, slice]
+
+LONGEST_MEMORY = 60
+"""Samples over which residuals are taken to be correlated: twenty periods of the cutoff."""
+SHORTEST_STRETCH = 6
+"""Samples; a shorter one is left out."""
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """Where each joint moves: per joint, the record and rows of every uninterrupted stretch."""
+
+    by_joint: tuple[tuple[Stretch, ...], ...]
+
+    @property
+    def samples(self) -> int:
+        """Residuals that are compared, of all joints."""
+        return sum(rows.stop - rows.start for joint in self.by_joint for _, rows in joint)
+
+    def of_joint(self, residual: Sequence[Floats], joint: int) -> list[Floats]:
+        """Residuals of a joint (index), stretch by stretch; `residual` is an array (m, n, …) a record."""
+        return [residual[i][rows, joint] for i, rows in self.by_joint[joint]]
+
+    def within(self, keep: Sequence[NDArray[np.bool_]]) -> Stretches:
+        """The same, cut to the rows (m,) of each record that are kept."""
+        cut = []
+        for joint in self.by_joint:
+            pieces: list[Stretch] = []
+            for i, rows in joint:
+                inside = np.zeros(len(keep[i]), dtype=bool)
+                inside[rows] = keep[i][rows]
+                pieces += _pieces(i, inside)
+            cut.append(tuple(pieces))
+        return Stretches(tuple(cut))
+
+
+def stretches_of(records: Sequence[TorqueRecord]) -> Stretches:
+    """The stretches of records in which their joints move."""
+    joints = records[0].moving.shape[1]
+    return Stretches(
+        tuple(tuple(s for i, r in enumerate(records) for s in _pieces(i, r.moving[:, j])) for j in range(joints))
+    )
+
+
+def _pieces(record: int, mask: NDArray[np.bool_]) -> list[Stretch]:
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
+    pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [(record, slice(a, b)) for a, b in pairs if b - a >= SHORTEST_STRETCH]
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """How large residual torques are (n,), N·m or N, and over how many samples each says the same, by joint.
+
+    `memory` is 1 + 2 Σ ρ², ρ the residual's autocorrelation: what the sampling variance of a product of two such
+    signals is larger by than for white ones (Bartlett 1935).
+    """
+
+    deviation: Floats
+    memory: Floats
+
+    def weighted(self, stretches: Stretches, arrays: Sequence[Floats]) -> list[Floats]:
+        """Per joint the samples (N_j, …) of arrays (m, n, …), stretch below stretch, each divided by the deviation
+        that makes their squares add up to as many as are independent."""
+        result = []
+        for j, size in enumerate(self.deviation * np.sqrt(self.memory)):
+            empty = np.zeros((0, *arrays[0].shape[2:]))
+            result.append(np.concatenate([empty, *stretches.of_joint(arrays, j)]) / size)
+        return result
+
+
+def noise_model(stretches: Stretches, residual: Sequence[Floats], floor: Floats) -> NoiseModel:
+    """Size and memory of residuals; `floor` (n,) is the least deviation that they can have."""
+    joints = len(stretches.by_joint)
+    deviation, memory = floor.copy(), np.ones(joints)
+    for j in range(joints):
+        if pieces := stretches.of_joint(residual, j):
+            covariance = autocovariance(pieces, LONGEST_MEMORY)
+            deviation[j] = max(float(np.sqrt(covariance[0])), floor[j])
+            memory[j] = 1 + 2 * float(((covariance[1:] / max(covariance[0], 1e-300)) ** 2).sum())
+    return NoiseModel(deviation, memory)
+
+
+def minus_twice_log_likelihood(
+    stretches: Stretches, residual: Sequence[Floats], memory: Floats, floor: Floats
+) -> Floats:
+    """Per joint (n,), constants left out: (n/memory) ln of the mean square, which no noise lets fall below `floor`²."""
+    result = np.zeros(len(stretches.by_joint))
+    for j in range(len(result)):
+        if pieces := stretches.of_joint(residual, j):
+            squares = np.concatenate(pieces) ** 2
+            result[j] = squares.size / memory[j] * np.log(max(float(squares.mean()), floor[j] ** 2))
+    return result

@@ -1,0 +1,105 @@
+"""How much of the residual a trial could explain: at finite sizes, with the adjustable parameters free to answer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.discrepancy.inverse_dynamics.balance import TorqueBalance
+from model.discrepancy.inverse_dynamics.candidates import Start, Trial
+from model.discrepancy.inverse_dynamics.fitting import Data, Slopes, TorqueFit, prior_rows
+
+Floats = NDArray[np.float64]
+
+BENT = (
+    "dead_zone", "supply_limit", "input_delay", "motor_inductance", "resistance_drift", "backlash", "joint_compliance",
+)  # fmt: skip
+"""Effects whose torque is far from linear in their size: no more than this many times the probed size is believed."""
+BENT_LIMIT = 2.0
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What a trial explained at its best start: fall of the weighted squares, and the start, scaled to fit."""
+
+    trial: Trial
+    gain: float
+    start: Start
+
+
+@dataclass(frozen=True)
+class Prober:
+    """A fit, prepared for probing: `basis` (N, p) spans what the adjustable parameters can answer."""
+
+    now: TorqueFit
+    data: Data
+    basis: Floats
+    left: Floats
+
+    def probe(self, trial: Trial) -> Probe:
+        """The best of a trial's starts."""
+        balance = TorqueBalance(trial.model, self.now.balance.records)
+        null = {p.name: float(p.null) for p in trial.parameters if p.null is not None}
+        best = Probe(trial, 0.0, trial.starts[0])
+        for start in trial.starts:
+            columns = [self._column(balance, {**start, **null, name: start[name]}) for name in trial.amplitudes]
+            gain, shares = self._explained(np.stack(columns, axis=1), trial, start, null)
+            if gain > best.gain:
+                scaled = {
+                    n: null[n] + float(a) * (start[n] - null[n]) for n, a in zip(trial.amplitudes, shares, strict=True)
+                }
+                best = Probe(trial, gain, {**start, **scaled})
+        return best
+
+    def _column(self, balance: TorqueBalance, values: Start) -> Floats:
+        moved = balance.residual({**self.now.values, **values})
+        change = [after - before for after, before in zip(moved, self.now.residual, strict=True)]
+        return self._prepared(np.concatenate(self.now.noise.weighted(self.data.stretches, change)))
+
+    def _prepared(self, signal: Floats) -> Floats:
+        """A signal (N,) with what adjustable parameters explain taken off, priors included."""
+        padded = np.concatenate([signal, np.zeros(self.basis.shape[0] - len(signal))])
+        return padded - self.basis @ (self.basis.T @ padded)
+
+    def _explained(self, columns: Floats, trial: Trial, start: Start, null: Start) -> tuple[float, Floats]:
+        """Fall of the squares and the amplitudes (as shares of the start's) that give it; none of a wrong sign."""
+        kept = np.linalg.norm(columns, axis=0) > 1e-9
+        shares = np.zeros(columns.shape[1])
+        while kept.any():
+            found = np.linalg.lstsq(columns[:, kept], -self.left, rcond=1e-8)[0]
+            shares[:] = 0.0
+            shares[kept] = np.clip(found, 0.0, BENT_LIMIT) if trial.effect in BENT else found
+            wrong = kept & np.array(
+                [self._outside(trial, n, a, start, null) for n, a in zip(trial.amplitudes, shares, strict=True)]
+            )
+            if not wrong.any():
+                break
+            kept &= ~wrong
+            shares[:] = 0.0
+        change = columns @ shares
+        return float(-2 * change @ self.left - change @ change), shares
+
+    def _outside(self, trial: Trial, name: str, share: float, start: Start, null: Start) -> bool:
+        p = next(p for p in trial.parameters if p.name == name)
+        value = null[name] + share * (start[name] - null[name])
+        room = 1e-9 * max(1.0, abs(value))
+        return not p.low - room <= value <= p.high + room
+
+
+def prober(now: TorqueFit, slopes: Slopes, data: Data) -> Prober:
+    """Prepares probing around a fit, whose derivatives are `slopes`."""
+    stacked: Sequence[Floats] = [
+        np.stack([slopes[p.name][i] for p in now.adjustables], axis=2) if now.adjustables else np.zeros((*r.shape, 0))
+        for i, r in enumerate(now.residual)
+    ]
+    A = np.concatenate(now.noise.weighted(data.stretches, stacked))
+    rows, _ = prior_rows(now.adjustables, np.array([now.values[p.name] for p in now.adjustables]))
+    scale = np.array([p.scale for p in now.adjustables])
+    whole = np.concatenate([A, rows]) * scale
+    u, s, _ = np.linalg.svd(whole, full_matrices=False)
+    basis = u[:, s > 1e-10 * s[0]] if s.size else np.zeros((whole.shape[0], 0))
+    left = np.concatenate([*now.noise.weighted(data.stretches, now.residual), np.zeros(len(rows))])
+    return Prober(now, data, basis, left - basis @ (basis.T @ left))

@@ -1,0 +1,109 @@
+"""What a signal of a joint goes with: its mean against time, position, speed, direction and drive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.machine import NoController
+from model.discrepancy.diagnosis import AgainstWhat
+from model.discrepancy.localisation.phases import asked_motion, asked_speed, directions
+from model.discrepancy.localisation.statistics import Bins, binned
+from model.fitting.records import Record
+from model.machine_model.model import Model
+
+Floats = NDArray[np.float64]
+
+AGAINST: tuple[AgainstWhat, ...] = get_args(AgainstWhat)
+"""Quantities, in the order in which they are looked at."""
+BINS = 12
+"""Of a quantity, at most."""
+BIN_SECONDS = 1.0
+"""s that a bin of time lasts at least."""
+DIRECTION_EDGES = np.array([-1.5, -0.5, 0.5, 1.5])
+"""Backwards, not yet moved, forwards."""
+
+
+@dataclass(frozen=True)
+class Quantities:
+    """All records of a machine one after the other: what a signal may go with.
+
+    values: by name (m, n), NaN where it is not known. stretches: without gaps, over all records.
+    """
+
+    values: dict[AgainstWhat, Floats]
+    units: dict[AgainstWhat, tuple[str, ...]]
+    stretches: tuple[slice, ...]
+
+
+def quantities(model: Model, records: Sequence[Record]) -> Quantities:
+    """Quantities of records. Time is each record's own; the drive is what was recorded."""
+    kinds = [model.machine.joint(j).kind for j in model.machine.modelled_joints]
+    angle = tuple("rad" if k == "revolute" else "m" for k in kinds)
+    per_record = [_of_record(model, record) for record in records]
+    stretches, begin = [], 0
+    for record in records:
+        stretches += [slice(begin + run.start, begin + run.stop) for run in record.runs]
+        begin += len(record.measured)
+    return Quantities(
+        {name: np.concatenate([q[name] for q in per_record]) for name in AGAINST},
+        {
+            "time": ("s",) * len(kinds), "position": angle, "speed": tuple(f"{a}/s" for a in angle),
+            "direction": ("1",) * len(kinds), "drive": drive_units(model),
+        },
+        tuple(stretches),
+    )  # fmt: skip
+
+
+def drive_units(model: Model) -> tuple[str, ...]:
+    """Unit of each joint's drive: volts at a motor, or the torque or force of a plain gain."""
+    units = []
+    for joint in model.machine.modelled_joints:
+        own = model.machine.joint(joint)
+        torque = "N·m" if own.kind == "revolute" else "N"
+        units.append("V" if own.drive.kind == "dc_motor" else torque)
+    return tuple(units)
+
+
+def dependence(signal: Floats, joint: int, against: AgainstWhat, known: Quantities, floor: float) -> Bins | None:
+    """Means of a signal (m,) of joint (index from 0) against a quantity; None where that does not vary."""
+    quantity = known.values[against][:, joint]
+    edges = _edges(quantity, against, known.stretches)
+    return None if edges is None else binned(signal, quantity, edges, known.stretches, floor)
+
+
+def _of_record(model: Model, record: Record) -> dict[AgainstWhat, Floats]:
+    inputs = record.inputs
+    rows = np.round(inputs.rows).astype(np.int64)
+    asked = asked_motion(model, record)
+    moved = directions(model, record).astype(np.float64)
+    # A controller's drive holds the noise of the reading that it answers: a period later nothing goes with that.
+    late = 0 if isinstance(model.machine.controller, NoController) else 1
+    drive = inputs.drive[np.maximum(rows - late, 0)] if np.any(inputs.drive) else np.full_like(asked, np.nan)
+    return {
+        "time": np.repeat((inputs.time[rows] - inputs.time[0])[:, None], asked.shape[1], axis=1),
+        "position": asked, "speed": asked_speed(asked, inputs.period), "direction": moved, "drive": drive,
+    }  # fmt: skip
+
+
+def _edges(quantity: Floats, against: AgainstWhat, stretches: Sequence[slice]) -> Floats | None:
+    """Edges of the bins: even in time and position, of even content in speed and drive, where most is near zero."""
+    values = np.concatenate([quantity[s] for s in stretches])
+    values = values[np.isfinite(values)]
+    if len(values) == 0 or np.ptp(values) < 1e-9:
+        return None
+    if against == "direction":
+        return DIRECTION_EDGES
+    low, high = float(values.min()), float(values.max())
+    if against == "time":
+        return np.linspace(low, high + 1e-9, 1 + int(np.clip((high - low) // BIN_SECONDS, 2, BINS)))
+    if against == "position":
+        return np.linspace(low, high + 1e-9, BINS + 1)
+    moving = values[np.abs(values) > 0.02 * np.abs(values).max()]
+    inner = np.quantile(moving, np.linspace(0, 1, BINS + 1)) if len(moving) > BINS else np.linspace(low, high, BINS + 1)
+    edges = np.unique(np.concatenate([[low], inner[1:-1], [high + 1e-9]]))
+    return edges if len(edges) > 2 else None

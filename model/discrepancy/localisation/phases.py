@@ -1,0 +1,114 @@
+"""Phases of a motion, a joint and sample each, from what was asked of the joint."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.machine import NoController
+from model.discrepancy.diagnosis import Phase
+from model.fitting.records import Record, resolution
+from model.machine_model.model import Model
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+PHASES: tuple[Phase, ...] = get_args(Phase)
+"""Phases in the order of their numbers: ramp start, steady ramp, reversal, creep, hold."""
+RAMP_START, STEADY_RAMP, REVERSAL, CREEP, HOLD = range(5)
+
+START = 0.3
+"""s after motion begins that count as its start."""
+TURNING = 0.5
+"""s after a change of direction that count as the reversal: a slow joint needs them to cross its free play."""
+REST = 0.3
+"""s of standstill after which motion starts anew, also backwards; a shorter stop belongs to a reversal or a ramp."""
+CREEPING_SPEED = 0.1
+"""rad/s (m/s) below which a motion is slow: 6 °/s, where friction's fall with speed and free play show."""
+SPEED_WINDOW = 0.2
+"""s over which a speed is taken: a slow ramp moves one step of its resolution in several periods."""
+LEAST_COUNTS = 1.5
+"""Counts of the sensor within that window below which a joint counts as at rest."""
+
+
+def asked_motion(model: Model, record: Record) -> Floats:
+    """What each joint was asked to do, (m, n) rad or m, at the samples of a record: its set points.
+
+    Without a controller nothing was asked; then it is what the joint did, a measured velocity summed up.
+    """
+    inputs = record.inputs
+    if not isinstance(model.machine.controller, NoController):
+        return inputs.set_points[np.round(inputs.rows).astype(np.int64)]
+    if _measures_velocity(model):
+        return np.asarray(np.cumsum(record.measured, axis=0) * inputs.period)
+    return record.measured
+
+
+def asked_speed(asked: Floats, period: float) -> Floats:
+    """Its speed (m, n), over a centred window of `SPEED_WINDOW`."""
+    half = max(1, round(0.5 * SPEED_WINDOW / period))
+    last = len(asked) - 1
+    after = np.minimum(np.arange(last + 1) + half, last)
+    before = np.maximum(np.arange(last + 1) - half, 0)
+    return np.asarray((asked[after] - asked[before]) / (period * np.maximum(after - before, 1))[:, None])
+
+
+def directions(model: Model, record: Record) -> Integers:
+    """Direction in which each joint moves or moved last, (m, n) of −1, 0 (not yet) and 1."""
+    moving = np.sign(_speed_beyond_rest(model, record)).astype(np.int64)
+    rows = np.where(moving != 0, np.arange(len(moving))[:, None], 0)
+    latest = np.maximum.accumulate(rows, axis=0)
+    return np.asarray(np.take_along_axis(moving, latest, axis=0))
+
+
+def phases_of(model: Model, record: Record) -> Integers:
+    """Number of the phase (index of `PHASES`) of each sample and joint, (m, n)."""
+    speed = _speed_beyond_rest(model, record)
+    return np.stack([_phases(speed[:, j], record.inputs.period) for j in range(speed.shape[1])], axis=1)
+
+
+def _speed_beyond_rest(model: Model, record: Record) -> Floats:
+    """Asked speed (m, n), zero where a joint rests."""
+    speed = asked_speed(asked_motion(model, record), record.inputs.period)
+    return np.where(np.abs(speed) > _least_speed(model, record), speed, 0.0)
+
+
+def _least_speed(model: Model, record: Record) -> Floats:
+    """(n,) speed below which a joint counts as at rest."""
+    if _measures_velocity(model):
+        return 0.02 * np.abs(record.measured).max(axis=0)
+    counted = not isinstance(model.machine.controller, NoController)
+    least = []
+    for column, joint in enumerate(model.machine.modelled_joints):
+        sensor = model.machine.joint(joint).sensor
+        if counted:
+            least.append(1e-6)  # set points have no noise: any step of them is motion
+        elif sensor is None:
+            least.append(1e-3 * float(np.ptp(record.measured[:, column])) / SPEED_WINDOW)
+        else:
+            least.append(LEAST_COUNTS * resolution(sensor) / SPEED_WINDOW)
+    return np.array(least)
+
+
+def _measures_velocity(model: Model) -> bool:
+    sensors = [model.machine.joint(j).sensor for j in model.machine.modelled_joints]
+    return any(s is not None and s.measures == "velocity" for s in sensors)
+
+
+def _phases(speed: Floats, period: float) -> Integers:
+    """Phases (m,) of one joint: slow, fast or no motion first; then what follows starts and changes of direction."""
+    found = np.where(speed == 0.0, HOLD, np.where(np.abs(speed) < CREEPING_SPEED, CREEP, STEADY_RAMP))
+    start, turning = round(START / period), round(TURNING / period)
+    last_direction, rested = 0.0, np.inf
+    for k, direction in enumerate(np.sign(speed)):
+        if direction == 0.0:
+            rested += period
+            continue
+        if rested >= REST:
+            found[k : k + start] = np.where(found[k : k + start] == STEADY_RAMP, RAMP_START, found[k : k + start])
+        elif last_direction * direction < 0:
+            found[k : k + turning] = np.where(speed[k : k + turning] == 0.0, HOLD, REVERSAL)
+        last_direction, rested = direction, 0.0
+    return np.asarray(found, dtype=np.int64)

@@ -1,0 +1,1 @@
+"""The output-error method: the closed loop is simulated, and measured less simulated positions are compared."""

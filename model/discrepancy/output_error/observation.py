@@ -1,0 +1,275 @@
+"""Traces as a diagnosis sees them: the simulated controller is given most of what the real one has read.
+
+The noise of a reading goes through the controller into the motor, and round the loop: a simulation in closed loop that
+does not know it is off by what the noise has moved, comes to rest where the real arm creeps on, and hides a torque
+behind a controller that makes up for it. A simulation that reads the record has all of that right, but nothing brings
+it back: an error of the smallest torque adds up. So the controller reads a share of the way from the simulated reading
+to the recorded one (Forssell and Ljung 1999 compare the two ends). What is left, measured less simulated, is nearly
+white where the model is right, and a missing torque shows 1/(1 − share) times as large as in closed loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError
+from daq.contracts.trace import Trace
+from model.discrepancy.output_error.feedback_share import FOLLOWING
+from model.fitting.fit import fit_problem
+from model.fitting.options import FitOptions
+from model.fitting.records import Record
+from model.fitting.simulated import INITIAL, SimulatedProblem, unknown_place
+from model.fitting.unknowns import Unknown
+from model.machine_model.model import Model
+from model.simulation.engines import engine_for
+from model.simulation.inputs import readings_on_grid
+from model.simulation.period import OUT_READING, OUTPUTS
+from model.simulation.simulate import Options, Prepared, at_rows, prepare
+
+Floats = NDArray[np.float64]
+Signals = tuple[Floats, ...]
+"""One array (m, n) a record."""
+
+STEP, COARSE_STEP = 2e-3, 7e-3
+"""s; longest step of integration: ten a control period of 20 ms, and three for derivatives and probes, which are
+differences and need no more. With longer ones than the first a delay explains an inductance as well."""
+HALVINGS = 2
+"""Of the step, for runs that do not stay finite with it."""
+DIFFERENCE = 0.05
+"""Of an expected deviation: over it, derivatives are taken."""
+TONE_DIFFERENCE = 0.02
+"""The same of a tone, in waves over a turn or over the longest record: its phase moves by an eighth of a radian."""
+BEND_TERMS = 8
+"""Of the sine series of a sound potentiometer's curve: an arm moves over a part of the range, and what the curve does
+there, bent by a count or two, has to be within the series' reach."""
+BEND_SHARE = 0.3
+"""Standard deviation of each term of a potentiometer's curve, as a share of the stated linearity."""
+STIFF = ("backlash", "joint_compliance")
+"""Gears that give: longer steps would make them unstable."""
+CONTACT_STEP = 1e-3
+"""s; of models with play: parts in contact swing at up to 1500 rad/s, which steps of 2 ms cannot follow."""
+LOOSE_START = 8.0
+"""Times the tolerance of a reading: how far a trace may begin from where its first reading says. The trace itself shows
+where it began, and what it is read by may be what is missing."""
+BATCH = 64
+"""Runs at a time: bounds the memory, 64 runs of 55 s take 26 MB."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Records of one machine, and how well a reading can be known.
+
+    records: what drives the simulations and what was measured. deviations: (n,) rad, noise and rounding of one reading.
+    unit: (n,) rad a count, 1 where the machine states no sensor. prepared: the records as compiled code reads them,
+    with the share of the recorded readings that is followed.
+    """
+
+    records: tuple[Record, ...]
+    deviations: Floats
+    unit: Floats
+    prepared: tuple[Prepared, ...]
+
+    @property
+    def samples(self) -> int:
+        """Readings that are compared, all joints together."""
+        return sum(r.samples for r in self.records) * len(self.deviations)
+
+    def following(self, share: float) -> Observation:
+        """The same with another share of the recorded readings that simulated controllers are given."""
+        return replace(self, prepared=tuple(replace(p, following=share) for p in self.prepared))
+
+    def with_noise(self, noise: Sequence[Floats]) -> Observation:
+        """The same with simulations that follow no record: noise (k, n), in counts, is on what they read."""
+        prepared = zip(self.prepared, noise, strict=True)
+        return replace(self, prepared=tuple(replace(p, following=0.0, noise=own) for p, own in prepared))
+
+    def made_of(self, measured: Sequence[Floats]) -> Observation:
+        """The same records with other readings (m, n) rad, compared and followed as the real ones are."""
+        records = tuple(replace(r, measured=own) for r, own in zip(self.records, measured, strict=True))
+        shown = [readings_on_grid(r.measured, r.inputs.rows, len(r.inputs)) for r in records]
+        prepared = tuple(replace(p, readings=own) for p, own in zip(self.prepared, shown, strict=True))
+        return replace(self, records=records, prepared=prepared)
+
+    def readings(
+        self, model: Model, vectors: Floats, initials: Sequence[Floats], longest_step: float = STEP
+    ) -> list[Floats]:
+        """What each of p parameter sets would show, its noise included where the simulation has one.
+
+        Args:
+            vectors: (p, size). initials: per record (p, n, 2). longest_step: of the integration, s.
+
+        Returns:
+            per record (p, m, n), rad; NaN where a run diverged.
+        """  # fmt: skip
+        longest = max(len(r.inputs) for r in self.records)
+        engine, count = engine_for(model), len(self.records)
+        found: list[list[Floats]] = [[] for _ in self.records]
+        for begin in range(0, len(vectors), BATCH):
+            own = vectors[begin : begin + BATCH]
+            which = np.repeat(np.arange(count), len(own))
+            out = np.zeros((len(which), OUTPUTS, longest, model.joint_count), dtype=np.float64)
+            starts = np.concatenate([i[begin : begin + BATCH] for i in initials])
+            repeated = np.ascontiguousarray(np.tile(own, (count, 1)))
+            left, step = np.arange(len(which)), min(longest_step, longest_step_of(model))
+            for _ in range(1 + HALVINGS):
+                tried = out[left]
+                engine.run(self.prepared, which[left], repeated[left], starts[left], model.flags, step, tried)
+                out[left] = tried
+                left = left[~np.isfinite(tried[:, OUT_READING]).all(axis=(1, 2))]
+                if not len(left):
+                    break
+                step /= 2
+            for t, record in enumerate(self.records):
+                rows = slice(t * len(own), (t + 1) * len(own))
+                shown = out[rows, OUT_READING, : len(record.inputs)]
+                found[t].append(np.stack([at_rows(one, record.inputs.rows) for one in shown]))
+        return [np.concatenate(parts) for parts in found]
+
+    def state(self, model: Model, unknowns: Sequence[Unknown], values: Floats) -> tuple[Floats, list[Floats]]:
+        """Flat vector and initial states (n, 2) of every record, for values of the unknowns."""
+        vector = model.vector.copy()
+        initials = [record.inputs.initial.copy() for record in self.records]
+        for value, unknown in zip(values, unknowns, strict=True):
+            slots, place = unknown_place(model, unknown.name)
+            if place is None:
+                vector[slots] = value
+            else:
+                for t in range(len(initials)) if unknown.trace is None else (unknown.trace,):
+                    initials[t][place] += value
+        return vector, initials
+
+    def shown(self, model: Model, unknowns: Sequence[Unknown], values: Floats, longest_step: float = STEP) -> Signals:
+        """What one set of values of the unknowns shows, rad. Not finite where the simulation is not."""
+        vector, initials = self.state(model, unknowns, values)
+        readings = self.readings(model, vector[None], [i[None] for i in initials], longest_step)
+        return tuple(one[0] for one in readings)
+
+    def residuals(self, model: Model, unknowns: Sequence[Unknown], values: Floats) -> Signals:
+        """Measured − simulated, rad. Not finite where the simulation is not."""
+        shown = self.shown(model, unknowns, values)
+        return tuple(record.measured - one for record, one in zip(self.records, shown, strict=True))
+
+    def tangents(
+        self,
+        model: Model,
+        unknowns: Sequence[Unknown],
+        values: Floats,
+        which: Sequence[int] | None = None,
+    ) -> Floats:
+        """Derivatives of the weighted readings by the unknowns of those indices (all), (p, N): by differences over a
+        small share of what each is expected to deviate, at a third of the price of dual numbers.
+
+        Raises SpecError when the simulation does not stay finite.
+        """  # fmt: skip
+        which = range(len(unknowns)) if which is None else which
+        seconds = max(len(r.inputs) * r.inputs.period for r in self.records)
+        moves = [_difference(model, unknowns[k], float(values[k]), seconds) for k in which]
+        states = [self.state(model, unknowns, values)]
+        for index, move in zip(which, moves, strict=True):
+            moved = values.copy()
+            moved[index] += move
+            states.append(self.state(model, unknowns, moved))
+        vectors = np.stack([vector for vector, _ in states])
+        starts = [np.stack([initials[t] for _, initials in states]) for t in range(len(self.records))]
+        shown = self.readings(model, vectors, starts, step_of_derivatives(model))
+        found = self.weighted([one[1:] - one[:1] for one in shown]) / np.array(moves)[:, None]
+        if not np.isfinite(found).all():
+            raise SpecError("the simulation does not stay finite: the loop is unstable")
+        return found
+
+    def weighted(self, signals: Sequence[Floats]) -> Floats:
+        """Signals (…, m, n) in standard deviations of a reading, all compared samples in one row: (…, N)."""
+        parts = []
+        for record, signal in zip(self.records, signals, strict=True):
+            chosen = np.concatenate([signal[..., run, :] for run in record.runs], axis=-2) / self.deviations
+            parts.append(chosen.reshape(*chosen.shape[:-2], -1))
+        return np.concatenate(parts, axis=-1)
+
+    def by_joint(self, weighted: Floats) -> list[list[Floats]]:
+        """A weighted row (…, N) taken apart: per joint its uninterrupted runs (…, m)."""
+        n = len(self.deviations)
+        runs: list[list[Floats]] = [[] for _ in range(n)]
+        done = 0
+        for record in self.records:
+            for run in record.runs:
+                count = (run.stop - run.start) * n
+                part = weighted[..., done : done + count].reshape(*weighted.shape[:-1], -1, n)
+                done += count
+                for joint in range(n):
+                    runs[joint].append(part[..., joint])
+        return runs
+
+
+def observed(
+    model: Model, traces: Sequence[Trace], following: float = FOLLOWING
+) -> tuple[Observation, Model, tuple[Unknown, ...]]:
+    """Traces ready for a diagnosis, the model with potentiometers that may bend within their linearity, and all that
+    may differ from its values on a sound machine: every number with an expected deviation, the potentiometers' bends,
+    the form of friction near zero speed, and the posture at the start.
+
+    Raises:
+        TraceError, SpecError: as `model.fitting.fit.fit`.
+    """
+    stated = tuple(p.name for p in model.parameters if p.deviation is not None and p.deviation > 0 and p.null is None)
+    effects = tuple(p.name for p in model.parameters if p.effect is not None and p.deviation is not None)
+    problem: SimulatedProblem = fit_problem(
+        model, traces, FitOptions(parameters=tuple(dict.fromkeys((*stated, *effects))), bend_terms=BEND_TERMS)
+    )
+    sensors = [model.machine.joint(j).sensor for j in model.machine.modelled_joints]
+    unit = np.array([1.0 if s is None else s.range.value / 2**s.bits for s in sensors])
+    options = Options(quantise=False, following=following)
+    prepared = tuple(prepare(problem.model, r.inputs, options) for r in problem.records)
+    given = {p.name: p.value for p in model.parameters if p.effect is not None}
+    unknowns = tuple(_loose_start(_even_bend(_as_given(u, given), problem.model)) for u in problem.unknowns)
+    return Observation(problem.records, problem.floor, unit, prepared), problem.model, unknowns
+
+
+def _as_given(unknown: Unknown, given: Mapping[str, float]) -> Unknown:
+    """An effect that the model was given with is expected to be what it was found to be."""
+    return replace(unknown, expected=given[unknown.name]) if unknown.name in given else unknown
+
+
+def longest_step_of(model: Model) -> float:
+    """Longest step of integration, s, with which a model can be followed."""
+    return CONTACT_STEP if any(use.name == "backlash" for use in model.effects) else COARSE_STEP
+
+
+def step_of_derivatives(model: Model) -> float:
+    """Longest step of integration, s, of runs that are compared over a small move."""
+    return STEP if any(use.name in STIFF for use in model.effects) else COARSE_STEP
+
+
+def _difference(model: Model, unknown: Unknown, value: float, seconds: float) -> float:
+    """The move over which a derivative is taken, towards the inside of the unknown's bounds. `seconds`: of the longest
+    record."""
+    parameter = model.by_name.get(unknown.name)
+    stated = None if parameter is None else parameter.deviation
+    size = DIFFERENCE * (unknown.deviation or stated or unknown.scale)
+    last = None if parameter is None else (parameter.effect, unknown.name.rpartition(".")[2])
+    if last in (("torque_ripple", "cycles"), ("periodic_disturbance", "frequency")):
+        size = TONE_DIFFERENCE / (1.0 if last[1] == "cycles" else seconds)
+    if unknown.name.startswith(INITIAL + "."):
+        size /= LOOSE_START
+    return -size if value + size > unknown.high else size
+
+
+def _loose_start(unknown: Unknown) -> Unknown:
+    """A posture at the start, free to be where the trace shows it."""
+    if not unknown.name.startswith(INITIAL + ".") or unknown.deviation is None:
+        return unknown
+    limit = 2 * LOOSE_START * unknown.deviation
+    return replace(unknown, deviation=LOOSE_START * unknown.deviation, low=-limit, high=limit)
+
+
+def _even_bend(unknown: Unknown, model: Model) -> Unknown:
+    """The bends of a sound potentiometer, every term alike: nothing says that its curve is a smooth one."""
+    if not (unknown.nuisance and unknown.name.rpartition(".")[2].startswith("bend_")):
+        return unknown
+    sensor = model.machine.joint(int(unknown.name.partition(".")[0].removeprefix("joint"))).sensor
+    if sensor is None or sensor.linearity is None:
+        return unknown
+    return replace(unknown, deviation=BEND_SHARE * sensor.linearity.value * sensor.range.value)

@@ -1,0 +1,47 @@
+"""The command line as a person types it, in this process: output, complaints, exit code."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+
+import pytest
+
+from daq_cli.app.command import main
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a command has said and ended with."""
+
+    code: int
+    out: str
+    err: str
+
+    def complains(self, code: int, *words: str) -> None:
+        """It ended with `code` and exactly one line, which holds the words, on standard error."""
+        assert self.code == code, (self.out, self.err)
+        assert self.out == ""
+        lines = [line for line in self.err.splitlines() if not line.startswith("No robot is configured")]
+        assert len(lines) == 1, self.err
+        assert lines[0].startswith("daq: ")
+        for word in words:
+            assert word in lines[0], lines[0]
+
+
+class CommandLine:
+    """`daq(...)` runs a command."""
+
+    def __init__(self, capture: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+        self._capture = capture
+        self._monkeypatch = monkeypatch
+
+    def __call__(self, *words: object) -> Said:
+        self._monkeypatch.setattr(sys, "argv", ["daq", *map(str, words)])
+        self._capture.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = self._capture.readouterr()
+        code = ended.value.code
+        assert isinstance(code, int)
+        return Said(code, said.out, said.err)

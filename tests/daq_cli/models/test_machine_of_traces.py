@@ -1,0 +1,68 @@
+"""The machine that traces were made on: one, whatever it is called; its limits may have changed meanwhile."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from daq.contracts.errors import SpecError
+from daq.contracts.limits import Limits
+from daq.contracts.machine import Machine, load_machine
+from daq.contracts.trace import Trace
+from daq_cli.app.context import Invocation
+from daq_cli.models.model_input import check_made_for, machine_of
+from tests.daq.traces.samples import record
+from tests.daq_cli.models.conftest import ROOT
+
+MA2000 = load_machine("ma2000")
+
+
+def trace(machine: Machine | None) -> Trace:
+    return Trace(record(machine=machine), (1,), np.arange(3.0), np.zeros((3, 1)))
+
+
+def unnamed(*joints: int) -> Trace:
+    """A trace of these joints that names no machine."""
+    return Trace(record(machine=None), joints, np.arange(3.0), np.zeros((3, len(joints))))
+
+
+def second_link(**changes: Any) -> Machine:
+    """The machine with another mass of its second link."""
+    joint = MA2000.joint(2)
+    link = joint.link.model_copy(update={"mass": joint.link.mass.model_copy(update=changes)})
+    return MA2000.model_copy(
+        update={"joints": (MA2000.joint(1), joint.model_copy(update={"link": link}), *MA2000.joints[2:])}
+    )
+
+
+def test_two_machines_of_one_name_are_refused_with_where_they_differ() -> None:
+    with pytest.raises(SpecError, match=r"both called ma2000: joints\.2\.link\.mass\.value differs"):
+        machine_of([trace(MA2000), trace(second_link(value=1.0))], Invocation())
+
+
+def test_what_is_only_said_otherwise_is_the_same_machine() -> None:
+    other = second_link(source="weighed").model_copy(update={"title": "the arm", "limits": Limits(reach=0.5)})
+    assert machine_of([trace(MA2000), unnamed(1, 2, 3), trace(other)], Invocation()) == other
+
+
+def test_traces_that_name_none_are_of_the_configured_machine_which_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    assert machine_of([unnamed(1, 2, 3)], Invocation(), ["bench.csv"]) == MA2000
+    assert "bench.csv: no machine is named there: taken for the configured ma2000" in capsys.readouterr().err
+
+
+def test_a_trace_that_names_none_and_lacks_joints_needs_a_model() -> None:
+    with pytest.raises(SpecError, match=r"^bench\.csv: names no machine, and has no joint 2 or 3 of ma2000.*--model"):
+        machine_of([unnamed(1)], Invocation(), ["bench.csv"])
+
+
+def test_a_trace_of_another_machine_is_told_by_its_file() -> None:
+    bench = load_machine(str(ROOT / "examples" / "motor_bench.toml"))
+    with pytest.raises(SpecError, match=r"^axis\.csv: has no velocity, which the sensors of motor-bench measure"):
+        check_made_for(bench, [unnamed(1)], ["axis.csv"])
+    with pytest.raises(SpecError, match=r"^axis\.csv: has no joint 2 or 3, which the model of ma2000 moves; it has 1$"):
+        check_made_for(MA2000, [unnamed(1)], ["axis.csv"])
+    with pytest.raises(SpecError, match=r"^arm\.mcap: was made on ma2000, the model describes motor-bench"):
+        check_made_for(bench, [trace(MA2000)], ["arm.mcap"])
+    check_made_for(MA2000, [unnamed(1, 2, 3)], ["arm.csv"])

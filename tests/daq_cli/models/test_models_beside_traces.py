@@ -1,0 +1,100 @@
+"""Simulate, compare and fit from the command line, on traces whose truth is known."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import load_machine
+from model.machine_model.model import base_model
+from tests.daq_cli.invoke import CommandLine
+from tests.daq_cli.models.conftest import ROOT, SINGLE_AXIS, write_csv
+
+RIG = ROOT / "examples" / "single_axis_rig.py"
+
+
+def rig_traces(folder: Path) -> list[Path]:
+    """Traces of the pretended rig of the guide."""
+    run = subprocess.run([sys.executable, str(RIG), str(folder)], check=True, capture_output=True, text=True)
+    return [Path(line) for line in run.stdout.split()]
+
+
+def test_a_simulated_trace_simulated_again_leaves_nothing(daq: CommandLine, tmp_path: Path) -> None:
+    """What `simulate` writes is a trace like any other; the model explains its own motion to one count, since the
+    start posture is known no better."""
+    trace = write_csv(tmp_path / "sine.csv")
+    first = daq("simulate", SINGLE_AXIS, trace, "-o", tmp_path / "simulated.csv", "--json")
+    assert json.loads(first.out)["agreement"]["in_sample"][0]["rmse"] > 0
+    again = json.loads(daq("simulate", SINGLE_AXIS, tmp_path / "simulated.csv", "--json").out)
+    assert again["agreement"]["in_sample"][0]["largest"] < 1.01 * 2 * math.pi / 2**14
+
+
+def test_a_simulated_trace_does_not_replace_the_machine_file(daq: CommandLine, tmp_path: Path) -> None:
+    machine = tmp_path / "axis.toml"
+    machine.write_text(SINGLE_AXIS.read_text())
+    said = daq("simulate", machine, write_csv(tmp_path / "run.csv"), "-o", tmp_path / "axis.csv")
+    said.complains(2, "axis.csv", "axis.toml")
+    assert machine.read_text() == SINGLE_AXIS.read_text()
+
+
+def test_a_fit_is_kept_when_what_comes_after_it_fails(
+    daq: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Found:
+        model = base_model(load_machine(str(SINGLE_AXIS)))
+
+        def save(self, path: Path) -> None:
+            path.write_text("found")
+
+    def fails(*_: object, **__: object) -> None:
+        raise SpecError("cannot be compared")
+
+    monkeypatch.setattr("model.fitting.fit.fit", lambda *_: Found())
+    monkeypatch.setattr("model.comparison.compare.compare", fails)
+    out = tmp_path / "out.json"
+    said = daq("fit", write_csv(tmp_path / "run.csv"), "--machine", SINGLE_AXIS, "-o", out)
+    assert said.code == 2
+    assert f"model {Found.model.identity}: {out}" in said.err
+    assert out.read_text() == "found"
+
+
+def test_compare_names_the_parameter_that_differs(daq: CommandLine, tmp_path: Path) -> None:
+    heavier = tmp_path / "heavier.toml"
+    heavier.write_text(SINGLE_AXIS.read_text().replace("value = 0.8, unit", "value = 1.2, unit"))
+    trace = write_csv(tmp_path / "sine.csv")
+    simulated = tmp_path / "simulated.csv"
+    daq("simulate", SINGLE_AXIS, trace, "-o", simulated)
+    page = tmp_path / "compared.html"
+    said = daq("compare", SINGLE_AXIS, heavier, simulated, "--json", "--report", page)
+    data = json.loads(said.out)
+    assert [d["name"] for d in data["differences"]] == ["link1.mass"]
+    assert data["differences"][0]["deviations"] == pytest.approx(5.0)
+    errors = data["mean_squared_error"]
+    assert errors["heavier"]["in_sample"] > 100 * errors["single_axis"]["in_sample"]
+    assert "single_axis and heavier compared" in page.read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(400)
+def test_a_fit_finds_what_the_rig_was_made_with(daq: CommandLine, tmp_path: Path) -> None:
+    """The rig is integrated by a script that shares nothing with the model; the guide shows this very example."""
+    first, second = rig_traces(tmp_path)
+    out, page = tmp_path / "axis.json", tmp_path / "axis.html"
+    words = ("fit", first, "--machine", SINGLE_AXIS, "--holdout", second, "-o", out, "--report", page, "--json")
+    data = json.loads(daq(*words).out)
+    found = {p["name"]: p for p in data["parameters"]}
+    true = {"link1.mass": 0.87, "joint1.viscous_friction.coefficient": 0.035, "joint1.coulomb_friction.torque": 0.06}
+    for name, value in true.items():
+        assert found[name]["verdict"] == "known"
+        assert found[name]["value"] == pytest.approx(value, rel=0.02)
+    fitted = data["agreement"][1]
+    assert fitted["held_out"][0]["rmse"] < 0.1 * data["agreement"][0]["held_out"][0]["rmse"]
+    assert re.search(r"determine 5 of 5", page.read_text())
+    assert daq("simulate", out, second).code == 0

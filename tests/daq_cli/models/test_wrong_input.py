@@ -1,0 +1,149 @@
+"""What cannot give a model is refused in one line that says what, where and what is allowed; no file is written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.daq_cli.invoke import CommandLine
+from tests.daq_cli.models.conftest import SINGLE_AXIS, write_csv
+
+
+def refused(daq: CommandLine, *words: object, says: tuple[str, ...], code: int = 2) -> None:
+    daq(*words).complains(code, *says)
+    assert not Path("out.json").exists()
+
+
+def fitting(*traces: object) -> tuple[object, ...]:
+    return ("fit", *traces, "--machine", SINGLE_AXIS, "-o", "out.json")
+
+
+def test_a_trace_without_motion(daq: CommandLine, tmp_path: Path) -> None:
+    still = write_csv(tmp_path / "still.csv", amplitude=0.0)
+    refused(daq, *fitting(still), says=("no motion", "4 counts"))
+
+
+def test_a_trace_with_a_value_that_is_no_number(daq: CommandLine, tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "nan.csv")
+    path.write_text(path.read_text().replace("0.100000,", "0.100000,nan,", 1).replace(",nan,", ",nan,", 1))
+    lines = path.read_text().splitlines()
+    row = next(k for k, line in enumerate(lines) if "nan" in line)
+    lines[row] = ",".join([lines[row].split(",")[0], "nan", *lines[row].split(",")[3:]])
+    path.write_text("\n".join(lines) + "\n")
+    refused(daq, *fitting(path), says=(f"row {row + 1}", "'nan' is not a finite number"))
+
+
+def test_a_trace_of_two_samples(daq: CommandLine, tmp_path: Path) -> None:
+    refused(daq, *fitting(write_csv(tmp_path / "two.csv", count=2)), says=("2 samples", "at least 10"))
+
+
+def test_a_joint_that_the_trace_lacks(daq: CommandLine, tmp_path: Path) -> None:
+    one = write_csv(tmp_path / "one.csv")
+    refused(daq, "fit", one, "--machine", "ma2000", "-o", "out.json", says=("joint 2 is not in it",))
+
+
+def test_degrees_instead_of_radians_are_named(daq: CommandLine, tmp_path: Path) -> None:
+    degrees = write_csv(tmp_path / "degrees.csv", scale=57.29577951308232)
+    refused(daq, *fitting(degrees), says=("joint 1", "degrees", "rad"))
+
+
+def test_fewer_samples_than_parameters(daq: CommandLine, tmp_path: Path) -> None:
+    short = write_csv(tmp_path / "short.csv", count=12)
+    everything = ("--effects", "viscous,coulomb,stribeck,stiction,torque_ripple,gear_loss,spring,potentiometer_gain")
+    words = (*fitting(short), *everything, "--parameters", "*")
+    refused(daq, *words, says=("12 samples for", "more samples than parameters"))
+
+
+def test_a_bound_the_wrong_way_round(daq: CommandLine, tmp_path: Path) -> None:
+    trace = write_csv(tmp_path / "good.csv")
+    words = (*fitting(trace), "--bound", "link1.mass=2:1")
+    refused(daq, *words, says=("link1.mass=2:1", "lower bound 2 is not below the upper 1"))
+
+
+def test_a_bound_that_is_no_number(daq: CommandLine, tmp_path: Path) -> None:
+    trace = write_csv(tmp_path / "good.csv")
+    refused(daq, *fitting(trace), "--bound", "link1.mass=much:", says=("link1.mass=much:", "numbers"))
+
+
+def test_a_machine_without_inertia(daq: CommandLine, tmp_path: Path) -> None:
+    text = SINGLE_AXIS.read_text().replace("value = 0.8, unit", "value = 0.0, unit")
+    text = text.replace("value = 0.004, unit", "value = 0.0, unit")
+    (tmp_path / "weightless.toml").write_text(text)
+    trace = write_csv(tmp_path / "good.csv")
+    words = ("fit", trace, "--machine", tmp_path / "weightless.toml", "-o", "out.json")
+    refused(daq, *words, says=("joint 1 has no inertia",))
+
+
+@pytest.mark.parametrize("command", ["simulate", "validate"])
+def test_a_model_of_a_newer_version(daq: CommandLine, tmp_path: Path, command: str) -> None:
+    trace = write_csv(tmp_path / "good.csv")
+    newer = tmp_path / "newer.json"
+    newer.write_text(json.dumps({"format": 99, "machine": {}}))
+    refused(daq, command, newer, trace, says=("newer.json", "format 99", "up to 1"))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [("{", ("not JSON",)), ("[]", ("neither a model",)), ('{"machine": {}}', ("no version",)),
+     ('{"format": 1, "machine": {}}', ("machine.version",))],
+)  # fmt: skip
+def test_a_file_that_is_no_model(daq: CommandLine, tmp_path: Path, text: str, says: tuple[str, ...]) -> None:
+    (tmp_path / "model.json").write_text(text)
+    trace = write_csv(tmp_path / "good.csv")
+    refused(daq, "simulate", tmp_path / "model.json", trace, says=("model.json", *says))
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("--effects warp_drive", ("effect 'warp_drive'", "viscous_friction")),
+        ("--effects st", ("effect 'st'", "could be", "stribeck_friction", "stiction")),
+        ("--effects viscous:2", ("viscous_friction on joint 2", "[1]")),
+        ("--effects payload:1", ("payload", "whole machine")),
+        ("--effects viscous,viscous", ("viscous_friction", "twice")),
+        ("--parameters link7.mass", ("link7.mass", "not in this model")),
+        ("--parameters ,", ("no parameter named",)),
+        ("--model model.json", ("--model and --machine",)),
+    ],
+)
+def test_what_is_not_there_is_named(daq: CommandLine, tmp_path: Path, words: str, says: tuple[str, ...]) -> None:
+    trace = write_csv(tmp_path / "good.csv")
+    refused(daq, *fitting(trace), *words.split(), says=says)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("fit nothing -o missing/out.json", ("--out missing/out.json", "no folder")),
+        ("diagnose nothing -o missing/out.json", ("--out missing/out.json", "no folder")),
+        ("diagnose nothing --report missing/page.html", ("report missing/page.html", "no folder")),
+        ("fit nothing -o out.json --torques --starts 3", ("--torques", "--starts")),
+        ("fit nothing -o out.json --torques --open-loop", ("--torques", "--open-loop")),
+        ("fit nothing -o out.json --torques --method nelder_mead", ("--torques", "--method")),
+        ("fit nothing -o out.json --torques --seed 2", ("--torques", "--seed")),
+    ],
+)
+def test_what_cannot_be_is_said_before_a_trace_is_read(daq: CommandLine, words: str, says: tuple[str, ...]) -> None:
+    refused(daq, *words.split(), says=says)
+
+
+def test_the_same_trace_twice(daq: CommandLine, tmp_path: Path) -> None:
+    trace = write_csv(tmp_path / "good.csv")
+    imported = Path(daq("traces", "import", trace, "--folder", tmp_path).out.strip())
+    refused(daq, *fitting(imported, imported), says=("more than once",))
+
+
+def test_one_model_is_not_compared(daq: CommandLine, tmp_path: Path) -> None:
+    refused(daq, "compare", SINGLE_AXIS, write_csv(tmp_path / "good.csv"), says=("1 model named", "at least two"))
+
+
+def test_models_of_different_joints_are_not_compared(daq: CommandLine, tmp_path: Path) -> None:
+    trace = write_csv(tmp_path / "good.csv", joints=3)
+    refused(daq, "compare", SINGLE_AXIS, "ma2000", trace, says=("cannot be compared", "[1, 2, 3]"))
+
+
+def test_a_report_of_another_kind(daq: CommandLine, tmp_path: Path) -> None:
+    trace = write_csv(tmp_path / "good.csv")
+    daq("simulate", SINGLE_AXIS, trace, "--report", "page.txt").complains(2, "page.txt", ".html")

@@ -1,0 +1,33 @@
+"""A trace's CSV never takes the place of a configuration or a machine file that has the name of its TOML."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.daq.traces.samples import write
+from tests.daq_cli.invoke import CommandLine
+
+
+@pytest.mark.parametrize(
+    "text", ['operator = "anna"\n', '[robot]\nname = "bench"\n', "", 'machine = "rig.toml"\ndrive_unit = "V"\n', "no"]
+)
+def test_a_toml_that_is_no_traces_is_not_replaced(daq: CommandLine, tmp_path: Path, text: str) -> None:
+    trace = write(tmp_path / "a.mcap", 3)
+    other = tmp_path / "other.toml"
+    other.write_text(text)
+    daq("traces", "export", trace, "-o", tmp_path / "other.csv").complains(2, "other.csv", "other.toml", "another name")
+    assert other.read_text() == text
+    assert not (tmp_path / "other.csv").exists()
+
+
+def test_the_same_trace_is_exported_again(daq: CommandLine, tmp_path: Path) -> None:
+    trace = write(tmp_path / "a.mcap", 3)
+    for _ in range(2):
+        assert daq("traces", "export", trace, "-o", tmp_path / "a.csv").code == 0
+
+
+def test_a_csv_does_not_have_the_name_of_its_toml(daq: CommandLine, tmp_path: Path) -> None:
+    trace = write(tmp_path / "a.mcap", 3)
+    daq("traces", "export", trace, "-o", tmp_path / "a.toml").complains(2, "a.toml", "name a .csv")

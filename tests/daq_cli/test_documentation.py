@@ -1,0 +1,85 @@
+"""docs/command-line.md shows every command there is, no other, with options that exist; and every exit code."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer.main
+
+import daq
+from daq.acquisition.process import EXIT_CODES, EXIT_INTERRUPTED, EXIT_PROGRAM_FAULT, EXIT_WRONG_INPUT
+from daq.contracts.errors import DaqError
+from daq_cli import run_result, stop, traces
+from daq_cli.app.lazy import SUBCOMMANDS
+
+entry = importlib.import_module("daq_cli.app.command")
+PAGE = Path(__file__).parents[2].joinpath("docs", "command-line.md").read_text("utf-8")
+EXAMPLES = [shlex.split(text) for text in re.findall(r"\| `daq ([^`]+)` \|", PAGE)]
+
+
+def commands() -> dict[tuple[str, ...], Any]:
+    """Every command that does something, by its words."""
+
+    def below(words: tuple[str, ...], command: Any) -> Iterator[tuple[tuple[str, ...], Any]]:
+        for name, sub in getattr(command, "commands", {}).items():
+            yield from below((*words, name), sub)
+        if not getattr(command, "commands", {}):
+            yield words, command
+
+    found: dict[tuple[str, ...], Any] = {}
+    for name, (module, _) in SUBCOMMANDS.items():
+        found |= dict(below((name,), typer.main.get_command(importlib.import_module(module).app)))
+    return found
+
+
+COMMANDS = commands()
+
+
+def command_of(words: list[str]) -> tuple[str, ...]:
+    return next(tuple(words[:n]) for n in (3, 2, 1) if tuple(words[:n]) in COMMANDS)
+
+
+def test_every_command_has_an_example() -> None:
+    assert {command_of(words) for words in EXAMPLES} == set(COMMANDS)
+
+
+@pytest.mark.parametrize("words", EXAMPLES, ids=" ".join)
+def test_every_example_can_be_typed(words: list[str]) -> None:
+    name = command_of(words)
+    if name == ("mock",):
+        return  # its options are the mock's own
+    rest = words[len(name) :]
+    with COMMANDS[name].make_context(" ".join(name), list(rest), resilient_parsing=False) as context:
+        assert context.command is COMMANDS[name]
+
+
+def exit_codes_of_errors() -> set[int]:
+    for module in pkgutil.walk_packages(daq.__path__, "daq."):
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
+
+    def below(kind: type[DaqError]) -> Iterator[type[DaqError]]:
+        yield kind
+        for sub in kind.__subclasses__():
+            yield from below(sub)
+
+    return {int(kind.exit_code) for kind in below(DaqError)}
+
+
+def test_every_exit_code_is_explained() -> None:
+    explained = {int(code) for code in re.findall(r"^\| (\d+) \|", PAGE, re.MULTILINE)}
+    used = exit_codes_of_errors() | set(EXIT_CODES.values()) | set(run_result.EXIT_CODES.values())
+    used |= {EXIT_INTERRUPTED, EXIT_PROGRAM_FAULT, EXIT_WRONG_INPUT, stop.EXIT_NOT_DELIVERED}
+    used |= {traces.EXIT_NOT_TRUSTWORTHY, entry.EXIT_INTERRUPTED, entry.EXIT_PROGRAM_FAULT, entry.EXIT_WRONG_INPUT}
+    assert explained == used
+
+
+def test_both_processes_end_with_the_same_codes() -> None:
+    assert EXIT_CODES == run_result.EXIT_CODES

@@ -1,0 +1,116 @@
+"""`daq traces` with files made to do harm: one line and the documented exit code, never a traceback."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.daq.traces.samples import write
+from tests.daq.traces.test_files_that_are_no_trace import foreign, ours
+from tests.daq.traces.test_hostile_files import bomb
+from tests.daq_cli.invoke import CommandLine
+
+FILES = {
+    "joints": (lambda: foreign(ours() | {"joints": ""}), "joints = ''"),
+    "nested": (lambda: foreign(ours() | {"record": '{"a":' * 10**5}), "its metadata is not that of a trace"),
+    "created": (lambda: foreign(ours(created="9999-12-31T23:59:59-14:00")), "the years 1970 to 2261"),
+    "bomb": (lambda: bomb(2**62, 1000), "declares more than 67108864 bytes (traces.limits.chunk_bytes)"),
+}
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_a_trace_made_to_do_harm_gets_one_line(daq: CommandLine, tmp_path: Path, kind: str) -> None:
+    make, complaint = FILES[kind]
+    path = tmp_path / f"{kind}.mcap"
+    path.write_bytes(make())
+    for words in (["show", path], ["plot", path], ["export", path, "-o", tmp_path / "a.csv"]):
+        daq("traces", *words).complains(2, str(path), complaint)
+    verified = daq("traces", "verify", path)
+    assert (verified.code, verified.err) == (5, "")
+    assert complaint in verified.out
+    listed = daq("traces", "ls", "--folder", tmp_path, "--json")
+    assert (listed.code, listed.err) == (0, "")
+    assert kind == "bomb" or complaint in listed.out
+
+
+@pytest.mark.parametrize(
+    ("text", "toml", "complaint"),
+    [
+        ("-1e308,0\n1e308,1", "", "row 2, column 'time': -1e+308 is too large, allowed is ±4e+09 s"),
+        ("0,0\n1,1e308", "", "row 3, column 'position_1': 1e+308 is too large, allowed is ±1e+09 rad or m"),
+        ("nan,0", "", "row 2, column 'time': 'nan' is not a finite number"),
+        ("0,0\ninf,0", "", "row 3, column 'time': 'inf' is not a finite number"),
+        ("0,0\n1e-320,0", "", "row 3, column 'time': 1e-320 does not increase after 0.0 by 1e-09 s at least"),
+        ("-0.0,0\n0,0", "", "row 3, column 'time': 0.0 does not increase after -0.0"),
+        ("0,\0", "", "row 2, column 'position_1'"),
+        ("0," + "9" * 200_000, "", "is not CSV: field larger than field limit"),
+        ("0,0", "a = " + "[" * 5000, "nested more than 64 levels deep"),
+        ("0,0", "notes = " + "[" * 70 + "]" * 70, "nested more than 64 levels deep"),
+        ("0,0", "notes = 0x" + "f" * 6000, "a whole number has more than a thousand digits"),
+        ("0,0", "notes = 0x" + "f" * 600, "notes: Input should be a valid string (got 0xffff"),
+        ("0,0", ".".join(["a"] * 5000) + " = 1", "a key has more than 64 parts"),
+        ("0,0\n\n1,1\n\n1,2", "", "row 6, column 'time': 1.0 does not increase after 1.0"),
+        ("0,0", "created = 9999-12-31T23:59:59-14:00", "created: Value error, a moment of the years 1970 to 2261"),
+        ("0,0", "created = 2020-01-01T00:00:00", "created: 2020-01-01T00:00:00 has no time zone; write Z behind it"),
+        ("0,0", "period = 1e-300", "period = 1e-300 s, allowed is 1e-06 to 86400 s"),
+    ],
+)
+def test_a_csv_made_to_do_harm_gets_one_line(
+    daq: CommandLine, tmp_path: Path, text: str, toml: str, complaint: str
+) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text(f"time,position_1\n{text}\n")
+    if toml:
+        path.with_suffix(".toml").write_text(toml)
+    daq("traces", "import", path, "--folder", tmp_path / "traces").complains(2, str(tmp_path), complaint)
+    assert not list((tmp_path / "traces").glob("*")) if (tmp_path / "traces").exists() else True
+
+
+def test_what_is_no_file_is_not_waited_for(daq: CommandLine, tmp_path: Path) -> None:
+    daq("traces", "import", "/dev/zero").complains(2, "/dev/zero", "it is no file")
+    daq("traces", "import", ".").complains(2, "Is a directory")
+    (tmp_path / "rig.csv").write_text("time,position_1\n0,0\n1,1\n")
+    (tmp_path / "rig.toml").symlink_to("/dev/zero")
+    daq("traces", "import", tmp_path / "rig.csv").complains(2, "rig.toml", "it is no file")
+    daq("traces", "show", "a" * 5000).complains(2, "is not a file")
+
+
+def test_limits_are_configured(daq: CommandLine, tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mcap", 50)
+    Path("daq.toml").write_text("[traces.limits]\njoints = 2\n")
+    daq("traces", "show", path).complains(2, "joints = '1 2 3' are not 1 to 2 different", "(traces.limits.joints)")
+    Path("daq.toml").write_text("[traces.limits]\njoint = 2\n")
+    daq("traces", "show", path).complains(2, "traces.limits.joint", "chunk_bytes")
+
+
+def test_a_trace_does_not_command_the_terminal(daq: CommandLine, tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mcap", 3, notes="\x1b[31mred\x07", operator="\x1b]0;title\x07", robot="a\x1b[2J")
+    shown = daq("traces", "show", path)
+    assert shown.code == 0
+    assert "red" in shown.out
+    assert "\x1b" not in shown.out
+    assert "\x07" not in shown.out
+
+
+def test_the_name_of_a_file_does_not_command_the_terminal(daq: CommandLine, tmp_path: Path) -> None:
+    path = write(tmp_path / "a\x1b[2J.mcap", 3)
+    for words in (("show", path), ("export", path)):
+        shown = daq("traces", *words)
+        assert shown.code == 0
+        assert "a\N{REPLACEMENT CHARACTER}[2J" in shown.out
+        assert "\x1b" not in shown.out
+
+
+def test_what_was_not_salvaged_is_told_with_where_it_is(daq: CommandLine, tmp_path: Path) -> None:
+    data = write(tmp_path / "a.mcap", 50).read_bytes()
+    (tmp_path / "a.mcap").rename(tmp_path / "a.mcap.part")
+    with (tmp_path / "a.mcap.part").open("ab") as stream:
+        stream.write(b"noise")
+    (tmp_path / "b.mcap.part").write_bytes(data[:100])
+    said = daq("traces", "salvage", "--folder", tmp_path)
+    assert said.code == 5
+    first, second = said.out.splitlines()
+    assert first.endswith("a.mcap: salvaged from a.mcap.part up to its damage; "
+                          "the 13 bytes after it are in a.mcap.part.damaged")  # fmt: skip
+    assert second.endswith("b.mcap.part: holds no trace; it was renamed to b.mcap.part.unreadable")

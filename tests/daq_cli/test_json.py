@@ -1,0 +1,98 @@
+"""`--json` makes every result one JSON document, the same here and at a server."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import typer
+
+from daq.contracts.service.robot import RobotStatus
+from daq.contracts.status import StatusReport, report_of
+from daq.trajectories.presets import PRESETS
+from tests.daq_cli.invoke import CommandLine
+from tests.daq_cli.test_documentation import COMMANDS
+
+WITHOUT = {
+    "gains set", "io set", "io gripper", "teach jog", "teach step", "teach program", "teach lead", "serve",
+    "queue pause", "queue resume", "token add", "token revoke", "mock", "demo",
+    "teach programs keep", "teach programs fetch", "teach programs delete",
+    "teach edit insert", "teach edit move", "teach edit delete", "teach edit change", "teach edit rename",
+}  # fmt: skip
+"""Commands that do something and have no data to give."""
+
+
+def test_every_command_that_gives_data_gives_it_as_json() -> None:
+    having = {" ".join(words) for words, one in COMMANDS.items() if any(p.name == "json" for p in one.params)}
+    missing = {" ".join(words) for words in COMMANDS} - having
+    assert missing <= WITHOUT
+
+
+def test_every_option_says_what_it_is() -> None:
+    silent = [
+        (" ".join(words), parameter.name)
+        for words, one in COMMANDS.items()
+        for parameter in one.params
+        if isinstance(parameter, typer.core.TyperOption | typer.core.TyperArgument) and not parameter.help
+    ]
+    assert silent == []
+
+
+def test_a_local_status_has_the_fields_of_a_service(daq: CommandLine, port: str) -> None:
+    said = daq("--port", port, "status", "--json")
+    assert said.code == 0, said.err
+    found = StatusReport.model_validate_json(said.out)
+    assert (found.server, found.queue, found.control) == (None, None, None)
+    assert found.sample is not None
+    assert found.identity is not None
+    assert (found.connection, found.arm, found.sample.joints) == ("connected", "idle", (1, 2, 3, 4, 5, 6))
+    assert "missed_set_points" in found.link.counters
+
+
+def test_a_report_holds_all_that_a_service_says() -> None:
+    """So that `report_of` leaves nothing out."""
+    own = StatusReport.model_fields
+    assert set(own) - {"server"} == set(RobotStatus.model_fields)
+    for name, field in RobotStatus.model_fields.items():
+        wanted = field.annotation if name not in ("control", "queue") else field.annotation | None
+        assert own[name].annotation == wanted, name
+
+
+def test_a_services_status_is_told_whole() -> None:
+    moment = "2026-01-01T00:00:00Z"
+    data = {
+        "robot": "ma2000", "machine": "ma2000", "port": "mock://", "connection": "lost", "arm": "disconnected",
+        "activity": "none", "link": {"state": "none"}, "control": {"holder": "nobody"}, "utc": moment,
+        "queue": {"paused": True, "reason": "no arm", "since": moment, "queued": 2},
+    }  # fmt: skip
+    status = RobotStatus.model_validate(data)
+    told = report_of(status, "http://arm:8300").model_dump(mode="json")
+    assert told == {"server": "http://arm:8300", **status.model_dump(mode="json")}
+
+
+def test_reset_preset_and_config_as_json(daq: CommandLine, port: str) -> None:
+    assert json.loads(daq("--port", port, "reset", "--json").out) == {
+        "server": None, "here": False, "text": "was not stopped",
+    }  # fmt: skip
+    listed = json.loads(daq("run", "preset", "--json").out)
+    assert [one["name"] for one in listed] == list(PRESETS)
+    checked = json.loads(daq("--port", "mock://", "config", "check", "--json").out)
+    assert (checked["machine"], checked["joints"], checked["port"]) == ("ma2000", 6, "mock://")
+
+
+def test_traces_made_from_traces_as_json(daq: CommandLine) -> None:
+    Path("rig.csv").write_text(
+        "time,set_point_1,position_1\n" + "".join(f"{k / 50},{k / 100},{k / 100}\n" for k in range(50))
+    )
+    made = json.loads(daq("traces", "import", "rig.csv", "--folder", "kept", "--json").out)
+    assert Path(made["file"]).is_file()
+    exported = json.loads(daq("traces", "export", made["file"], "-o", "again.csv", "--json").out)
+    assert exported == {"trace": made["file"], "file": "again.csv"}
+    drawn = json.loads(daq("traces", "plot", made["file"], "-o", "rig.html", "--json").out)
+    assert Path(drawn["file"]).is_file()
+
+
+@pytest.mark.parametrize("words", ["run preset nonsense --json", "traces show nothing --json"])
+def test_what_fails_gives_no_half_a_document(daq: CommandLine, words: str) -> None:
+    daq(*words.split()).complains(2)

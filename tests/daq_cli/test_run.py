@@ -1,0 +1,105 @@
+"""`daq run`: what it does, prints, and ends with; stopped in every way a person has."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from daq.traces.reader import read_trace
+from tests.daq_cli.invoke import CommandLine
+from tests.daq_cli.person import at_a_terminal
+
+LONG = ["run", "ramp", "--hold", "600", "--folder", "traces"]
+
+
+def test_the_main_job_to_its_end_as_json(daq: CommandLine, port: str) -> None:
+    said = daq("--port", port, "run", "ramp", "--joints", "1-3", "--folder", "traces", "--json", "--hold", "0.2")
+    assert said.code == 0, said.err
+    result = json.loads(said.out)
+    assert (result["outcome"], result["missing"]) == ("complete", 0)
+    trace = read_trace(Path(result["trace"]))
+    assert trace.record.spec is not None
+    assert trace.record.spec.joints == (1, 2, 3)
+    assert len(trace) == result["samples"]
+
+
+def test_the_main_job_for_people(daq: CommandLine, port: str) -> None:
+    said = daq("--port", port, "run", "step", "--joints", "3", "--folder", "traces", "--hold", "0.2")
+    assert said.code == 0
+    lines = said.out.splitlines()
+    assert lines[0].startswith("complete: ")
+    assert lines[1].startswith("link: retries 0, ")
+    assert Path(lines[2].removeprefix("trace: ")).is_file()
+
+
+def test_a_dry_run_connects_to_nothing_and_leaves_nothing(
+    daq: CommandLine, monkeypatch: pytest.MonkeyPatch, nobodys_desk: Path
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("a dry run starts no process")
+
+    monkeypatch.setattr(subprocess, "Popen", refuse)
+    said = daq("--port", "serial:///dev/nowhere", "run", "ramp", "--dry-run")
+    assert said.code == 0, said.err
+    assert "nothing was sent" in said.out
+    data = json.loads(daq("--port", "serial:///dev/nowhere", "run", "ramp", "--dry-run", "--json").out)
+    assert data["violations"] == []
+    assert data["preview"]["period"] == 0.02
+    assert not list(nobodys_desk.iterdir())
+
+
+def test_an_experiment_from_a_file(daq: CommandLine) -> None:
+    Path("one.json").write_text(json.dumps({"trajectory": {"kind": "pause", "duration": 1}, "joints": [2]}))
+    assert "pause: " in daq("run", "spec", "one.json", "--dry-run").out
+    Path("two.toml").write_text('joints = [2]\n[trajectory]\nkind = "pause"\nduration = -1\n')
+    daq("run", "spec", "two.toml", "--dry-run").complains(2, "experiment two.toml", "greater than 0", "-1")
+
+
+@pytest.mark.parametrize("keys", [b"\x03\x03", b"\x1a"], ids=["Ctrl-C twice", "Ctrl-Z"])
+def test_keys_that_stop_the_arm(keys: bytes) -> None:
+    with at_a_terminal(["--port", "mock://?pty=1&seed=3", *LONG]) as person:
+        person.until(b"ramp starts")
+        person.type(keys)
+        code = person.end()
+    assert code == 6, person.seen
+    assert b"stopped: " in person.seen
+    assert b"confirmed" in person.seen
+    (path,) = Path("traces").iterdir()
+    assert read_trace(path).record.outcome == "stopped"
+
+
+def test_stop_from_another_terminal(daq: CommandLine) -> None:
+    with at_a_terminal(["--port", "mock://?pty=1&seed=3", *LONG]) as person:
+        person.until(b"ramp starts")
+        said = daq("stop", "--json")
+        code = person.end()
+    assert said.code == 0
+    (answer,) = json.loads(said.out)
+    assert (answer["robot"], answer["delivered"], answer["confirmed"]) == ("ma2000", True, True)
+    assert code == 6
+    assert b"stopped on request, by daq stop or through the service" in person.seen
+
+
+def test_a_command_line_that_is_killed_leaves_an_interrupted_trace() -> None:
+    with at_a_terminal(["--port", "mock://?pty=1&seed=3", *LONG]) as person:
+        person.until(b"ramp starts")
+        children = Path(f"/proc/{person.process.pid}/task/{person.process.pid}/children").read_text().split()
+        (acquisition,) = [os.pidfd_open(int(child)) for child in children]
+        try:
+            person.process.send_signal(signal.SIGKILL)
+            signal_of_end(acquisition)
+        finally:
+            os.close(acquisition)
+    (path,) = Path("traces").iterdir()
+    assert read_trace(path).record.outcome == "interrupted"
+
+
+def signal_of_end(handle: int) -> None:
+    import select
+
+    assert select.select([handle], [], [], 30)[0], "the acquisition process outlived its parent"

@@ -1,0 +1,136 @@
+"""`daq stop`, whatever it finds: it says what became of it, and never says more than it knows."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+from pathlib import Path
+
+import pytest
+import serial
+
+from daq.acquisition.stop_socket import StopAnswer, StopAttempt, stop_listener
+from daq.driver import Controller
+from daq.transport.mock_process import MockProcess
+from tests.daq_cli.board import ask
+from tests.daq_cli.invoke import CommandLine
+
+
+def test_with_nothing_running_and_nothing_configured(daq: CommandLine) -> None:
+    said = daq("stop")
+    assert (said.code, said.err) == (3, "")
+    assert said.out == "no robot is being moved from here, and none is configured: nothing to stop\n"
+    assert json.loads(daq("stop", "--json").out) == []
+
+
+def test_a_robot_that_nobody_holds_is_stopped_over_its_port(daq: CommandLine, mock: MockProcess, port: str) -> None:
+    said = daq("--port", port, "stop")
+    assert said.code == 0
+    assert "stopped, confirmed by the board" in said.out
+    assert ask(mock, "state")["frozen"]
+    assert "holds its posture and takes set points again" in daq("--port", port, "reset").out
+    assert not ask(mock, "state")["frozen"]
+    assert "was not stopped" in daq("--port", port, "reset").out
+
+
+@pytest.mark.parametrize("words", [("reset",), ("reset", "--here")])
+def test_a_reset_ends_no_stop_that_comes_after_it_has_looked(
+    daq: CommandLine, mock: MockProcess, port: str, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
+) -> None:
+    assert daq("--port", port, "stop").code == 0
+    release = Controller.release
+
+    def overtaken(controller: Controller, *stop: int) -> None:
+        controller.link.stop()
+        release(controller, *stop)
+
+    with monkeypatch.context() as meanwhile:
+        meanwhile.setattr(Controller, "release", overtaken)
+        daq("--port", port, *words).complains(3, "another stop has come meanwhile, and holds")
+    assert ask(mock, "state")["frozen"]
+    assert daq("--port", port, *words).code == 0
+    assert not ask(mock, "state")["frozen"]
+
+
+def test_the_configured_robot_is_stopped_beside_those_that_run(daq: CommandLine, mock: MockProcess, port: str) -> None:
+    """A run on the mock must not hide that the arm itself was not asked."""
+    Path("daq.toml").write_text(f'[robot]\nport = "{port}"\n')
+    with stop_listener("another"):  # does not answer
+        said = daq("stop", "--json")
+    answers = {answer["robot"]: answer for answer in json.loads(said.out)}
+    assert said.code == 3
+    assert answers["ma2000"]["confirmed"]
+    assert not answers["another"]["delivered"]
+    daq("reset")
+
+
+def test_a_port_that_somebody_else_holds_is_told_as_not_delivered(daq: CommandLine) -> None:
+    master, slave = pty.openpty()
+    try:
+        with serial.Serial(os.ttyname(slave), exclusive=True):
+            said = daq("--port", f"serial://{os.ttyname(slave)}", "stop")
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert said.code == 3
+    assert "NOT DELIVERED" in said.out
+    assert "in use by another program" in said.out
+    assert "emergency stop" in said.out
+
+
+def test_a_board_that_does_not_answer_is_told_as_not_confirmed(daq: CommandLine) -> None:
+    master, slave = pty.openpty()
+    try:
+        said = daq("--port", f"serial://{os.ttyname(slave)}", "stop")
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert said.code == 3
+    assert "stop sent, NOT CONFIRMED" in said.out
+    assert "emergency stop" in said.out
+
+
+def test_a_configuration_that_cannot_be_read_is_told_and_stops_nobody_from_stopping(daq: CommandLine) -> None:
+    Path("daq.toml").write_text("[robot\n")
+    said = daq("stop")
+    assert said.code == 3
+    assert "NOT DELIVERED" in said.out
+    assert "not TOML" in said.out
+
+
+def test_with_a_service_by_default_what_is_moved_from_here_is_stopped_too(
+    daq: CommandLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DAQ_SERVER", "http://127.0.0.1:1")
+    Path("mine.toml").touch()
+    with stop_listener("another"):  # does not answer
+        here_too = json.loads(daq("--config", "mine.toml", "stop", "--json").out)
+        named = json.loads(daq("--server", "http://127.0.0.1:1", "stop", "--json").out)
+    assert [answer["robot"] for answer in here_too] == ["another", "ma2000"]
+    assert [answer["robot"] for answer in named] == ["ma2000"]
+
+
+def test_a_port_that_is_named_goes_before_the_service_by_default(
+    daq: CommandLine, mock: MockProcess, port: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DAQ_SERVER", "http://127.0.0.1:1")
+    said = daq("--port", port, "stop")
+    assert said.code == 0, said
+    assert ask(mock, "state")["frozen"]
+    daq("--port", port, "--server", "http://127.0.0.1:1", "stop").complains(2, "--port and --server")
+    assert daq("--port", port, "reset").code == 0
+
+
+@pytest.mark.parametrize("written", ["serial://{device}?baud=9600", "serial://{link}", "serial://{link}?baud=115200"])
+def test_a_port_whose_process_has_been_asked_is_not_opened_however_it_is_written(
+    daq: CommandLine, monkeypatch: pytest.MonkeyPatch, written: str
+) -> None:
+    device, link = Path("device").absolute(), Path("link").absolute()
+    device.touch()
+    link.symlink_to(device)
+    answer = StopAnswer(robot="arm", port=f"serial://{device}", delivered=True, confirmed=True, tick=7)
+    monkeypatch.setattr("daq_cli.app.early_stop._asked", [StopAttempt(Path("arm-1.sock"), answer, 0.0)])
+    said = daq("--port", written.format(device=device, link=link), "stop")
+    assert said.code == 0, said
+    assert said.out == "arm: stopped, confirmed by the board: set points frozen at tick 7\n"

@@ -1,0 +1,306 @@
+"""Keys that stop what a service's robot does, and `daq stop` at a service: sent in time, told, and never lost."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any
+
+import httpx
+import pytest
+
+from daq.client import Client, ServiceError, ServiceNotReachedError
+from daq.contracts.errors import SafetyError
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.service.problems import ProblemDetails
+from daq.contracts.service.robot import StopResult
+from daq.contracts.service.teaching import TaughtPath, TeachingStatus
+from daq.teaching import RecordedPath
+from daq.teaching.program import Program, Wait
+from daq_cli.app.context import Invocation
+from daq_cli.robot.remote import companion, run, teach
+from daq_cli.robot.remote.companion import Companion
+from daq_cli.robot.remote.teach import Stopped, StoppedAtServerError, lead_at_server, perform_at_server
+from tests.daq.client.service_stand_in import problem
+from tests.daq_cli.invoke import CommandLine
+
+FROZEN = StopResult(delivered=True, confirmed=True, tick=7, seconds=0.1, text="stopped, confirmed by the board")
+PROGRAM = Program(name="wait", instructions=(Wait(duration=1.0),))
+CALL = Invocation(server="http://arm.lab:8300")
+
+
+def refused(status: int, kind: str = "no") -> ServiceError:
+    return ServiceError(ProblemDetails(type=f"#{kind}", title="No", status=status, detail=kind))
+
+
+class Robot:
+    """Of a service. `cancel` does what a test says; stops are counted."""
+
+    def __init__(self, cancel: Callable[[], object] | None = None) -> None:
+        self.name = "arm"
+        self.stops = 0
+        self.patience: list[float | None] = []
+        self.attended = threading.Event()
+        self.status_of_teaching = TeachingStatus(activity="none", result="done: 1 instructions")
+        self.experiments = SimpleNamespace(cancel=self._cancel)
+        self.queue = SimpleNamespace(attend=self._attend)
+        self._does = cancel
+
+    def stop(self) -> StopResult:
+        self.stops += 1
+        return FROZEN
+
+    def teaching(self) -> TeachingStatus:
+        return self.status_of_teaching
+
+    def _cancel(self, _experiment: str, *, within: float | None = None) -> object:
+        self.patience.append(within)
+        assert self._does is not None
+        return self._does()
+
+    def _attend(self, *, within: float | None = None) -> None:
+        self.patience.append(within)
+        self.attended.set()
+
+
+def raising(error: Exception) -> Callable[[], object]:
+    def fail() -> object:
+        raise error
+
+    return fail
+
+
+def state(name: str) -> Callable[[], object]:
+    return lambda: SimpleNamespace(state=name)
+
+
+# ---- an experiment in the queue
+
+
+@pytest.fixture(autouse=True)
+def _patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However busy this computer is."""
+    monkeypatch.setattr(companion, "ENDS_WITHIN", 60.0)
+    monkeypatch.setattr(companion, "LEAVES_WITHIN", 60.0)
+
+
+@pytest.mark.parametrize(
+    "cancel",
+    [raising(refused(status)) for status in (401, 429, 500, 503)] + [raising(ServiceNotReachedError("no answer"))],
+    ids=["401", "429", "500", "503", "no answer"],
+)
+def test_a_cancel_that_is_not_carried_out_becomes_a_stop_that_is_told(
+    cancel: Callable[[], object], capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot: Any = Robot(cancel)
+    with Companion(robot, "1234", attends=False) as keys:
+        keys.press()
+    assert robot.stops == 1
+    assert robot.patience == [companion.ANSWER_WITHIN]
+    assert companion.ANSWER_WITHIN <= 1.0
+    assert "arm: stopped, confirmed by the board" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("cancel", [state("running"), raising(refused(409, "experiment-state"))])
+def test_an_experiment_that_still_runs_after_its_cancel_is_stopped(
+    cancel: Callable[[], object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(companion, "ENDS_WITHIN", 0.0)
+    stopped = threading.Event()
+    robot: Any = Robot(cancel)
+    robot.stop = lambda: stopped.set() or FROZEN
+    with Companion(robot, "1234", attends=False) as keys:
+        keys.press()
+        assert stopped.wait(60)
+
+
+def test_what_waits_is_taken_back_and_nobody_else_is_stopped() -> None:
+    robot: Any = Robot(state("cancelled"))
+    with Companion(robot, "1234", attends=False) as keys:
+        keys.press()
+    assert (robot.stops, len(robot.patience)) == (0, 1)
+
+
+def test_the_end_of_the_experiment_needs_no_stop() -> None:
+    robot: Any = Robot(raising(refused(404)))
+    with Companion(robot, "1234", attends=False) as keys:
+        keys.press()
+    assert robot.stops == 0
+
+
+def test_the_third_key_leaves_and_the_stop_is_sent_all_the_same() -> None:
+    robot: Any = Robot(state("running"))
+
+    def leave() -> None:
+        with Companion(robot, "1234", attends=False) as keys:
+            for _ in range(3):
+                keys.press()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        leave()
+    assert robot.stops >= 1
+
+
+def test_the_word_that_somebody_is_there_keeps_no_stop_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(companion, "ATTEND_EVERY", 0.0)
+    robot: Any = Robot()
+    with Companion(robot, "1234", attends=True):
+        assert robot.attended.wait(60)
+    assert robot.patience[0] == companion.ANSWER_WITHIN
+
+
+def test_a_queue_that_is_paused_while_the_operator_is_asked_stays_paused(monkeypatch: pytest.MonkeyPatch) -> None:
+    def status(paused: bool) -> SimpleNamespace:
+        queue = SimpleNamespace(paused=paused, reason="paused by bert: a guest is at the arm")
+        identity = SimpleNamespace(simulated=False)
+        return SimpleNamespace(robot="arm", port="serial:///dev/x", identity=identity, queue=queue)
+
+    answers = [status(False), status(True)]
+    resumed: list[dict[str, bool]] = []
+    robot = SimpleNamespace(
+        status=lambda: answers.pop(0), queue=SimpleNamespace(resume=lambda **word: resumed.append(word))
+    )
+
+    @contextmanager
+    def reached(_call: Invocation) -> Iterator[SimpleNamespace]:
+        yield robot
+
+    monkeypatch.setattr(run, "remote_robot", reached)
+    monkeypatch.setattr("daq_cli.app.consent.agreed", lambda *_: True)
+    with pytest.raises(SafetyError, match="a guest is at the arm"):
+        run.acquire_remotely(CALL, ExperimentSpec(), Invocation().trace_folder, False)
+    assert resumed == []
+
+
+# ---- teaching
+
+
+@pytest.mark.parametrize("error", [None, SafetyError("the program has ended"), refused(409, "stopped")])
+def test_a_key_that_meets_the_end_of_the_work_counts_as_a_stop(error: Exception | None) -> None:
+    robot: Any = Robot()
+
+    def work() -> None:
+        with Stopped(robot) as stopped:
+            stopped.press()
+            stopped.press()
+            if error is not None:
+                raise error
+
+    with pytest.raises(StoppedAtServerError, match="confirmed by the board"):
+        work()
+    assert robot.stops == 1
+
+
+def test_without_a_key_nothing_is_stopped() -> None:
+    robot: Any = Robot()
+    with Stopped(robot):
+        pass
+    assert robot.stops == 0
+
+
+@pytest.fixture
+def control(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """Of the robot `control.robot`."""
+    found = SimpleNamespace(robot=Robot(), lease=None, lead=lambda _: None)
+
+    @contextmanager
+    def held(_call: Invocation, _consent: bool) -> Iterator[tuple[Robot, SimpleNamespace]]:
+        yield found.robot, found
+
+    monkeypatch.setattr(teach, "controlled", held)
+    return found
+
+
+def test_a_program_that_ends_while_the_stop_is_in_flight(
+    control: SimpleNamespace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    control.perform = lambda _: signal.raise_signal(signal.SIGINT)
+    with pytest.raises(StoppedAtServerError):
+        perform_at_server(CALL, PROGRAM, consent=True)
+    assert control.robot.stops == 1
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize("finish", [None, refused(503, "not-reached")])
+def test_a_lead_that_is_stopped_keeps_its_path(control: SimpleNamespace, finish: ServiceError | None) -> None:
+    """The path is there only when the lead has ended, which is after the answer to the stop."""
+    path = TaughtPath(joints=(1,), times=(0.0, 0.1), positions=((0.0,), (0.1,)))
+    ended = TeachingStatus(activity="none", problem="the arm has been stopped", path=path)
+    kept: list[RecordedPath] = []
+
+    def end() -> TeachingStatus:
+        assert control.robot.stops == 1
+        control.robot.status_of_teaching = ended
+        if finish is not None:
+            raise finish
+        return ended
+
+    control.robot.status_of_teaching = TeachingStatus(activity="lead")
+    control.lead = lambda _: signal.raise_signal(signal.SIGINT)
+    control.finish = end
+    with pytest.raises(StoppedAtServerError):
+        lead_at_server(CALL, (1,), 60.0, kept.append, consent=True)
+    assert [one.joints for one in kept] == [(1,)]
+
+
+# ---- daq stop
+
+
+@pytest.fixture
+def asked_for_names(monkeypatch: pytest.MonkeyPatch) -> list[float | None]:
+    """How long was to be waited for the names of the service's robots, each time."""
+    waited: list[float | None] = []
+
+    def robots(_: Client, *, within: float | None = None) -> list[SimpleNamespace]:
+        waited.append(within)
+        return [SimpleNamespace(robot="other")]
+
+    monkeypatch.setattr(Client, "robots", robots)
+    return waited
+
+
+def test_a_service_that_does_not_answer_is_told_at_once(
+    daq: CommandLine, asked_for_names: list[float | None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def silent(url: str, **_: object) -> httpx.Response:
+        raise httpx.ReadTimeout("slow", request=httpx.Request("POST", url))
+
+    monkeypatch.setattr("daq.client.stopping.httpx.post", silent)
+    said = daq("--server", "http://arm.lab:8300", "stop")
+    assert said.code == 3
+    assert "ma2000: stop NOT DELIVERED" in said.out
+    assert asked_for_names == []
+
+
+def test_a_robot_of_another_name_is_stopped_and_the_name_that_is_not_known_is_told_first(
+    daq: CommandLine, asked_for_names: list[float | None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def post(url: str, **_: object) -> httpx.Response:
+        if "/other/" in url:
+            return httpx.Response(200, content=FROZEN.model_dump_json())
+        return problem(404, "not-found", "there is no robot 'ma2000'")
+
+    monkeypatch.setattr("daq.client.stopping.httpx.post", post)
+    said = daq("--server", "http://arm.lab:8300", "stop")
+    assert said.code == 0, said
+    assert said.err.startswith("there is no robot 'ma2000': http://arm.lab:8300 is asked to stop")
+    assert said.out.startswith("other: stopped, confirmed by the board")
+    assert len(asked_for_names) == 1
+    assert asked_for_names[0] is not None
+    assert asked_for_names[0] <= 1.0
+
+
+def test_a_token_that_no_header_can_carry_is_told_and_not_shown(
+    daq: CommandLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DAQ_TOKEN", "daq_schlüssel")
+    stopped = daq("--server", "http://127.0.0.1:1", "stop")
+    assert stopped.code == 3, stopped
+    assert "stop NOT DELIVERED: token: only ASCII" in stopped.out
+    told = daq("--server", "http://127.0.0.1:1", "status")
+    told.complains(2, "token: only ASCII")
+    assert "schl" not in stopped.out + stopped.err + told.err

@@ -1,0 +1,52 @@
+"""Records that were not fitted to meet a disturbance at a phase of their own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from daq.contracts.trace import Trace
+from model.discrepancy.inverse_dynamics.judging import held_out_squares
+from model.discrepancy.inverse_dynamics.records import TorqueRecord, torque_records
+from model.machine_model.model import Model, base_model
+from tests.model.discrepancy.inverse_dynamics import rigs
+
+CUTOFF = 8.0
+
+
+def records(*traces: Trace) -> tuple[TorqueRecord, ...]:
+    return torque_records(traces, rigs.slide_machine(), CUTOFF)
+
+
+def later(trace: Trace, samples: int) -> Trace:
+    """The record as if it had begun later."""
+    signals = {n: getattr(trace, n)[samples:] for n in ("position", "drive")}
+    return replace(trace, time=trace.time[samples:] - trace.time[samples], **signals)
+
+
+def humming(size: float) -> Model:
+    """The rig with the disturbance that `rigs` hides, as a fit to a record from its beginning would have it."""
+    values = {"sine": size, "cosine": 0.0, "frequency": rigs.SLIDE["hertz"]}
+    return base_model(rigs.slide_machine()).with_effect("periodic_disturbance", (1,), values)
+
+
+@pytest.fixture(scope="module")
+def hum() -> Trace:
+    return rigs.slide_trace(1, {"hum": 3.0}, duration=8.0)
+
+
+def test_a_record_may_begin_at_any_phase(hum: Trace) -> None:
+    step = float(np.median(np.diff(hum.time)))
+    whole = records(hum)
+    without = held_out_squares(base_model(rigs.slide_machine()), {}, whole)
+    starts = [round(share / rigs.SLIDE["hertz"] / step) for share in (0.25, 0.5, 0.8)]
+    for others in (whole, *(records(later(hum, k)) for k in starts), records(hum, later(hum, starts[1]))):
+        assert held_out_squares(humming(3.0), {}, others)[0] < 0.05 * without[0]
+
+
+def test_a_disturbance_does_not_vanish_from_a_record_that_does_not_show_it() -> None:
+    quiet = records(rigs.slide_trace(1, {}, duration=8.0))
+    without = held_out_squares(base_model(rigs.slide_machine()), {}, quiet)
+    assert held_out_squares(humming(3.0), {}, quiet)[0] > without[0] + 0.5 * 3.0**2 / 2

@@ -1,0 +1,167 @@
+"""Where: phases are what a person would call them, noise is not significant, a disagreement is found where it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from daq.contracts.errors import SpecError
+from model.discrepancy.localisation.disagreement import _beyond, located
+from model.discrepancy.localisation.phases import CREEP, HOLD, RAMP_START, REVERSAL, STEADY_RAMP, directions, phases_of
+from model.discrepancy.localisation.statistics import (
+    Correlation,
+    binned,
+    chance_significance,
+    correlation_of,
+    significance_of_squares,
+)
+from model.fitting.records import Record, noise_floor, records_of
+from model.machine_model.model import Model
+from tests.model.discrepancy.motions import PERIOD, every_phase
+from tests.model.fitting import imagined
+from tests.model.simulation.records import trace_of
+
+
+@pytest.fixture(scope="module")
+def arm() -> Model:
+    return imagined.arm()
+
+
+@pytest.fixture(scope="module")
+def records(arm: Model) -> tuple[Record, ...]:
+    """An arm that does what is asked; its drive goes with its speed."""
+    points = every_phase()
+    return records_of([trace_of(points, drive=10 * np.gradient(points, PERIOD, axis=0))], arm.machine, "position")
+
+
+def alike(shape: tuple[int, int], seed: int, memory: float = 0.7) -> np.ndarray:
+    """Noise of deviation 1 whose neighbours are alike."""
+    draws = np.random.default_rng(seed).standard_normal(shape)
+    noise = np.empty(shape)
+    noise[0] = draws[0]
+    for k in range(1, shape[0]):
+        noise[k] = memory * noise[k - 1] + np.sqrt(1 - memory**2) * draws[k]
+    return noise
+
+
+def test_phases_are_what_a_person_would_call_them(arm: Model, records: tuple[Record, ...]) -> None:
+    phase = phases_of(arm, records[0])[:, 0]
+
+    def at(seconds: float) -> int:
+        return int(phase[round(seconds / PERIOD)])
+
+    assert at(0.3) == HOLD
+    assert at(0.7) == RAMP_START  # the ramp begins at 0.6 s
+    assert at(1.1) == STEADY_RAMP
+    assert at(1.6) == HOLD
+    assert at(2.2) == RAMP_START  # back, but after a rest
+    assert at(5.0) == CREEP  # 0.05 rad/s
+    assert at(5.7) == REVERSAL  # the slow motion turns at 5.5 s
+    assert at(6.5) == CREEP
+    assert at(12.8) == REVERSAL  # fast, turned at 12.6 s
+    assert {RAMP_START, STEADY_RAMP, REVERSAL, CREEP, HOLD} == set(phase)
+
+
+def test_a_direction_is_kept_through_a_rest(arm: Model, records: tuple[Record, ...]) -> None:
+    moved = directions(arm, records[0])[:, 0]
+    assert [moved[round(t / PERIOD)] for t in (0.2, 1.0, 1.8, 2.4, 3.2)] == [0, 1, 1, -1, -1]
+
+
+def test_noise_is_significant_as_often_as_it_should(arm: Model, records: tuple[Record, ...]) -> None:
+    deviations = noise_floor(records, arm.machine, "position")
+    named, peaks = 0, []
+    for seed in range(30):
+        residual = alike(records[0].measured.shape, seed) * deviations
+        found = located(arm, records, [residual], deviations)
+        named += found.joint is not None
+        peaks.append(max(c.significance for c in found.cells))
+    assert named <= 3
+    limit = chance_significance(len(found.cells), 0.05)
+    assert np.mean(np.array(peaks) > limit) <= 0.2
+    assert np.median(peaks) > 2.0  # nor is it so careful that it would see nothing
+
+
+def test_a_sensor_a_little_noisier_than_stated_is_no_disagreement(arm: Model, records: tuple[Record, ...]) -> None:
+    deviations = noise_floor(records, arm.machine, "position")
+    named = [
+        located(arm, records, [1.15 * alike(records[0].measured.shape, seed) * deviations], deviations).joint
+        for seed in range(10)
+    ]
+    assert sum(joint is not None for joint in named) <= 2
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
+def test_significance_of_alike_samples_follows_a_gaussian(memory: float) -> None:
+    noise = alike((400 * 15, 1), 3, memory)[:, 0]
+    correlation = correlation_of([noise], 0.5)
+    windows = (noise.reshape(-1, 15) ** 2).mean(axis=1)
+    beyond = significance_of_squares(windows, 15, correlation)
+    assert 0.08 < np.mean(beyond > 1.0) < 0.22  # 16 % of a Gaussian
+    assert np.mean(beyond > 3.0) < 0.006
+
+
+def test_a_lag_after_reversals_is_found_there(arm: Model, records: tuple[Record, ...]) -> None:
+    deviations = noise_floor(records, arm.machine, "position")
+    residual = alike(records[0].measured.shape, 1) * deviations
+    reversal = phases_of(arm, records[0])[:, 1] == REVERSAL
+    residual[:, 1] -= np.where(reversal, 5 * deviations[1] * directions(arm, records[0])[:, 1], 0.0)
+    found = located(arm, records, [residual], deviations)
+    assert (found.joint, found.phase) == (2, "reversal")
+    assert found.summary.startswith("joint 2, after reversals: ")
+    assert "ADC counts rms against a floor of" in found.summary
+    worst = max(found.cells, key=lambda c: c.significance)
+    assert (worst.joint, worst.phase) == (2, "reversal")
+    quiet = [c for c in found.cells if c.joint != 2]
+    assert max(c.significance for c in quiet) < 6
+
+
+@pytest.mark.parametrize("against", ["time", "position", "speed", "direction", "drive"])
+def test_a_dependence_is_the_most_significant_of_its_joint(
+    arm: Model, records: tuple[Record, ...], against: str
+) -> None:
+    from model.discrepancy.localisation.dependence import quantities
+
+    deviations = noise_floor(records, arm.machine, "position")
+    quantity = np.nan_to_num(quantities(arm, records).values[against][:, 2])
+    shape = np.sin(3 * (quantity - quantity.mean()) / quantity.std()) if against != "direction" else quantity
+    residual = alike(records[0].measured.shape, 2) * deviations
+    residual[:, 2] += 3 * deviations[2] * shape
+    own = [d for d in located(arm, records, [residual], deviations).dependences if d.joint == 3]
+    strongest = max(own, key=lambda d: d.significance).against
+    # this record's drive is its speed, so either may be named for the other
+    assert strongest == against or {strongest, against} == {"speed", "drive"}
+
+
+def test_nothing_depends_on_anything_in_noise(arm: Model, records: tuple[Record, ...]) -> None:
+    deviations = noise_floor(records, arm.machine, "position")
+    beyond = []
+    for seed in range(15):
+        residual = alike(records[0].measured.shape, seed, 0.8) * deviations
+        beyond += [d.significance for d in located(arm, records, [residual], deviations).dependences]
+    assert np.mean(np.array(beyond) > 3.0) < 0.03
+
+
+def test_means_in_bins_come_with_the_deviation_of_alike_samples() -> None:
+    quantity = np.tile(np.repeat([0.25, 0.75], 50), 10)
+    means = [
+        binned(alike((1000, 1), s, 0.8)[:, 0], quantity, np.array([0, 0.5, 1.0]), [slice(0, 1000)], 0.3)
+        for s in range(100)
+    ]
+    scores = np.array([m.mean / m.deviation for m in means])
+    assert 0.8 < scores.std() < 1.25
+    assert max(m.explained for m in means) < 0.2
+
+
+def test_residuals_of_other_records_are_refused(arm: Model, records: tuple[Record, ...]) -> None:
+    with pytest.raises(SpecError, match=r"one \(m, n\) array a record"):
+        located(arm, records, [np.zeros((5, 3))], np.ones(3))
+    with pytest.raises(SpecError, match="must be positive"):
+        located(arm, records, [np.zeros_like(records[0].measured)], np.zeros(3))
+
+
+def test_a_short_window_is_judged_by_its_own_length() -> None:
+    """Half as many samples reach the same mean square by chance far more often."""
+    windows, white = [slice(0, 15), slice(15, 23)], Correlation(1.0, np.append(1.0, np.zeros(100)))
+    long, short = _beyond(windows, np.array([4.0, 4.0]), white)
+    assert long == pytest.approx(significance_of_squares(np.array([4.0]), 15, white)[0])
+    assert short < long - 1.0
