@@ -16,8 +16,9 @@ import typer.main
 import daq
 from daq.acquisition.process import EXIT_CODES, EXIT_INTERRUPTED, EXIT_PROGRAM_FAULT, EXIT_WRONG_INPUT
 from daq.contracts.errors import DaqError
-from daq_cli import run_result, stop, traces
 from daq_cli.app.lazy import SUBCOMMANDS
+from daq_cli.commands import stop, traces
+from daq_cli.robot import run_result
 
 entry = importlib.import_module("daq_cli.app.command")
 PAGE = Path(__file__).parents[2].joinpath("docs", "command-line.md").read_text("utf-8")
