@@ -19,6 +19,7 @@ FIT = {"kind": "fit", "parameters": ["joint2.motor.*"]}
 DIAGNOSIS = {"kind": "diagnose", "joints": [2], "most_steps": 1, "effects": ["coulomb_friction"]}
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_a_day(tmp_path: Path) -> None:
     with running_service(tmp_path) as service:
