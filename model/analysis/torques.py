@@ -8,10 +8,10 @@ from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
-from model.analysis.bodies import chain_of
 from model.dynamics import recursive
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
+from model.simulation.chain_of_model import chain_of
 from model.simulation.simulate import Options, simulate
 from model.validation import differentiation
 

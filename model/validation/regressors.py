@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from model.analysis.bodies import gravity_loads
 from model.machine_model.model import Model
+from model.simulation.chain_of_model import gravity_loads
 from model.validation.measured_motion import Observation
 from model.validation.variation import Correlation
 
