@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.server.queue_bench import Bench
+from tests.server.queue.bench import Bench
 from tests.server.service import Service, running_service
 
 
