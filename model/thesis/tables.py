@@ -77,18 +77,11 @@ class PublishedModel:
         """The arm that the table describes."""
         v = self.values
         rotor = tuple(g * g * j for g, j in zip(GEAR, ROTOR_INERTIA, strict=True))
-        arm = DrivenArm(
-            RodArm(
-                *(v[symbol] for symbol in ("m1", "R1", "m2", "m3", "MLOAD", "A2", "A3")),
-                rotor_inertia=(rotor[0], rotor[1], rotor[2]),
-                gravity=(0.0, 0.0, -9.81),
-                published_inertia=published_inertia,
-            ),
-            RESISTANCE,
-            TORQUE_CONSTANT,
-            (v["Kb1-3"], v.get("Kb2", DATA_SHEET_BACK_EMF_2), v["Kb1-3"]),
-            GEAR,
-        )
+        links = (v["m1"], v["R1"], v["m2"], v["m3"], v["MLOAD"], v["A2"], v["A3"])
+        body = RodArm(*links, rotor_inertia=(rotor[0], rotor[1], rotor[2]), published_inertia=published_inertia)
+        body = replace(body, gravity=(0.0, 0.0, -9.81))
+        back_emf = (v["Kb1-3"], v.get("Kb2", DATA_SHEET_BACK_EMF_2), v["Kb1-3"])
+        arm = DrivenArm(body, RESISTANCE, TORQUE_CONSTANT, back_emf, GEAR)
         viscous = (v.get("v_eff1", 0.0), v.get("v_eff2", 0.0), v.get("v_eff3", 0.0))
         return replace(arm, viscous=viscous, friction_arm=v.get("μ̃", 0.0))
 
