@@ -1,4 +1,4 @@
-"""How effects and their places are written in a report: as the field writes them."""
+"""Names of effects and their joints, as a report writes them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ _PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
 
 
 def effect_name(effect: str) -> str:
-    """Coulomb friction, back-EMF error, dead zone."""
+    """The name of an effect in words: Coulomb friction, back-EMF error, dead zone."""
     return " ".join(_PROPER.get(word, word) for word in effect.replace("back_emf", "back-EMF").split("_"))
 
 
