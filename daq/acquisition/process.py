@@ -18,12 +18,12 @@ from daq.driver import Controller
 from daq.link import LinkState
 from daq.runner import (
     ArmControl,
-    Arrangement,
     Consent,
     MissingConsentError,
-    Outside,
     RunResult,
+    RunSetup,
     StoppedError,
+    StopRequests,
     run_experiment,
 )
 from firmware_protocol.errors import ProtocolError
@@ -90,12 +90,12 @@ def run_job(job: Job, speaker: Speaker) -> RunResult:
             # It came while there was nothing to freeze. Now there is.
             control.stop(guardian.cause.value)
             raise StoppedError(f"{guardian.cause.value} before it began; nothing moved")
-        outside = Outside(
+        stop_requests = StopRequests(
             ended=lambda: None if guardian.cause is None else guardian.cause.value,
             interrupted=lambda: guardian.cause is EndCause.ORPHANED,
         )
-        run = Arrangement(
-            controller, control, job.spec, job.machine, job.limits, job.folder, speaker, outside, job.robot
+        run = RunSetup(
+            controller, control, job.spec, job.machine, job.limits, job.folder, speaker, stop_requests, job.robot
         )
         result = run_experiment(run, Consent(job.moves_real_arm))
         if controller.link.state is LinkState.LOST and controller.link.control is None:

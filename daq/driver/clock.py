@@ -58,7 +58,7 @@ class LockStepClock:
         return self._now
 
     def tick_seen(self, tick: int) -> None:
-        """A reply has shown that period `tick` is over."""
+        """Records that a reply has shown period `tick` to be over."""
         self._now = max(self._now, self._tick_zero_s + tick * self._period_s)
 
     def sleep_until(self, time_s: float) -> None:

@@ -36,7 +36,7 @@ class Verdict:
     findings: tuple[Finding, ...] = ()
 
     def __or__(self, other: Verdict) -> Verdict:
-        # Nearly every verdict of a period is the one that finds nothing.
+        # Nearly every verdict finds nothing.
         if other is NOTHING:
             return self
         if self is NOTHING:
@@ -52,7 +52,7 @@ NOTHING = Verdict()
 
 @dataclass(frozen=True)
 class Watched:
-    """The joints in each sample, in its order, with what turns their angles back into counts and posture units."""
+    """The joints of each sample, in its order, with the calibrations that turn angles into counts and posture units."""
 
     joints: tuple[int, ...]
     calibrations: tuple[JointCalibration, ...]

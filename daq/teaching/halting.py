@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from daq.runner import ArmControl, StoppedError
-from daq.runner.arm_control import told
+from daq.runner.arm_control import stop_line
 from daq.safety import Event
 from daq.teaching.arm import TeachingError
 
@@ -20,4 +20,4 @@ def tripped(control: ArmControl, cause: str, event: Event = Event.TRIP) -> Teach
 
 def _frozen(control: ArmControl, event: Event, cause: str) -> str:
     confirmation = control.handle(event, cause)
-    return "" if confirmation is None else f"; {told(confirmation)}"
+    return "" if confirmation is None else f"; {stop_line(confirmation)}"

@@ -58,9 +58,9 @@ def lead_by_nose(
             if len(rows) >= SHORTEST:
                 keep(_path(rows, arm.joints, joints, control_period(machine)))
     except StoppedError as error:
-        raise StoppedError(f"lead: {error}{_told(limp)}") from error
+        raise StoppedError(f"lead: {error}{_limp_line(limp)}") from error
     except DaqError as error:
-        raise TeachingError(f"lead: {error}{_told(limp)}") from error
+        raise TeachingError(f"lead: {error}{_limp_line(limp)}") from error
     if len(rows) < SHORTEST:
         raise TeachingError(f"lead: {len(rows)} samples are no path, at least {SHORTEST} are needed")
 
@@ -89,7 +89,7 @@ def _lead(
     _restore(arm, machine, guards, limp)
 
 
-def _told(limp: Mapping[int, Gain]) -> str:
+def _limp_line(limp: Mapping[int, Gain]) -> str:
     if not limp:
         return ""
     gains = ",".join(f"{joint}={'/'.join(map(str, gain))}" for joint, gain in limp.items())

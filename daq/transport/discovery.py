@@ -9,7 +9,7 @@ from serial.tools import list_ports
 
 @dataclass(frozen=True)
 class FoundPort:
-    """A serial port of this machine. What hangs on it is not known until it is asked."""
+    """A serial port of this machine. What is connected to it is unknown until it answers."""
 
     url: str
     description: str
@@ -22,11 +22,14 @@ def ports() -> tuple[FoundPort, ...]:
     found = sorted(list_ports.comports(), key=lambda port: port.device)
     return tuple(
         FoundPort(
-            f"serial://{port.device}", _told(port.description) or port.name, port.manufacturer, port.serial_number
+            f"serial://{port.device}",
+            _shown(port.description) or port.name,
+            port.manufacturer,
+            port.serial_number,
         )
         for port in found
     )
 
 
-def _told(text: str | None) -> str | None:
+def _shown(text: str | None) -> str | None:
     return None if text in (None, "", "n/a") else text
