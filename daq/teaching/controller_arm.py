@@ -34,7 +34,7 @@ def require_period(controller: Controller, machine: Machine) -> None:
 class ControllerArm:
     """A `TeachableArm` over the driver, in the states of `ArmControl` like every run.
 
-    ended:        says why somebody outside wants the end; None while nobody does
+    ended:        gives the reason of an external request to end; None while there is none
     every_period: True delivers each period once, in order; False the newest, which a slow line can do
 
     Raises SafetyError for a controller of another period than the machine file's.
@@ -102,7 +102,7 @@ class ControllerArm:
         self._controller.set_gains(joint, p, i, d)
 
     def stopped(self, cause: str) -> StoppedError:
-        """Freezes the arm for whoever wants it stopped."""
+        """Freezes the arm on request."""
         return halting.stopped(self._control, cause)
 
     def tripped(self, cause: str) -> TeachingError:
@@ -117,5 +117,5 @@ class ControllerArm:
     def _step(self, event: Event) -> None:
         try:
             self._control.handle(event)
-        except StoppedError as error:  # in this very moment: it still says what became of the stop
+        except StoppedError as error:  # stopped meanwhile: the error still states the result of the stop
             raise self.stopped(self._ended() or self._control.halted or str(error)) from error

@@ -1,4 +1,4 @@
-"""How teaching ends before its time: the arm is frozen first, then one line says why, and what became of the freeze."""
+"""Early end of teaching: the arm is frozen first; then one line states the reason and the result of the freeze."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from daq.teaching.arm import TeachingError
 
 
 def stopped(control: ArmControl, cause: str) -> StoppedError:
-    """Freezes the arm for whoever wants it stopped. Asking twice costs nothing: the board confirms what holds."""
+    """Freezes the arm on request. A second request does no harm: the board confirms its state."""
     return StoppedError(f"the arm has been stopped: {cause}{_frozen(control, Event.STOP, cause)}")
 
 

@@ -20,7 +20,7 @@ from daq.trajectories import control_period, make_plan
 JOG_SPEED = 0.35
 """Highest speed of jogging in rad/s (20 °/s): an assumption. A joint's own limit may be lower."""
 DEAD_MAN = 0.3
-"""Time (s) for which a command moves the arm: an assumption. Whoever holds the key repeats it more often."""
+"""Time (s) for which a command moves the arm: an assumption. While the key is held, commands come more often."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Jogger:
                 raise SpecError(f"jog: joint {joint}: velocity of {velocity} rad/s: allowed are up to ±{top:g} rad/s")
 
     def _angles(self, row: SampleRow) -> Floats:
-        """Where the set points of all joints are: what was sent last, else what the controller holds."""
+        """Set points of all joints: those sent last, else those that the controller holds."""
         held = zip(self._joints, row.set_point, strict=True)
         return np.array([self._driven.get(joint, angle) for joint, angle in held])
 

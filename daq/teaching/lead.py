@@ -21,9 +21,9 @@ STILL_WITHIN = 8
 """ADC counts of error up to which the gains of a led joint come back: an assumption, a pull of half a degree. No led
 joint may have moved by more in that time either: set points that follow it leave no error to be seen."""
 STILL_FOR = 0.2
-"""Time (s) for which it must be so without a break: an assumption. A hand that turns round is still for a moment."""
+"""Time (s) for which the error must stay that small: an assumption. A hand that reverses is still for a moment."""
 SHORTEST = 2
-"""Samples that make a path."""
+"""Least number of samples of a path."""
 PATIENCE = 10.0
 """Time (s) that a led arm has to come to rest before its gains come back: an assumption."""
 

@@ -19,16 +19,16 @@ from daq.trajectories import Plan
 
 
 class _Teller:
-    """Of what happens on the way only the alarms are worth a line."""
+    """Observer of a taught motion: reports alarms only."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         self._tell = tell
 
     def row(self, row: SampleRow) -> None:
-        """Not told."""
+        """Ignored."""
 
     def event(self, time: float, kind: EventKind, message: str, tick: int | None, joint: int | None = None) -> None:
-        """One line."""
+        """Reports an alarm in one line."""
         del time, tick, joint
         if kind not in ("start", "end", "note", "ramp_start", "ramp_end"):
             self._tell(message)
@@ -55,7 +55,7 @@ class FollowingPerformer:
         self._arm = ControllerArm(controller, control, machine, ended, every_period=False)
         self._guarded = partial(RunningGuards, machine, limits, self._arm.joints)
         self._guards = self._guarded(moving=self._arm.joints)
-        """While nothing is sent. Joints that were moved last may still be on the way to their set points."""
+        """Guards while nothing is sent. Joints that were moved last may still be on the way to their set points."""
         self._step(Event.ARM)
 
     def follow(self, plan: Plan) -> None:

@@ -1,4 +1,4 @@
-"""A program as plans: worked out and checked from end to end before its first motion."""
+"""Plans and checks a whole program before its first motion."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class PlannedInstruction:
 
 
 class Performer(Protocol):
-    """Who carries a program out."""
+    """Carries out a program's instructions."""
 
     def follow(self, plan: Plan) -> None:
         """Plays a plan to its end. Raises a DaqError when it does not get there."""

@@ -1,4 +1,4 @@
-"""Traces as plain CSV, for other rigs and other tools, with a TOML beside it for what columns cannot say."""
+"""Traces as plain CSV, for other rigs and tools, with a TOML file beside it for what columns cannot hold."""
 
 from __future__ import annotations
 
@@ -299,5 +299,5 @@ def _beside_text(trace: Trace) -> str:
 
 
 def _toml_text(text: str | None) -> str | None:
-    """A TOML string: JSON's escapes are TOML's, but for DEL, which TOML wants escaped."""
+    """A TOML string: as in JSON, except that TOML requires DEL to be escaped."""
     return None if text is None else json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")

@@ -86,7 +86,7 @@ class Fields:
 def chunk_of(body: memoryview) -> CompressedChunk:
     """Raises ValueError, as all of these do."""
     fields = Fields(body)
-    fields.raw(16)  # times of the first and the last message: the messages tell them
+    fields.raw(16)  # times of the first and the last message, which the messages state themselves
     size, crc, compression = fields.u64(), fields.u32(), fields.text()
     return CompressedChunk(size, crc, compression, fields.raw(fields.u64()))
 

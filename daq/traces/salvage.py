@@ -26,11 +26,12 @@ from daq.traces.scan import Scan, messages, scan
 NO_SCHEMA = 0
 """MCAP's number of the schema of a channel that has none."""
 SALVAGE_SUFFIX = ".salvage"
-"""Of the new file until it is safe; one that is found was left by a salvage that did not end, and is made again."""
+"""Suffix of the new file until it is complete. One that is found was left by an interrupted salvage and is made
+again."""
 UNREADABLE_SUFFIX = ".unreadable"
-"""Of a part file that holds no trace at all: it is put aside, never deleted."""
+"""Suffix of a part file that holds no trace: it is renamed, never deleted."""
 DAMAGED_SUFFIX = ".damaged"
-"""Of a part file that was salvaged, and holds something that is not in the trace and might be of use to somebody."""
+"""Suffix of a salvaged part file that holds something which is not in the trace and may still be useful."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ def salvage_folder(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> 
             if not disk.is_being_written(part):
                 found.append(salvage(part, limits))
         except FileNotFoundError:
-            continue  # another process salvaged it, or its writer finished it, in this moment
+            continue  # meanwhile salvaged by another process, or finished by its writer
         except OSError as error:
             found.append(Salvaged(part, None, problem=f"{part}: cannot be read: {disk.reason(error)}", kept=part))
         except PutAsideError as error:
@@ -150,7 +151,7 @@ def _salvage_locked(part: Path, data: bytes, limits: TraceLimits) -> Salvaged:
     except BaseException:
         unfinished.unlink(missing_ok=True)
         raise
-    # A power cut may leave zeros behind what was synced: there is nothing in them to keep.
+    # A power cut may leave zeros after the synced part, which hold nothing to keep.
     kept = _put_aside(part, DAMAGED_SUFFIX) if found.others or any(data[found.good_bytes :]) else None
     if kept is None:
         part.unlink()
@@ -197,7 +198,7 @@ def _put_aside(part: Path, suffix: str) -> Path:
 
 
 def _counters(start: Texts, end: Texts | None, part: Path) -> dict[str, float]:
-    """What the link had counted, where the recording came to write it down."""
+    """The link's counters, where the recording got as far as writing them."""
     try:
         return record_of(start, end, str(part)).counters
     except TraceError:

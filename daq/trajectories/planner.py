@@ -45,7 +45,7 @@ from daq.trajectories.step import step
 from daq.trajectories.via import via
 
 Relative = Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | Pause
-"""Motions that say where to go from where they begin, whatever the machine."""
+"""Motions relative to their start, independent of the machine."""
 
 
 def start_angles(spec: ExperimentSpec, machine: Machine) -> tuple[float, ...]:

@@ -52,7 +52,7 @@ class PlanPreview:
     set_points: int
     joints: tuple[JointPreview, ...]
     marks: tuple[tuple[float, str, str], ...]
-    """(time in s, kind, message)."""
+    """Marks as (time in s, kind, message)."""
 
     def as_data(self) -> dict[str, object]:
         """Plain data for JSON."""
