@@ -99,7 +99,7 @@ class Models:
         return self._connection.get(ModelDetails, f"{self._path}/{model}")
 
     def machine_parameters(self) -> Sequence[ModelParameter]:
-        """Of the model that the machine file describes (`machine` in requests)."""
+        """Parameters of the model that the machine file describes (`machine` in requests)."""
         return self._connection.get(tuple[ModelParameter, ...], f"{self._path}/machine/parameters")
 
     def upload(self, file: Path, name: str | None = None) -> ModelEntry:

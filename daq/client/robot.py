@@ -21,7 +21,7 @@ from daq.contracts.service.robot import Done, JointGains, ProcessState, ResetReq
 from daq.contracts.service.teaching import CalibrationRequest, TeachingStatus
 
 CONNECT_PATIENCE = 60.0
-"""s for a mock with its physics engine to start, on a busy computer."""
+"""Time (s) allowed for a mock with its physics engine to start on a busy computer."""
 
 
 class Robot:

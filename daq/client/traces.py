@@ -14,12 +14,12 @@ from daq.contracts.service.traces import CatalogueEntry, Source, TraceChange, Tr
 from daq.contracts.trace import Outcome
 
 LAST = "last"
-"""Instead of a number: the newest."""
+"""Name of the newest trace, in place of its number."""
 KINDS = {".mcap": "application/octet-stream", ".csv": "text/csv"}
 MOST_NAMED = 4
-"""Traces named in the complaint about a beginning that several share."""
+"""Number of traces named in the error about an ambiguous beginning."""
 UPLOAD_WITHIN = 600.0
-"""s for the answer to a file that is sent."""
+"""Time-out (s) for the answer to an upload."""
 
 
 class Traces:

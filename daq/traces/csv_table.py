@@ -31,7 +31,7 @@ SIGNALS = ("set_point", "position", "drive", "velocity")
 position is then the integral of the speed, from 0."""
 
 INTEGRATED = "Positions are integrals of the measured speeds, from 0."
-"""What a trace says whose record has no positions."""
+"""Note in a trace whose positions were integrated."""
 
 _COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-6])")
 
