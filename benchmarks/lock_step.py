@@ -31,7 +31,7 @@ from mock_controller.device import build_device
 from mock_controller.options import Options
 
 TARGET = 20.0
-"""Times real time."""
+"""Target speed as a multiple of real time."""
 PERIOD_S = 0.02
 
 
@@ -56,7 +56,7 @@ class Cost:
 
 
 class Silent:
-    """Nobody listens."""
+    """A run listener that ignores everything."""
 
     def progress(self, fraction: float, text: str) -> None:
         """How far the run is."""

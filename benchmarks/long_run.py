@@ -40,7 +40,7 @@ FAULTS = ("--fault", f"drop:rate={RATE}", "--fault", f"flip:rate={RATE}")
 JOINTS = (1, 2, 3)
 SINE_S = 4.0
 FETCH_EVERY_S = 0.4
-"""The mock's ring keeps 1.28 s."""
+"""Time (s) between fetches; the mock's ring keeps 1.28 s."""
 
 
 @dataclass

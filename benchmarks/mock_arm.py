@@ -43,7 +43,7 @@ FRICTION_ARMS = tuple(f"joint{j}.load_dependent_friction.arm" for j in (1, 2, 3)
 
 
 class Unheard:
-    """Nobody listens to the runs."""
+    """A run listener that ignores everything."""
 
     def progress(self, fraction: float, text: str) -> None:
         """How far the run is."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 ANSWER_WITHIN = 60.0
 PAUSE = 0.1
-"""s between two stops."""
+"""Pause (s) between two stops."""
 
 
 @dataclass
@@ -28,7 +28,7 @@ class Stopped:
 
 @dataclass
 class Stops:
-    """By door. Filled when the stops have ended."""
+    """Stops by address; filled when they have ended."""
 
     found: dict[str, Stopped] = field(default_factory=dict)
 

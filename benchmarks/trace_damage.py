@@ -61,14 +61,14 @@ class Tally:
     slowest: float = 0.0
 
     def fault(self, kind: str, damaged: Damaged, detail: str) -> None:
-        """Something that must not be."""
+        """Counts a fault."""
         self.faults[kind] += 1
         if self.faults[kind] <= 3:
             self.examples.append(f"{kind}: {damaged.original.kind}, {damaged.way}: {detail}")
 
 
 def record() -> TraceRecord:
-    """That of a run on the mock, with a machine."""
+    """The record of a run on the mock, with a machine."""
     return TraceRecord(
         trace_id="ab12cd34ef56",
         created=CREATED,

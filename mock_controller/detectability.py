@@ -1,7 +1,7 @@
 """`python -m mock_controller.detectability SEED… --experiment FILE`: how well the effects of a secret arm can be seen.
 
 One line of JSON an arm: d′ of all its effects together and of each with the others acting, after a refit of the
-tolerance parameters. It tells what the seeds hide, and is for whoever scores answers. Exit code 2 for wrong options.
+tolerance parameters. It reveals what the seeds hide, and is meant for scoring answers. Exit code 2 for wrong options.
 """
 
 from __future__ import annotations
