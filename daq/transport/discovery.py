@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from serial.tools import list_ports
+from serial.tools.list_ports_common import ListPortInfo
 
 
 @dataclass(frozen=True)
@@ -17,9 +19,9 @@ class FoundPort:
     serial_number: str | None
 
 
-def ports() -> tuple[FoundPort, ...]:
+def ports(found_by: Callable[[], Iterable[ListPortInfo]] = list_ports.comports) -> tuple[FoundPort, ...]:
     """The serial ports of this machine, by device name. Opens none of them."""
-    found = sorted(list_ports.comports(), key=lambda port: port.device)
+    found = sorted(found_by(), key=lambda port: port.device)
     return tuple(
         FoundPort(
             f"serial://{port.device}",
