@@ -152,7 +152,7 @@ def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) 
             ending = _finish(run, changes)
         if ending.kind != "finished":
             for change in changes:
-                follower.tell("gains", change.left)
+                follower.tell("gains", change.kept_message)
             if ending.kind != "lost":
                 follower.observe(round(AFTERMATH / run.controller.period_s))
         outcome = _outcome(ending, run.stop_requests.interrupted())

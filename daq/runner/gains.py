@@ -27,7 +27,7 @@ class GainChange:
         return f"joint {self.joint}: gains {_text(self.during)} for this run, {_text(self.before)} before"
 
     @property
-    def left(self) -> str:
+    def kept_message(self) -> str:
         """What stays, for the trace."""
         return f"joint {self.joint}: gains stay at {_text(self.during)}, they were {_text(self.before)} before the run"
 

@@ -53,10 +53,10 @@ class TeachableArm(Protocol):
         """Writes the gains of a joint."""
         ...
 
-    def stopped(self, cause: str) -> StoppedError:
+    def freeze_for_stop(self, cause: str) -> StoppedError:
         """Freezes the arm on request; returns the error to raise, which states the result."""
         ...
 
-    def tripped(self, cause: str) -> TeachingError:
+    def freeze_for_fault(self, cause: str) -> TeachingError:
         """Freezes the arm because of a fault; returns the error to raise, which states the result."""
         ...

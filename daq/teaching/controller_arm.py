@@ -76,7 +76,7 @@ class ControllerArm:
         try:
             snapshot = self._controller.next_snapshot(self._last if self._every_period else None, self.joints)
         except (LinkError, NoSampleError) as error:
-            raise halting.tripped(self._control, str(error), Event.LINK_LOST) from error
+            raise halting.freeze_for_fault(self._control, str(error), Event.LINK_LOST) from error
         except ControllerRestartedError as error:
             raise self.tripped(str(error)) from error
         self._last, self.lateness = snapshot.tick, snapshot.jitter
@@ -101,13 +101,13 @@ class ControllerArm:
         self._require_going_on()
         self._controller.set_gains(joint, p, i, d)
 
-    def stopped(self, cause: str) -> StoppedError:
+    def freeze_for_stop(self, cause: str) -> StoppedError:
         """Freezes the arm on request."""
-        return halting.stopped(self._control, cause)
+        return halting.freeze_for_stop(self._control, cause)
 
-    def tripped(self, cause: str) -> TeachingError:
+    def freeze_for_fault(self, cause: str) -> TeachingError:
         """Freezes the arm because of a fault."""
-        return halting.tripped(self._control, cause)
+        return halting.freeze_for_fault(self._control, cause)
 
     def _require_going_on(self) -> None:
         cause = self._ended() or self._control.halted

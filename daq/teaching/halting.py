@@ -8,12 +8,12 @@ from daq.safety import Event
 from daq.teaching.arm import TeachingError
 
 
-def stopped(control: ArmControl, cause: str) -> StoppedError:
+def freeze_for_stop(control: ArmControl, cause: str) -> StoppedError:
     """Freezes the arm on request. A second request does no harm: the board confirms its state."""
     return StoppedError(f"the arm has been stopped: {cause}{_frozen(control, Event.STOP, cause)}")
 
 
-def tripped(control: ArmControl, cause: str, event: Event = Event.TRIP) -> TeachingError:
+def freeze_for_fault(control: ArmControl, cause: str, event: Event = Event.TRIP) -> TeachingError:
     """Freezes the arm because of a fault."""
     return TeachingError(f"the arm has been stopped by a fault: {cause}{_frozen(control, event, cause)}")
 

@@ -123,9 +123,9 @@ def jog(
             step = jogger.step(row, commands(row))
             verdict = guards.check(row, step.postures) | lag.check(row.tick, arm.lateness)
             if verdict.stop is not None:
-                raise arm.stopped(verdict.stop)
+                raise arm.freeze_for_stop(verdict.stop)
             if verdict.trips:
-                raise arm.tripped("; ".join(verdict.trips))
+                raise arm.freeze_for_fault("; ".join(verdict.trips))
             if step.refused != told:
                 told = step.refused
                 for line in told:

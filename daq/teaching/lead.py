@@ -114,9 +114,9 @@ def _measured(arm: TeachableArm, machine: Machine, joints: tuple[int, ...], row:
 def _require_calm(arm: TeachableArm, guards: RestGuards, row: SampleRow) -> None:
     verdict = guards.check(row)
     if verdict.stop is not None:
-        raise arm.stopped(verdict.stop)
+        raise arm.freeze_for_stop(verdict.stop)
     if verdict.trips:
-        raise arm.tripped("; ".join(verdict.trips))
+        raise arm.freeze_for_fault("; ".join(verdict.trips))
 
 
 def _restore(arm: TeachableArm, machine: Machine, guards: RestGuards, limp: dict[int, Gain]) -> None:
@@ -142,7 +142,7 @@ def _restore(arm: TeachableArm, machine: Machine, guards: RestGuards, limp: dict
             return
         sent = _measured(arm, machine, joints, row)
         arm.set_points(sent)
-    raise arm.tripped(f"the arm did not come to rest within {PATIENCE:g} s")
+    raise arm.freeze_for_fault(f"the arm did not come to rest within {PATIENCE:g} s")
 
 
 def _at_rest(arm: TeachableArm, machine: Machine, row: SampleRow, sent: Mapping[int, int]) -> bool:

@@ -18,7 +18,7 @@ from daq.teaching.controller_arm import ControllerArm
 from daq.trajectories import Plan
 
 
-class _Teller:
+class _AlarmReporter:
     """Observer of a taught motion: reports alarms only."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
@@ -49,7 +49,7 @@ class FollowingPerformer:
         self._controller = controller
         self._control = control
         self._follower = Follower(
-            controller, control, machine, limits, EVERY_JOINT, _Teller(tell), ended, every_period=False
+            controller, control, machine, limits, EVERY_JOINT, _AlarmReporter(tell), ended, every_period=False
         )
         self._ended = ended
         self._arm = ControllerArm(controller, control, machine, ended, every_period=False)
@@ -65,9 +65,9 @@ class FollowingPerformer:
         self._step(Event.START)
         ending = self._follower.follow(plan, lambda _index: None)
         if ending.kind == "stopped":
-            raise halting.stopped(self._control, ending.cause)
+            raise halting.freeze_for_stop(self._control, ending.cause)
         if ending.kind != "finished":
-            raise halting.tripped(self._control, ending.cause)
+            raise halting.freeze_for_fault(self._control, ending.cause)
         self._guards = self._guarded(moving=plan.moving)
         self._step(Event.FINISHED)
 
@@ -77,9 +77,9 @@ class FollowingPerformer:
         for _ in range(periods):
             verdict = self._guards.check(self._arm.next_sample(), {})
             if verdict.stop is not None:
-                raise self._arm.stopped(verdict.stop)
+                raise self._arm.freeze_for_stop(verdict.stop)
             if verdict.trips:
-                raise self._arm.tripped("; ".join(verdict.trips))
+                raise self._arm.freeze_for_fault("; ".join(verdict.trips))
         self._require_going_on()
 
     def input_is_on(self, line: int) -> bool:
@@ -104,10 +104,10 @@ class FollowingPerformer:
     def _require_going_on(self) -> None:
         cause = self._ended() or self._control.halted
         if cause is not None:
-            raise halting.stopped(self._control, cause)
+            raise halting.freeze_for_stop(self._control, cause)
 
     def _step(self, event: Event) -> None:
         try:
             self._control.handle(event)
         except StoppedError as error:
-            raise halting.stopped(self._control, self._control.halted or str(error)) from error
+            raise halting.freeze_for_stop(self._control, self._control.halted or str(error)) from error

@@ -111,14 +111,14 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
             signals[name] = table[:, [header.index(f"{name}_{joint}") for joint in joints]]
     record = _record(path, beside, trace_id_of(data, *([] if beside_data is None else [beside_data])))
     if "position" not in signals:
-        signals["position"] = _travelled(table[:, 0], signals["velocity"])
+        signals["position"] = _integrate(table[:, 0], signals["velocity"])
         bounds.check_signals({"position": signals["position"]}, f"{path}: integrals of the speeds")
         record = record.model_copy(update={"notes": f"{record.notes} {INTEGRATED}".strip()})
     bounds.check_record(record, (), str(path))
     return Trace(record, joints, table[:, 0], **signals)
 
 
-def _travelled(time: Floats, velocity: Floats) -> Floats:
+def _integrate(time: Floats, velocity: Floats) -> Floats:
     """Positions (k, j) from 0 for speeds (k, j), by the trapezoidal rule."""
     steps = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time)[:, None]
     return np.concatenate([np.zeros((1, velocity.shape[1])), np.cumsum(steps, axis=0)])

@@ -67,18 +67,18 @@ class Fields:
         """A map from text to text, its length before it."""
         inner = Fields(self.raw(self.u32()))
         found: dict[str, str] = {}
-        while inner.left:
+        while inner.remaining:
             key = inner.text()
             found[key] = inner.text()
         return found
 
     def end(self, what: str) -> None:
         """Nothing may follow: two records that differ in it alone would be the same definition."""
-        if self.left:
-            raise ValueError(f"a {what} has {self.left} bytes after its last field")
+        if self.remaining:
+            raise ValueError(f"a {what} has {self.remaining} bytes after its last field")
 
     @property
-    def left(self) -> int:
+    def remaining(self) -> int:
         """Bytes that have not been read."""
         return len(self._body) - self._position
 

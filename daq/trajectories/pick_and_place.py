@@ -43,7 +43,12 @@ def pick_and_place(
     columns = [joint - 1 for joint in joints]
     end = start.copy()
     end[columns] += amplitudes
-    postures = (start, lifted(machine, start, joints, move.lift), lifted(machine, end, joints, move.lift), end)
+    postures = (
+        start,
+        lift_posture(machine, start, joints, move.lift),
+        lift_posture(machine, end, joints, move.lift),
+        end,
+    )
     knots = np.stack([posture[columns] - start[columns] for posture in postures])
     time = sample_times(float(durations.sum()), period)
     marks = (
@@ -112,7 +117,7 @@ def last_link(machine: Machine) -> float:
     return length
 
 
-def lifted(machine: Machine, posture: Floats, joints: tuple[int, ...], height: float) -> Floats:
+def lift_posture(machine: Machine, posture: Floats, joints: tuple[int, ...], height: float) -> Floats:
     """The posture (all joints, rad) near `posture` whose end is `height` m above it, moving `joints` alone.
 
     Newton's method on the forward kinematics, least squares where joints are too many. Raises SpecError where these

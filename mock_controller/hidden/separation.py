@@ -169,7 +169,7 @@ def separation(
 ) -> Separation:
     """d′ between `parts` and the same arm with the modifications `without` only (by default none).
 
-    `present`: what `seen` has given for these parts, where that is known.
+    `present`: what `modelled_readings` has given for these parts, where that is known.
 
     The refit goes along the tangents, then looks where that has led. Unless what is left is what the tangents have
     foretold, or d′ is clearly large, it goes on, up to `refits` times: a strong effect that tolerances can imitate is
@@ -177,11 +177,11 @@ def separation(
     """
     one = reading_deviation(parts.board)
     step_us = _step_length(parts)
-    present = seen(parts, experiment) if present is None else present
+    present = modelled_readings(parts, experiment) if present is None else present
     sound = replace(parts, modifications=without)
 
     def left_at(moved: NDArray[np.float64]) -> NDArray[np.float64]:
-        there, rest = _moved(sound, known, moved, step_us)
+        there, rest = _move_parameters(sound, known, moved, step_us)
         absent = readings(there, experiment, step_us=step_us)[:, :MODELLED]
         left: NDArray[np.float64] = ((present - absent) / one).ravel() - known.matrix @ rest
         return left
@@ -193,7 +193,7 @@ def separation(
         return found
     there = known.within_reach(np.array(list(found.moved.values())))
     left_there = left_at(there)
-    looked = _told(found.before_refit, left_there, there, known)
+    looked = _separation_of(found.before_refit, left_there, there, known)
     hidden = [effect for effect in parts.modifications if effect not in without]
     imitating = imitation(parts.plant, hidden)
     as_foretold = abs(looked.d_prime - found.d_prime) <= _AS_FORETOLD * found.d_prime
@@ -202,21 +202,21 @@ def separation(
         return min(looked, found, key=lambda each: each.d_prime)
     if imitating:
         start = known.within_reach(np.array([imitating.get(name, 0.0) for name in known.names]) / known.deviations)
-        refitted = _refitted(left_at(start), start, left_at, known, refits)
+        refitted = _refit(left_at(start), start, left_at, known, refits)
     elif looked.d_prime < found.before_refit:
-        refitted = _refitted(left_there, there, left_at, known, refits, _NEAR_DAMPING)
+        refitted = _refit(left_there, there, left_at, known, refits, _NEAR_DAMPING)
     else:
-        refitted = _refitted(apart, nowhere, left_at, known, refits)
+        refitted = _refit(apart, nowhere, left_at, known, refits)
     return replace(min(looked, refitted, key=lambda each: each.d_prime), before_refit=found.before_refit)
 
 
 def project(difference: NDArray[np.float64], known: Tangents) -> Separation:
     """d′ of a difference of readings (in their standard deviations, periods·3) after one refit along the tangents."""
     moved = _step(difference, np.zeros(len(known.names)), known.matrix)
-    return _told(float(np.linalg.norm(difference)), difference - known.matrix @ moved, moved, known)
+    return _separation_of(float(np.linalg.norm(difference)), difference - known.matrix @ moved, moved, known)
 
 
-def seen(parts: LoopParts, experiment: Experiment) -> NDArray[np.float64]:
+def modelled_readings(parts: LoopParts, experiment: Experiment) -> NDArray[np.float64]:
     """Readings (counts, (periods, MODELLED)) of the arm with all that it has."""
     return readings(parts, experiment, step_us=_step_length(parts))[:, :MODELLED]
 
@@ -227,7 +227,7 @@ def _step_length(parts: LoopParts) -> int:
     return STEP_US if fine else _COARSE_STEP_US
 
 
-def _refitted(
+def _refit(
     left: NDArray[np.float64],
     moved: NDArray[np.float64],
     left_at: Callable[[NDArray[np.float64]], NDArray[np.float64]],
@@ -255,7 +255,7 @@ def _refitted(
                 break
         else:
             damping *= _MORE_DAMPING
-    return _told(0.0, left, moved, known)
+    return _separation_of(0.0, left, moved, known)
 
 
 def _step(
@@ -266,13 +266,13 @@ def _step(
     return np.asarray(np.linalg.solve(normal, matrix.T @ left - moved), dtype=np.float64)
 
 
-def _told(before: float, left: NDArray[np.float64], moved: NDArray[np.float64], known: Tangents) -> Separation:
+def _separation_of(before: float, left: NDArray[np.float64], moved: NDArray[np.float64], known: Tangents) -> Separation:
     squared = float(left @ left + moved @ moved)
     by_name = {name: float(value) for name, value in zip(known.names, moved, strict=True)}
     return Separation(float(np.sqrt(squared)), before, by_name)
 
 
-def _moved(
+def _move_parameters(
     parts: LoopParts, known: Tangents, moved: NDArray[np.float64], step_us: int
 ) -> tuple[LoopParts, NDArray[np.float64]]:
     """The arm with its tolerance parameters moved by so many of their standard deviations.
