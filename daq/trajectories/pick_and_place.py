@@ -43,12 +43,8 @@ def pick_and_place(
     columns = [joint - 1 for joint in joints]
     end = start.copy()
     end[columns] += amplitudes
-    postures = (
-        start,
-        lift_posture(machine, start, joints, move.lift),
-        lift_posture(machine, end, joints, move.lift),
-        end,
-    )
+    lift_off, set_down = (lift_posture(machine, posture, joints, move.lift) for posture in (start, end))
+    postures = (start, lift_off, set_down, end)
     knots = np.stack([posture[columns] - start[columns] for posture in postures])
     time = sample_times(float(durations.sum()), period)
     marks = (
