@@ -1,17 +1,17 @@
-"""What no test notices: small faults made in the code, and the tests of the same folder run against each.
+"""Finds faults that no test notices: makes small faults in the code, and runs the tests of the same folder against each.
 
     python -m benchmarks mutation daq/link firmware_protocol --sample 100 --seed 1 --processes 2
 
-Each path is a folder or a file; each mutant (see `mutants`) is tried in a temporary copy of the tree, never in the tree
-itself. Run against it are the test files that reach its module through imports, of the folder of `tests` that mirrors
-the module's (`daq/link` has `tests/daq/link`; where there is none, the folder above), the quickest file first, up to
-the first failure. Left out are tests that are slow (marked so, or longer than --longest seconds), and those that
-need a browser, a real arm or measured traces. A mutant that makes the tests take three times their time and 20 s more
-(240 s for the model, which compiles) is killed too.
+Each path is a folder or a file. Each mutant (see `mutants`) is tried in a temporary copy of the tree. The tests are
+those of the folder of `tests` that mirrors the module's (`tests/daq/link` for `daq/link`; where there is none, the
+folder above), and of these the files that reach the module through imports. The quickest file runs first, and the
+first failure ends the run. Tests are left out if they are marked slow, take longer than --longest seconds, or need a
+browser, a real arm or measured traces. A mutant also counts as killed when the tests take longer than three times
+their time and 20 s (240 s for the model, which has to compile).
 
-Printed are the share killed of each folder, and every survivor with file, line and change. A survivor asks for a test;
-one that no test could notice is written into equivalent_mutants.toml with the reason, and no longer counted.
-The exit code is 1 where a folder has less than 90 % killed.
+The output is each survivor with file, line and change, and the share killed of each path. A survivor asks for a test.
+One that no test could notice is entered in equivalent_mutants.toml with the reason, and is then left out.
+The exit code is 1 where less than 90 % of a path's mutants are killed.
 
 --sample N    as many mutants of each path, drawn with --seed (all of them without it)
 --list        print the mutants and run nothing
