@@ -1,4 +1,4 @@
-"""Finds faults that no test notices: makes small faults in the code, and runs the tests of the same folder against each.
+"""Finds faults that no test notices: makes small ones in the code, and runs the tests of the same folder against each.
 
     python -m benchmarks mutation daq/link firmware_protocol --sample 100 --seed 1 --processes 2
 
