@@ -114,7 +114,7 @@ class Seen:
     """The renderer of 3-D as the browser names it."""
     latencies: list[float]
     firsts: list[float]
-    """ms from the start of a load to the first sample on the screen; nothing was in the browser's cache."""
+    """Times (ms) from the start of a load, with an empty browser cache, to the first sample on the screen."""
     transfer: int
     """Transferred size (bytes) of the first load."""
     used: float
@@ -274,7 +274,7 @@ def _now(page: Page, session: CDPSession) -> dict[str, Any]:
 
 
 def _used_during(service: RunningService, seconds: float, page: Page | None) -> float:
-    """s of processor time that the server's process uses in so many seconds, its owner of the port not counted."""
+    """Processor time (s) that the server's process uses in so many seconds, its owner of the port not counted."""
     before = _used(service.process.pid)
     if page is None:
         time.sleep(seconds)

@@ -254,7 +254,7 @@ def _error(problem: SimulatedProblem, values: Floats) -> float:
 
 
 def compared(problem: SimulatedProblem, begin: Floats, limit: int) -> list[Figure]:
-    """All three, and by how much ours is quicker."""
+    """Figures of all three, with the ratio of their times to ours."""
     share = 1 + 1 / _samples(problem)  # by which an error may be larger and still count as ours
     goal = 3 * ours(problem, begin).error * share  # the simplex sums over the joints
     found = best_in_turn(

@@ -52,7 +52,7 @@ class BoardRecord:
     _over: threading.Event = field(default_factory=threading.Event)
 
     def fetch_until_over(self) -> None:
-        """To be run by a thread of its own."""
+        """Fetches until the run is over; runs in a thread of its own."""
         last = 0
         while True:
             over = self._over.wait(FETCH_EVERY_S)

@@ -61,7 +61,7 @@ COMPILING_S = 240.0
 BASELINE_LIMIT_S = 900.0
 """Time limit of the unchanged tests."""
 _TIMES = count(1_000_000_000, 10)
-"""Times of change, all different: Python takes compiled code for current that has the time and size of its source."""
+"""Modification times, all different, since Python recognises current bytecode by its source's time and size."""
 
 
 @dataclass(frozen=True)

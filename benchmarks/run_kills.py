@@ -77,7 +77,7 @@ WAYS = (
 
 @dataclass
 class Findings:
-    """What the moments met, and what was wrong. `wrong` has a line each."""
+    """What was running at the kills, and what was wrong, one line each in `wrong`."""
 
     met: Counter[str] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
@@ -205,7 +205,7 @@ def end_one(
 
 
 def _until_gone(run: subprocess.Popen[bytes], acquisition: int | None, label: str, findings: Findings) -> None:
-    """Nothing of the run is left after ENDS_WITHIN s; else that is told, and ended."""
+    """Waits until nothing of the run is left; what is left after ENDS_WITHIN s is reported and ended."""
     until = time.monotonic() + ENDS_WITHIN
     try:
         run.wait(ENDS_WITHIN)

@@ -22,7 +22,7 @@ SUBSCRIBED = ["samples", "robot", "queue", "jobs", "events"]
 
 @dataclass
 class Seen:
-    """What the clients met. Times in s."""
+    """Observations of the clients. Times in s."""
 
     latencies: list[float] = field(default_factory=list)
     """Latency of every GET from the moment when it was due, so that waiting for a free connection counts."""

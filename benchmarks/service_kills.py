@@ -46,7 +46,7 @@ WORKER, OWNER = b"spawn_main", b"server.owner"
 
 @dataclass
 class Told:
-    """What the service tells at one moment. By number."""
+    """The service's answers at one moment, by number."""
 
     experiments: dict[str, dict[str, Any]]
     jobs: dict[str, dict[str, Any]]
@@ -77,7 +77,7 @@ class Findings:
     finished: set[str] = field(default_factory=set)
     """Traces that were seen finished; each was read."""
     found_running: Counter[str] = field(default_factory=Counter)
-    """What the kills met: kind and state."""
+    """Kinds and states of what was running at the kills."""
 
 
 def _all(service: RunningService, path: str) -> dict[str, dict[str, Any]]:

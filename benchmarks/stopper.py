@@ -71,7 +71,7 @@ def _stop(host: str, port: int, path: str, stopped: Stopped) -> None:
 
 
 def stop_again_and_again() -> None:
-    """In the process: until nobody holds the other end of its input any more."""
+    """Runs in the process until the other end of its input is closed."""
     host, doors, path = sys.argv[1], json.loads(sys.argv[2]), sys.argv[3]
     found = {door: Stopped() for door in doors}
     while not select.select([sys.stdin], [], [], PAUSE)[0]:

@@ -51,7 +51,7 @@ CREATED = datetime(2026, 11, 21, 5, 14, 42, tzinfo=UTC)
 
 @dataclass
 class Tally:
-    """What was counted; the first few of each fault are told."""
+    """Counts; the first few of each fault are printed."""
 
     cases: int = 0
     by_way: Counter[str] = field(default_factory=Counter)

@@ -53,7 +53,7 @@ class Experiments:
         return self._connection.ask(MotionPreview, Request("POST", f"{self._path}/preview", body, repeatable=True))
 
     def get(self, experiment: str, wait: float = 0.0) -> Experiment:
-        """One of them, as it is now; with `wait` as it is at its end, or after so many s (60 at most)."""
+        """The present state of an experiment; with `wait` (s, at most 60) its state at its end or after that time."""
         path = f"{self._path}/{experiment}"
         return self._connection.get(Experiment, path, wait=wait or None, patience=wait)
 
@@ -75,7 +75,8 @@ class Experiments:
                 raise TimeoutError(f"experiment {experiment} is {found.state} after {seconds:g} s")
 
     def cancel(self, experiment: str, *, within: float | None = None) -> Experiment:
-        """Takes back what waits; stops the arm where it runs, which needs a reset then. `within`: s for the answer."""
+        """Withdraws a waiting experiment; for a running one it stops the arm, which then needs a reset. `within`: s for
+        the answer."""
         return self._connection.ask(Experiment, Request("POST", f"{self._path}/{experiment}/cancel", within=within))
 
     def set_priority(self, experiment: str, priority: int) -> Experiment:

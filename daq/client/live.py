@@ -61,7 +61,7 @@ class LiveStream:
     def subscribe(
         self, *topics: Topic, rate: SampleRate | None = None, history: float | None = None, points: int = 1000
     ) -> None:
-        """From now on also these topics; `rate` samples a second; `history` s of samples at once, in about `points`."""
+        """Subscribes to further topics; `rate` samples a second; `history` s of samples at once, in about `points`."""
         self.send(LiveRequest(subscribe=topics, rate=rate, history=history, points=points))
 
     def unsubscribe(self, *topics: Topic) -> None:

@@ -58,7 +58,7 @@ def stop(addresses: Sequence[str], robot_path: str, token: str | None) -> StopRe
 
 
 def _tells(answer: StopResult) -> tuple[bool, bool, bool, bool]:
-    """How much an answer says."""
+    """Rank of an answer: the higher, the more it confirms."""
     return answer.confirmed, answer.delivered, answer.seconds > 0, isinstance(answer, NoSuchRobot)
 
 

@@ -54,7 +54,7 @@ class Traces:
         )
 
     def get(self, trace: str) -> TraceDetails:
-        """What one says about itself, its figures and events."""
+        """A trace's description, figures and events."""
         return self._connection.get(TraceDetails, f"{self._path}/{trace}")
 
     def find(self, wanted: str) -> CatalogueEntry:
@@ -144,7 +144,7 @@ class Traces:
         return self._connection.ask(CatalogueEntry, Request("PATCH", f"{self._path}/{trace}", body))
 
     def delete(self, trace: str) -> None:
-        """For good. Refused while a model or a job refers to it."""
+        """Deletes a trace for good. Refused while a model or a job refers to it."""
         self._connection.do(Request("DELETE", f"{self._path}/{trace}"))
 
     def gains(self, trace: str) -> Sequence[MeasuredGain]:

@@ -104,7 +104,7 @@ class Settings(BaseSettings):
 
 
 def config_files(explicit: Path | None = None) -> list[Path]:
-    """Where a configuration is looked for, first found wins: the one asked for, ./daq.toml, the user's."""
+    """Candidates for the configuration file, in order: the one requested, ./daq.toml, the user's."""
     if explicit is not None:
         return [explicit]
     if "DAQ_CONFIG" in os.environ:

@@ -9,7 +9,7 @@ from daq.link import Link
 from firmware_protocol.commands import Advance, Advanced
 
 LONGEST_ADVANCE_US = 1_000_000
-"""One turn of lock-step lets at most this much time pass, so that its watchdog keeps its meaning."""
+"""Longest time (µs) of one turn of lock-step; a longer turn could trigger the watchdog."""
 
 
 class Clock(Protocol):

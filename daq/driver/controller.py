@@ -66,7 +66,7 @@ class Identity:
     ring_depth: int
     boots: int
     restarted: bool = False
-    """It has been reset since this host last asked."""
+    """Whether it has been reset since this host last asked."""
 
     @property
     def simulated(self) -> bool:

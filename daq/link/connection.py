@@ -81,7 +81,7 @@ class Connection:
         return first
 
     def receive(self, timeout_s: float) -> bytes:
-        """What has arrived, its replies matched. One thread at a time. Raises LinkLostError."""
+        """Reads what has arrived and matches its replies. One thread at a time. Raises LinkLostError."""
         try:
             data = self._channel.read(timeout_s)
         except ChannelError as error:

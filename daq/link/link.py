@@ -36,7 +36,7 @@ R = TypeVar("R", bound=Reply)
 
 
 class LinkState(StrEnum):
-    """How well the controller can be spoken to."""
+    """Quality of the connection to the controller."""
 
     CONNECTED = "connected"
     DEGRADED = "degraded"
@@ -104,7 +104,7 @@ class Link:
 
     @property
     def bytes_per_second(self) -> float:
-        """What the line carries in each direction; infinite where nothing limits it."""
+        """Capacity of the line in each direction; infinite where nothing limits it."""
         return self._endpoint.bytes_per_second
 
     @property
@@ -114,7 +114,7 @@ class Link:
 
     @property
     def state(self) -> LinkState:
-        """How well the controller can be spoken to now."""
+        """Present quality of the connection."""
         if self._connection.failure is not None or self._unanswered:
             return LinkState.LOST
         return LinkState.CONNECTED if self._clean >= CLEAN_TRANSACTIONS else LinkState.DEGRADED

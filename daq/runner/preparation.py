@@ -29,7 +29,7 @@ PERIOD_TOLERANCE = 0.01
 
 @dataclass(frozen=True)
 class Consent:
-    """What the operator has agreed to. A controller with an arm behind it is not moved without `moves_real_arm`."""
+    """The operator's consent. A controller with an arm behind it is not moved without `moves_real_arm`."""
 
     moves_real_arm: bool = False
 

@@ -14,15 +14,15 @@ class RunListener(Protocol):
     """Receives progress, rows and events during a run. No method may block."""
 
     def progress(self, fraction: float, text: str) -> None:
-        """How far the run is."""
+        """Reports progress."""
         ...
 
     def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
-        """A recorded control period."""
+        """Receives a recorded control period."""
         ...
 
     def happened(self, event: TraceEvent) -> None:
-        """An event that is in the trace too."""
+        """Receives an event, which is also in the trace."""
         ...
 
 

@@ -16,7 +16,7 @@ from daq.trajectories.kinematics import link_ends
 
 
 def check_plan(plan: Plan, machine: Machine, limits: Limits) -> list[Violation]:
-    """Everything that speaks against carrying out `plan`; an empty list when nothing does.
+    """All violations of `plan`; an empty list when there are none.
 
     Limits that are None are not checked: `unchecked` names them. Speed is that of the planned angles, not of the
     rounded set points. A set point that jumps on purpose is judged by its size against the following-error limit: the

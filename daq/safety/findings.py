@@ -22,7 +22,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is to be done after one control period.
+    """The decision after one control period.
 
     hold:     set points stay as they are and the plan's time stands still
     stop:     somebody has stopped the arm on the board; None when nobody has

@@ -23,7 +23,7 @@ class State(StrEnum):
 
 
 class Event(StrEnum):
-    """What can happen."""
+    """Events that change the state."""
 
     CONNECTED = "connected"
     LINK_LOST = "link lost"

@@ -69,7 +69,7 @@ def rename(program: Program, name: str) -> Program:
 
 
 def new_violations(before: Program, after: Program, machine: Machine) -> list[str]:
-    """What speaks against carrying the edited program out and did not before, planned from the machine's rest posture.
+    """Violations of the edited program that the program before did not have, planned from the machine's rest posture.
 
     A program that could not be planned before either (of another machine, or outside the sensors' ranges) is let
     through: it may take several edits to mend. Raises SpecError where it cannot be planned any more, and for a machine

@@ -64,7 +64,7 @@ class Jogger:
         self._driven: dict[int, float] = {}
 
     def step(self, row: SampleRow, command: JogCommand | None) -> JogStep:
-        """What to send after `row`. Nothing moves without a command, or when it is older than DEAD_MAN."""
+        """The step to send after `row`. Nothing moves without a command, or when it is older than DEAD_MAN."""
         if command is None or row.host_time - command.time > DEAD_MAN:
             return JogStep()
         self._check(command)

@@ -80,7 +80,7 @@ def plan_program(program: Program, machine: Machine, start: Sequence[float]) -> 
 
 
 def check_program(planned: Sequence[PlannedInstruction], machine: Machine, limits: Limits) -> list[str]:
-    """Everything that speaks against carrying the program out, one line each. The first motion may come back from
+    """All violations of the program, one line each. The first motion may come back from
     outside the limits, where the arm may have been led."""
     lines = []
     first = True

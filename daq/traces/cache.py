@@ -28,11 +28,11 @@ WORTH_IT = 1_000_000
 _VERSION = 2
 """Format version; to be raised when a reader interprets files differently, which makes earlier caches invalid."""
 _PIECE = 1 << 19
-"""Bytes read at a time: they stay in the processor's cache while their checksum is computed."""
+"""Size (bytes) of the pieces that are read: they stay in the processor's cache while their checksum is computed."""
 
 
 def cache_path(path: Path) -> Path:
-    """Where the cache of a trace file is."""
+    """Path of the cache of a trace file."""
     return path.parent / FOLDER / f"{path.name}.npz"
 
 

@@ -26,14 +26,14 @@ LAST = "last"
 
 
 class TraceSummary(BaseModel):
-    """One file of a folder of traces. What is not known is None: of an unfinished trace, how long it is."""
+    """One file of a folder of traces. Unknown values are None, such as the duration of an unfinished trace."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     path: Path
     state: State
     size: int
-    """Bytes; 0 where the file system cannot tell it."""
+    """Size (bytes); 0 where it is unknown."""
     trace_id: str | None = None
     created: datetime | None = None
     source: str | None = None

@@ -25,12 +25,12 @@ def open_regular(path: Path) -> IO[bytes]:
 
 
 def size_of(stream: IO[bytes]) -> int:
-    """Bytes of an open file."""
+    """Size (bytes) of an open file."""
     return os.fstat(stream.fileno()).st_size
 
 
 def read_at_most(stream: IO[bytes], most: int, origin: str, limit: str = "file_bytes") -> bytes:
-    """All of a file. Raises TraceError when it has more than `most` bytes, without reading them; OSError."""
+    """The content of a file. Raises TraceError when it has more than `most` bytes, without reading them; OSError."""
     size = size_of(stream)
     if size > most:
         raise TraceError(f"{origin}: has {size} bytes; up to {most} are read (traces.limits.{limit})")

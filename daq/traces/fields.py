@@ -73,13 +73,13 @@ class Fields:
         return found
 
     def end(self, what: str) -> None:
-        """Nothing may follow: two records that differ in it alone would be the same definition."""
+        """Raises ValueError where bytes follow: records that differ only in these would be the same definition."""
         if self.remaining:
             raise ValueError(f"a {what} has {self.remaining} bytes after its last field")
 
     @property
     def remaining(self) -> int:
-        """Bytes that have not been read."""
+        """Number of bytes that have not been read."""
         return len(self._body) - self._position
 
 
@@ -92,7 +92,7 @@ def chunk_of(body: memoryview) -> CompressedChunk:
 
 
 def metadata_of(body: memoryview) -> Metadata:
-    """A name, and text by text."""
+    """The name and entries of a metadata record."""
     fields = Fields(body)
     return Metadata(name=fields.text(), metadata=fields.texts())
 
@@ -106,7 +106,7 @@ def attachment_of(body: memoryview) -> Attachment:
 
 
 def schema_of(body: memoryview) -> Schema:
-    """What the messages of a channel look like."""
+    """The schema of a channel's messages."""
     fields = Fields(body)
     number, name, encoding = fields.u16(), fields.text(), fields.text()
     schema = Schema(id=number, name=name, encoding=encoding, data=bytes(fields.raw(fields.u32())))

@@ -85,7 +85,7 @@ def extent_of(end: dict[str, str], origin: str) -> tuple[int, float]:
 
 
 def one_line(error: Exception) -> str:
-    """What is wrong, and for pydantic's errors where."""
+    """The error in one line, with the field for pydantic's errors."""
     if isinstance(error, ValidationError):
         first = error.errors()[0]
         return f"{'.'.join(str(part)[:_SHOWN] for part in first['loc'])}: {first['msg']}"

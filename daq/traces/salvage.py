@@ -51,7 +51,7 @@ class Salvaged:
 
 @dataclass(frozen=True)
 class _Readable:
-    """Of one part file: its records, the trace in them, and the counters at its end."""
+    """Content of one part file: its records, the trace in them, and the counters at its end."""
 
     found: Scan
     trace: Trace
@@ -160,7 +160,7 @@ def _salvage_locked(part: Path, data: bytes, limits: TraceLimits) -> Salvaged:
 
 
 def _readable(part: Path, data: bytes, limits: TraceLimits) -> _Readable:
-    """What can be read. Raises NewerTraceError when a newer version may read it, else _NoTraceError."""
+    """The readable content. Raises NewerTraceError when a newer version may read it, else _NoTraceError."""
     try:
         found = scan(data, str(part), limits)
         end = found.metadata.pop(layout.END_METADATA, None)
@@ -215,7 +215,7 @@ def _refuse_another(path: Path, record: TraceRecord, limits: TraceLimits) -> Non
 
 
 def _copy(found: Scan, writer: Writer) -> None:
-    """Everything but the end, message by message: the copy has an index, which the part file has not."""
+    """Copies everything but the end, message by message, which gives the copy the index that the part file lacks."""
     writer.add_metadata(layout.START_METADATA, found.metadata[layout.START_METADATA])
     for attachment in found.attachments:
         writer.add_attachment(

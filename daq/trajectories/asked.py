@@ -16,7 +16,7 @@ ELSEWHERE = (40.0, 35.0, -50.0)
 
 @dataclass(frozen=True)
 class AskedExperiment:
-    """One of the library: what is said of it, and whether it is made for effects of every kind."""
+    """One experiment of the library: its description, and whether it suits effects of every kind."""
 
     name: str
     description: str

@@ -31,7 +31,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class JointPreview:
-    """What one joint will do: angles in rad, speed in rad/s between set points, steps made on purpose left out."""
+    """Motion of one joint: angles in rad, speed in rad/s between set points; intended steps are left out."""
 
     joint: int
     moves: bool

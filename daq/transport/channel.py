@@ -25,7 +25,7 @@ class ByteChannel(Protocol):
 
     @property
     def description(self) -> str:
-        """Where it leads, for people."""
+        """Description of the far end, for messages."""
         ...
 
     def read(self, timeout_s: float) -> bytes:
@@ -64,7 +64,7 @@ class DescriptorChannel:
 
     @property
     def description(self) -> str:
-        """Where it leads."""
+        """Description of the far end."""
         return self._description
 
     def read(self, timeout_s: float) -> bytes:

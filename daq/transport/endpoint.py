@@ -22,7 +22,7 @@ class Endpoint(Protocol):
 
     @property
     def url(self) -> str:
-        """As the user wrote it."""
+        """Port URL as the user wrote it."""
         ...
 
     @property
@@ -32,7 +32,7 @@ class Endpoint(Protocol):
 
     @property
     def bytes_per_second(self) -> float:
-        """What the line carries in one direction."""
+        """Capacity of the line in one direction."""
         ...
 
     @property

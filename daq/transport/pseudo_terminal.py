@@ -78,5 +78,6 @@ def _index(about: Path) -> int | None:
 
 
 def _start(process: Path) -> int:
-    """When a process was started, ticks: its number comes again, too (proc(5), field 22, counted behind its name)."""
+    """Start time (clock ticks) of a process, since its number is reused too (proc(5), field 22, counted after its
+    name)."""
     return int((process / "stat").read_text().rpartition(")")[2].split()[19])
