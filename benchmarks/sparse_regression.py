@@ -22,7 +22,6 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +37,6 @@ from daq.contracts.machine import BoardPid
 from daq.contracts.trace import Trace
 from daq.traces.reader import read_trace
 from model.discrepancy.inverse_dynamics.records import acts_until_next_sample
-from model.fitting.options import HELD_BY_DEFAULT
 from model.machine_model import layout as at
 from model.machine_model.model import Model, base_model
 from model.simulation.torque_space import TorquesAlongTrace, torque_balance
@@ -167,7 +165,7 @@ def _tolerances(trace: Trace, model: Model, target: Floats) -> list[Floats]:
     """Change of the residual for each tolerance parameter moved by its expected deviation."""
     columns = []
     for p in model.parameters:
-        if p.deviation is None or any(fnmatchcase(p.name, h) for h in HELD_BY_DEFAULT):
+        if p.deviation is None or p.sets_torque_scale:
             continue
         step = p.deviation if p.value + p.deviation <= p.high else -p.deviation
         columns.append(_moved(model.with_values({p.name: p.value + step}), trace, target))

@@ -78,7 +78,7 @@ class ControllerArm:
         except (LinkError, NoSampleError) as error:
             raise halting.freeze_for_fault(self._control, str(error), Event.LINK_LOST) from error
         except ControllerRestartedError as error:
-            raise self.tripped(str(error)) from error
+            raise self.freeze_for_fault(str(error)) from error
         self._last, self.lateness = snapshot.tick, snapshot.jitter
         return self._rows.row(snapshot)
 
