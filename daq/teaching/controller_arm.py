@@ -90,7 +90,7 @@ class ControllerArm:
         try:
             self._controller.set_points(postures)
         except RequestRefusedError as error:
-            raise self.stopped(self._ended() or str(error)) from error
+            raise self.freeze_for_stop(self._ended() or str(error)) from error
 
     def gains(self) -> Mapping[int, Gain]:
         """Joint → (P, I, D)."""
@@ -112,10 +112,10 @@ class ControllerArm:
     def _require_going_on(self) -> None:
         cause = self._ended() or self._control.halted
         if cause is not None:
-            raise self.stopped(cause)
+            raise self.freeze_for_stop(cause)
 
     def _step(self, event: Event) -> None:
         try:
             self._control.handle(event)
         except StoppedError as error:  # stopped meanwhile: the error still states the result of the stop
-            raise self.stopped(self._ended() or self._control.halted or str(error)) from error
+            raise self.freeze_for_stop(self._ended() or self._control.halted or str(error)) from error
