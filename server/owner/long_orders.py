@@ -10,7 +10,7 @@ from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, ReachError, SafetyError
 from daq.contracts.limp import limp_line
 from daq.contracts.sample import SampleRow
-from daq.runner import Arrangement, Consent, Outside, StoppedError, run_experiment
+from daq.runner import Consent, RunSetup, StoppedError, StopRequests, run_experiment
 from daq.teaching import JogCommand, RecordedPath, check_program, jog, lead_by_nose, plan_program, run_program
 from daq.teaching.jog import top_speed
 from daq.teaching.performer import FollowingPerformer
@@ -41,7 +41,7 @@ def require_in_time(order: Long) -> None:
 def run(desk: Desk, order: RunExperiment) -> Answer:
     """An experiment, as `daq run` does it."""
     result = run_experiment(
-        Arrangement(
+        RunSetup(
             desk.controller,
             desk.control,
             order.spec,
@@ -49,7 +49,7 @@ def run(desk: Desk, order: RunExperiment) -> Answer:
             desk.limits,
             desk.folder,
             desk.speaker,
-            Outside(desk.ended, lambda: desk.guardian.cause is EndCause.ORPHANED),
+            StopRequests(desk.ended, lambda: desk.guardian.cause is EndCause.ORPHANED),
             desk.robot,
             order.trace_id,
         ),
