@@ -209,7 +209,7 @@ class ArmReport(_Message):
     counters: dict[str, float]
 
 
-class Told(_Message):
+class TeachingText(_Message):
     """A line for whoever is teaching."""
 
     kind: Literal["told"] = "told"
@@ -239,7 +239,7 @@ class CannotOpen(_Message):
 
 
 Report = Annotated[
-    Opened | LiveSample | ArmReport | Told | Answer | CannotOpen | Progress | EventHappened,
+    Opened | LiveSample | ArmReport | TeachingText | Answer | CannotOpen | Progress | EventHappened,
     Field(discriminator="kind"),
 ]
 REPORT: TypeAdapter[Report] = TypeAdapter(Report)

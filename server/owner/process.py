@@ -15,9 +15,9 @@ from daq.transport import PortBusyError
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.memory_map import default_memory_map, parse_memory_map
 from server import logs
-from server.owner.desk import Desk
 from server.owner.inbox import Inbox
 from server.owner.messages import CannotOpen, Open, Opened
+from server.owner.owned_robot import OwnedRobot
 from server.owner.owner import serve
 from server.owner.watched_controller import WatchedController
 from server.steady import keep_steady
@@ -56,7 +56,7 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
     ):
         controller = closed_last.enter_context(WatchedController.connect(opening.url, memory_map))
         control = freezer.control = ArmControl(controller)
-        desk = Desk(
+        robot = OwnedRobot(
             opening.robot,
             opening.machine,
             opening.limits,
@@ -67,9 +67,9 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
             inbox,
             speaker,
         )
-        if (cause := desk.ended()) is not None:
+        if (cause := robot.ended()) is not None:
             control.stop(cause)
-        desk.read_gains()
+        robot.read_gains()
         identity = controller.identity
         keep_steady()
         speaker.ended(
@@ -81,4 +81,4 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
             )
         )
         with inbox.reading():
-            serve(desk)
+            serve(robot)

@@ -13,7 +13,7 @@ from server.logs import PlainLines
 PROGRAM = """
 import logging, sys, threading, warnings
 from server import logs
-from server.jobs.desk import worker_processes
+from server.jobs.service import worker_processes
 
 if __name__ == "__main__":
     logs.begin()

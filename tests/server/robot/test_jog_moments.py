@@ -14,10 +14,10 @@ import httpx
 from daq.contracts.service.teaching import TeachingStatus
 from server.access.caller import LOCAL
 from server.access.gate import Gate
+from server.api.stream import WAITING_MESSAGES, _carry_out, _receive
 from server.app import bare_app
 from server.live.hub import Client
 from server.live.outbox import Outbox
-from server.live.stream import WAITING_MESSAGES, _carry_out, _receive
 from tests.server.clocks import HandClock
 
 JOG = '{"jog": {"lease": "mine", "velocities": {"1": 0.1}}}'
