@@ -165,10 +165,23 @@ class Close(_Message):
 
 
 Order = Annotated[
-    Open | RunExperiment | JogBegin | JogDrive | RunProgram | LeadBegin | Finish | HaltRun | ReadGains | WriteGains
-    | ReadProcess | WriteOutput | MoveGripper | Reset | Close,
+    Open
+    | RunExperiment
+    | JogBegin
+    | JogDrive
+    | RunProgram
+    | LeadBegin
+    | Finish
+    | HaltRun
+    | ReadGains
+    | WriteGains
+    | ReadProcess
+    | WriteOutput
+    | MoveGripper
+    | Reset
+    | Close,
     Field(discriminator="kind"),
-]  # fmt: skip
+]
 ORDER: TypeAdapter[Order] = TypeAdapter(Order)
 
 Long = RunExperiment | JogBegin | RunProgram | LeadBegin

@@ -78,11 +78,18 @@ class Bench:
         self.told: list[Job] = []
         self.desk = JobService(
             JobContext(
-                robot="ma2000", machine=MACHINE, folder=self.folder, jobs=self.jobs, catalogue=self.catalogue,
-                models=self.models, clock=self.clock, changed=self._hear, at_once=1,
+                robot="ma2000",
+                machine=MACHINE,
+                folder=self.folder,
+                jobs=self.jobs,
+                catalogue=self.catalogue,
+                models=self.models,
+                clock=self.clock,
+                changed=self._hear,
+                at_once=1,
                 make_executor=self._make_executor,
             )
-        )  # fmt: skip
+        )
 
     def _carry_out(self, folder: Path) -> Ended:
         return self.carry_out(folder)  # as it is then
@@ -365,8 +372,10 @@ def test_a_short_job_waits_behind_no_diagnosis_and_the_next_one_says_behind_what
     told = {job.id: job for job in bench.desk.with_progress_all(bench.jobs.waiting("ma2000"))}
     behind = [told[job.id].waits_behind for job in (fit, other_fit, next_short)]
     assert [(one.job, one.request.kind, one.others) for one in behind if one] == [
-        (diagnosis.id, "diagnose", 0), (diagnosis.id, "diagnose", 1), (short.id, "compare", 0),
-    ]  # fmt: skip
+        (diagnosis.id, "diagnose", 0),
+        (diagnosis.id, "diagnose", 1),
+        (short.id, "compare", 0),
+    ]
     assert all(one and one.started == bench.clock.utc() for one in behind)
 
     held.futures[diagnosis.id].set_result(Ended())

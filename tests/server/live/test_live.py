@@ -211,9 +211,16 @@ def test_a_client_that_does_not_take_its_dismissal_either_is_dropped_without_a_f
 def _sample(tick: int, value: float) -> LiveSample:
     six = (value,) * 6
     return LiveSample(
-        tick=tick, host_time=tick * 0.02, joints=(1, 2, 3, 4, 5, 6), set_point=six, position=six, error=six, drive=six,
-        status=0, lateness=0.0,
-    )  # fmt: skip
+        tick=tick,
+        host_time=tick * 0.02,
+        joints=(1, 2, 3, 4, 5, 6),
+        set_point=six,
+        position=six,
+        error=six,
+        drive=six,
+        status=0,
+        lateness=0.0,
+    )
 
 
 @given(st.integers(1, 150), st.integers(10, 40))

@@ -15,12 +15,26 @@ from tests.server.service import Service
 
 NOON = datetime(2026, 3, 2, 12, 0, tzinfo=UTC)
 GAUGES = (
-    "daq_connected", "daq_stopped", "daq_queued", "daq_queue_paused", "daq_running", "daq_live_clients",
-    "daq_jobs_now", "daq_disk_free_bytes", "daq_disk_reserve_bytes", "daq_link_seconds",
-)  # fmt: skip
+    "daq_connected",
+    "daq_stopped",
+    "daq_queued",
+    "daq_queue_paused",
+    "daq_running",
+    "daq_live_clients",
+    "daq_jobs_now",
+    "daq_disk_free_bytes",
+    "daq_disk_reserve_bytes",
+    "daq_link_seconds",
+)
 COUNTERS = (
-    "daq_link", "daq_samples", "daq_experiments", "daq_jobs", "daq_stops", "daq_refused_requests", "daq_live_dropped",
-)  # fmt: skip
+    "daq_link",
+    "daq_samples",
+    "daq_experiments",
+    "daq_jobs",
+    "daq_stops",
+    "daq_refused_requests",
+    "daq_live_dropped",
+)
 
 
 class Scraped:

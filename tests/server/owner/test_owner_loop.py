@@ -67,10 +67,15 @@ def served(
             closing.set()
 
     robot = SimpleNamespace(
-        controller=controller, control=control, tell_arm=tell_arm, read_gains=dict, activity="none",
-        guardian=SimpleNamespace(cause=None), speaker=SimpleNamespace(ended=answers.append),
+        controller=controller,
+        control=control,
+        tell_arm=tell_arm,
+        read_gains=dict,
+        activity="none",
+        guardian=SimpleNamespace(cause=None),
+        speaker=SimpleNamespace(ended=answers.append),
         inbox=SimpleNamespace(take=take, closing=closing, done=lambda: None),
-    )  # fmt: skip
+    )
     serve(cast(Any, robot))
     return states, answers
 

@@ -84,9 +84,13 @@ def owner_at(endpoint: InProcess) -> Iterator[Scene]:
 
     with stop_listener("arm") as listener, Guardian(listener, None, freeze) as guardian:
         robot = SimpleNamespace(
-            activity="none", controller=controller, control=control, guardian=guardian, read_gains=controller.gains,
+            activity="none",
+            controller=controller,
+            control=control,
+            guardian=guardian,
+            read_gains=controller.gains,
             ended=lambda: guardian.cause and guardian.cause.value,
-        )  # fmt: skip
+        )
         yield Scene(endpoint, guardian, control, robot)
 
 

@@ -58,9 +58,15 @@ class Bench:
             self.clock, lambda who: self._end("lapsed", who), lambda who: self._end("given_back", who)
         )
         self.robot: Any = SimpleNamespace(
-            name="ma2000", identity=MOCK, arm=CALM, problem="", experiment=None,
-            place=SimpleNamespace(folder=folder), ask=self._ask, tell=self.orders.append,
-        )  # fmt: skip
+            name="ma2000",
+            identity=MOCK,
+            arm=CALM,
+            problem="",
+            experiment=None,
+            place=SimpleNamespace(folder=folder),
+            ask=self._ask,
+            tell=self.orders.append,
+        )
         self.queues = QueueStore(self.store)
         self.queue = self.begun_anew()
 
@@ -75,10 +81,17 @@ class Bench:
     def begun_anew(self) -> QueueService:
         """The queue as a service that begins now has it."""
         context = QueueContext(
-            robot=self.robot, control=self.control, experiments=self.experiments, schedules=self.schedules,
-            queues=self.queues, clock=self.clock, record_event=self._record_event, recorded=self._record,
-            unfinished=self._look_for_traces, unattended=False,
-        )  # fmt: skip
+            robot=self.robot,
+            control=self.control,
+            experiments=self.experiments,
+            schedules=self.schedules,
+            queues=self.queues,
+            clock=self.clock,
+            record_event=self._record_event,
+            recorded=self._record,
+            unfinished=self._look_for_traces,
+            unattended=False,
+        )
         return QueueService(context)
 
     def _end(self, how: str, who: str) -> None:

@@ -62,10 +62,15 @@ class Socket:
 
 def test_over_the_socket_it_is_not_that_at_which_the_command_before_it_was_done() -> None:
     clock, teaching = HandClock(), Teaching()
-    one = cast(Any, SimpleNamespace(
-        robot=SimpleNamespace(clock=clock), teaching=teaching, require_motion=lambda _lease: None,
-        hub=SimpleNamespace(shown=lambda _topics: []),
-    ))  # fmt: skip
+    one = cast(
+        Any,
+        SimpleNamespace(
+            robot=SimpleNamespace(clock=clock),
+            teaching=teaching,
+            require_motion=lambda _lease: None,
+            hub=SimpleNamespace(shown=lambda _topics: []),
+        ),
+    )
 
     async def first() -> str:
         return JOG
