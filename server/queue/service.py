@@ -11,16 +11,16 @@ from datetime import datetime, timedelta
 from daq.contracts.errors import DaqError
 from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState
 from daq.contracts.service.queue import QueueStatus
+from server.experiments.endings import Ending, ending_of
+from server.experiments.order import next_due
+from server.experiments.states import Event, IllegalEventError, advance
 from server.owner.messages import Answer, ArmReport, HaltRun, RunExperiment
 from server.problems import ProblemError, conflict
 from server.queue.attendance import Attendance
+from server.queue.context import QueueContext
 from server.queue.due_runs import DueRuns
-from server.queue.endings import Ending, ending_of
 from server.queue.notices import Notices, Seen
-from server.queue.order import next_due
-from server.queue.parts import QueueParts
 from server.queue.readiness import Circumstances, what_is_missing, why_held
-from server.queue.states import Event, IllegalEventError, advance
 from server.store.queues import QueueState
 
 LOOK_EVERY = 1.0
@@ -48,17 +48,17 @@ class Ended:
     at: datetime
 
 
-class QueueDesk:
+class QueueService:
     """One queue with its worker thread."""
 
-    def __init__(self, parts: QueueParts) -> None:
-        self._parts = parts
+    def __init__(self, context: QueueContext) -> None:
+        self._context = context
         self._lock = threading.RLock()
         self._changed = threading.Event()
         self._closing = False
         self._consented: int | None = None
         """The connection, as `Seen` counts them, that a person's word to move a real arm was given for."""
-        self._attendance = Attendance(parts.clock)
+        self._attendance = Attendance(context.clock)
         self._running: Running | None = None
         self._waiting_for = ""
         self.notices = Notices()
@@ -67,7 +67,7 @@ class QueueDesk:
         """Whether the database knows the state."""
         self._ended: Ended | None = None
         """What ran last, where the database could not be told of its end: nothing else begins until it is."""
-        self._runs = DueRuns(parts)
+        self._runs = DueRuns(context)
         self._state = self._state_at_start()
         self._runs.leave_out_missed()
         self._worker = threading.Thread(target=self._work, name="queue", daemon=True)
@@ -83,26 +83,26 @@ class QueueDesk:
 
     def submit(self, request: ExperimentRequest, by: str, key: str | None) -> tuple[Experiment, bool]:
         """Takes an experiment in; False where the same key did before. Raises a 409 for a key used otherwise."""
-        experiment, new = self._parts.experiments.submit(
-            self._parts.robot.name, request, self._parts.clock.utc(), by, key
+        experiment, new = self._context.experiments.submit(
+            self._context.robot.name, request, self._context.clock.utc(), by, key
         )
         if new:
-            self._parts.told("experiment", "queued", actor=by, experiment=experiment.id)
+            self._context.record_event("experiment", "queued", actor=by, experiment=experiment.id)
             self.wake()
         return experiment, new
 
     def cancel(self, identity: str, by: str) -> Experiment:
         """Takes back what waits; stops the arm where it runs. Raises a 404, and a 409 for what has ended."""
-        name = self._parts.robot.name
+        name = self._context.robot.name
         with self._lock:
             running = self._running
             if running is not None and running.id == identity:
                 running.cancelled_by = by
                 if running.answer is not None:
-                    self._parts.robot.tell(HaltRun())
-                return self.as_told(self._parts.experiments.get(name, identity))
-        found = self._parts.experiments.cancel_waiting(name, identity, self._parts.clock.utc(), by)
-        self._parts.told("experiment", "cancelled", actor=by, experiment=identity)
+                    self._context.robot.tell(HaltRun())
+                return self.with_progress(self._context.experiments.get(name, identity))
+        found = self._context.experiments.cancel_waiting(name, identity, self._context.clock.utc(), by)
+        self._context.record_event("experiment", "cancelled", actor=by, experiment=identity)
         return found
 
     def pause(self, reason: str, by: str | None = None) -> None:
@@ -110,7 +110,7 @@ class QueueDesk:
         with self._lock:
             held = self._hold(reason, anew=by is not None)
         if held:
-            self._parts.told("queue", f"paused: {reason}", actor=by)
+            self._context.record_event("queue", f"paused: {reason}", actor=by)
 
     def resume(self, by: str, *, moves_real_arm: bool, seen: Seen | None = None) -> None:
         """The operator's word that the queue may move the arm, given when there was so much to be `seen`: what came
@@ -118,17 +118,17 @@ class QueueDesk:
         seen = seen or self.notices.seen
         with self._lock:
             self.notices.answer_for(seen)
-            arm = self._parts.robot.arm
+            arm = self._context.robot.arm
             if arm is not None and (held := why_held(arm)):
                 self.notices.note(held)
                 line = f"the arm is {arm.arm}: {arm.cause}"
                 raise conflict("arm-stopped", line, "look at the arm, reset it, then resume the queue")
-            state = QueueState(False, f"resumed by {by}", self._parts.clock.utc())
-            self._parts.queues.set(self._parts.robot.name, state)  # first: what is not written stays paused
+            state = QueueState(False, f"resumed by {by}", self._context.clock.utc())
+            self._context.queues.set(self._context.robot.name, state)  # first: what is not written stays paused
             self._state, self._written = state, True
             self._consented = seen.connections if moves_real_arm else self._consented
             self._attendance.say()
-        self._parts.told("queue", "resumed", actor=by)
+        self._context.record_event("queue", "resumed", actor=by)
         self.wake()
 
     def attend(self) -> None:
@@ -137,7 +137,7 @@ class QueueDesk:
         self._attendance.say()
         self.wake()
 
-    def hear(self, arm: ArmReport) -> None:
+    def on_arm_report(self, arm: ArmReport) -> None:
         """What the arm's owner says: a stop, a fault or a lost link holds the queue, whatever waits. Must not wait."""
         self.notices.arm_reported(arm)
         self.wake()
@@ -177,7 +177,7 @@ class QueueDesk:
         if running is not None:
             running.progress, running.text = fraction, text
 
-    def as_told(self, experiment: Experiment) -> Experiment:
+    def with_progress(self, experiment: Experiment) -> Experiment:
         """With the progress of the one that runs."""
         running = self._running
         if running is None or running.id != experiment.id or experiment.state != "running":
@@ -188,8 +188,8 @@ class QueueDesk:
         """Now. Waits for nothing, neither for a disk nor for whoever holds the queue: the event loop asks this."""
         running, waiting_for, state, left = self._running, self._waiting_for, self._state, self._attendance.left
         if not state.paused and (held := self.notices.reason):  # it is held from this moment on, and written down soon
-            state = QueueState(True, held, self._parts.clock.utc())
-        attended = self._parts.clock.utc() + timedelta(seconds=left) if left and self._needs_attendance() else None
+            state = QueueState(True, held, self._context.clock.utc())
+        attended = self._context.clock.utc() + timedelta(seconds=left) if left and self._needs_attendance() else None
         return QueueStatus(
             paused=state.paused,
             reason=state.reason,
@@ -213,13 +213,13 @@ class QueueDesk:
             self._worker.join(patience)
 
     def _state_at_start(self) -> QueueState:
-        parts, now = self._parts, self._parts.clock.utc()
-        name = parts.robot.name
-        interrupted = parts.experiments.settle_after_restart(name, now)
+        context, now = self._context, self._context.clock.utc()
+        name = context.robot.name
+        interrupted = context.experiments.settle_after_restart(name, now)
         for one in interrupted:
-            parts.told("experiment", f"interrupted: {one.reason}", experiment=one.id)
-        waiting = parts.experiments.count_waiting(name)
-        before = parts.queues.get(name)
+            context.record_event("experiment", f"interrupted: {one.reason}", experiment=one.id)
+        waiting = context.experiments.count_waiting(name)
+        before = context.queues.get(name)
         if before is not None and before.paused:
             return before
         if waiting or interrupted:
@@ -227,14 +227,14 @@ class QueueDesk:
             state = QueueState(True, f"{line}: look at the arm, then resume the queue", now)
         else:
             state = QueueState(False, "nothing was waiting when the service started", now)
-        parts.queues.set(name, state)
+        context.queues.set(name, state)
         return state
 
     def _hold(self, reason: str, *, anew: bool = False) -> bool:
         """Pauses, under the lock; False where it is paused already, and keeps its first reason unless it is `anew`."""
         if self._state.paused and not anew:
             return False
-        self._state, self._written = QueueState(True, reason, self._parts.clock.utc()), False
+        self._state, self._written = QueueState(True, reason, self._context.clock.utc()), False
         try:
             self._write_state()
         except Exception:  # it is paused, whatever the disk says, and is written as soon as that is possible
@@ -243,18 +243,18 @@ class QueueDesk:
 
     def _write_state(self) -> None:
         if not self._written:
-            self._parts.queues.set(self._parts.robot.name, self._state)
+            self._context.queues.set(self._context.robot.name, self._state)
             self._written = True
 
     def _count_waiting(self) -> int:
-        return self._parts.experiments.count_waiting(self._parts.robot.name)
+        return self._context.experiments.count_waiting(self._context.robot.name)
 
     def _has_consent(self) -> bool:
         return self._consented == self.notices.seen.connections
 
     def _needs_attendance(self) -> bool:
-        identity = self._parts.robot.identity
-        return identity is not None and not identity.simulated and not self._parts.unattended
+        identity = self._context.robot.identity
+        return identity is not None and not identity.simulated and not self._context.unattended
 
     def _work(self) -> None:
         while True:
@@ -286,35 +286,35 @@ class QueueDesk:
 
     def _take(self) -> Experiment | None:
         """The next experiment, with the control of the robot; None when none may begin now."""
-        parts = self._parts
+        context = self._context
         with self._lock:
-            now = parts.clock.utc()
-            following = next_due(parts.experiments.due(parts.robot.name, now), now)
+            now = context.clock.utc()
+            following = next_due(context.experiments.due(context.robot.name, now), now)
             if following is None:
                 self._waiting_for = ""
                 return None
             self._waiting_for = self._what_is_missing()
             if self._state.paused or self._waiting_for or self._closing:
                 return None
-            if not parts.control.take_for_queue(following.id):
+            if not context.control.take_for_queue(following.id):
                 self._waiting_for = "somebody has control of the robot"
                 return None
             if self.notices.reason:  # a control that has just ended, say: the queue is held first
-                parts.control.give_back_for_queue()
+                context.control.give_back_for_queue()
                 self.wake()
                 return None
             self._running = Running(following.id)  # before it leaves those that wait: the queue never looks empty
             try:
-                return parts.experiments.begin(parts.robot.name, following.id, parts.clock.utc())
+                return context.experiments.begin(context.robot.name, following.id, context.clock.utc())
             except BaseException as error:
                 self._running = None
-                parts.control.give_back_for_queue()
+                context.control.give_back_for_queue()
                 if isinstance(error, IllegalEventError):  # cancelled in this moment
                     return None
                 raise
 
     def _what_is_missing(self) -> str:
-        robot = self._parts.robot
+        robot = self._context.robot
         if robot.arm is not None:
             self.notices.arm_reported(robot.arm)  # what this decision is made from has been noticed before it
         attended = self._attendance.left > 0 or not self._needs_attendance()
@@ -332,24 +332,24 @@ class QueueDesk:
 
     def _carry_out(self, experiment: Experiment) -> None:
         """From its begin to its end, whatever fails meanwhile: then a person looks before the next one."""
-        parts = self._parts
+        context = self._context
         try:
-            parts.robot.experiment = experiment.id
-            parts.told("experiment", "started", experiment=experiment.id)
+            context.robot.experiment = experiment.id
+            context.record_event("experiment", "started", experiment=experiment.id)
             ending = self._run(experiment)
         except Exception as error:
             log.exception("experiment %s", experiment.id)
             why = str(error) if isinstance(error, DaqError) else f"{type(error).__name__}: see the log"
             ending = Ending(Event.LOST, why)
         finally:
-            parts.robot.experiment = None
-            parts.control.give_back_for_queue()
+            context.robot.experiment = None
+            context.control.give_back_for_queue()
         with self._lock:
             ending = self._as_wished(ending, self._running)
             state = advance("running", ending.event)
             why = f"{_ended_as(experiment, state)} ({ending.reason}): look at the arm, then resume the queue"
             held = ending.holds_queue and self._hold(why)  # whoever hears of the end finds the queue paused
-            self._ended = Ended(experiment.id, ending, parts.clock.utc())
+            self._ended = Ended(experiment.id, ending, context.clock.utc())
             try:
                 self._write_end()
             except Exception:
@@ -358,46 +358,46 @@ class QueueDesk:
             finally:
                 self._running = None
         if held:
-            parts.told("queue", f"paused: {why}")
+            context.record_event("queue", f"paused: {why}")
 
     def _write_end(self) -> None:
         """Of what ran last, under the lock. Raises what the database does; the end is kept then."""
-        ended, parts = self._ended, self._parts
+        ended, context = self._ended, self._context
         if ended is None:
             return
         ending, state = ended.ending, advance("running", ended.ending.event)
         try:
-            parts.experiments.end(parts.robot.name, ended.id, ending.event, ended.at, ending.reason, ending.outcome)
+            context.experiments.end(context.robot.name, ended.id, ending.event, ended.at, ending.reason, ending.outcome)
         except (IllegalEventError, ProblemError):
             log.exception("experiment %s", ended.id)  # it has an end, or is gone: nothing is left to be written
         self._ended = None
         what = "completed" if ending.event is Event.COMPLETED else state
-        parts.told("experiment", f"{what}: {ending.reason}".rstrip(": "), experiment=ended.id)
+        context.record_event("experiment", f"{what}: {ending.reason}".rstrip(": "), experiment=ended.id)
         if ending.untaken:
-            parts.unfinished()  # the database can be written again, and finds the trace in its folder
+            context.unfinished()  # the database can be written again, and finds the trace in its folder
 
     def _run(self, experiment: Experiment) -> Ending:
         """How it ended. Raises whatever keeps it from being begun, or loses it."""
-        parts = self._parts
+        context = self._context
         with self._lock:
             running = self._running
             assert running is not None
             if running.cancelled_by is not None:
                 return Ending(Event.STOPPED, "cancelled before it moved")
-            answer = running.answer = parts.robot.ask(
+            answer = running.answer = context.robot.ask(
                 RunExperiment,
-                asked=parts.clock.monotonic(),
+                asked=context.clock.monotonic(),
                 spec=experiment.spec,
-                trace_id=parts.experiments.trace_number(experiment.id),
+                trace_id=context.experiments.trace_number(experiment.id),
                 moves_real_arm=self._has_consent(),
             )
         found = self._await(answer)
         ending = ending_of(found)
         try:
             if found.finished is not None:
-                parts.recorded(found)
+                context.recorded(found)
             elif ending.event is not Event.REFUSED:
-                parts.unfinished()
+                context.unfinished()
         except Exception:
             log.exception("experiment %s: its trace", experiment.id)
             line = "its trace is not in the catalogue: see the log"
@@ -414,7 +414,7 @@ class QueueDesk:
                     running = self._running
                     if running is not None and running.cancelled_by is None:
                         running.cancelled_by = "the service: no operator confirmed to be present"
-                        self._parts.robot.tell(HaltRun())
+                        self._context.robot.tell(HaltRun())
 
     def _as_wished(self, ending: Ending, running: Running | None) -> Ending:
         """Whose wish a stop was."""

@@ -18,7 +18,7 @@ from daq.runner import ArmControl
 from daq.safety import State
 from daq.teaching.controller_arm import ControllerArm
 from server.owner.inbox import Inbox
-from server.owner.messages import ArmReport, Told
+from server.owner.messages import ArmReport, TeachingText
 from server.owner.watched_controller import SampleMaker, WatchedController
 
 REPORT_EVERY = 1.0
@@ -26,10 +26,10 @@ REPORT_EVERY = 1.0
 
 
 @dataclass
-class Desk:
+class OwnedRobot:
     """One connected robot in its owner's process."""
 
-    robot: str
+    name: str
     machine: Machine
     limits: Limits
     folder: Path
@@ -69,7 +69,7 @@ class Desk:
 
     def say(self, line: str) -> None:
         """A line for whoever teaches."""
-        self.speaker.say(Told(text=line))
+        self.speaker.say(TeachingText(text=line))
 
     def tell_arm(self, *, anew: bool = False) -> None:
         """The arm's state, when it has changed, or nobody has been told for a second; or `anew` in any case."""

@@ -8,14 +8,14 @@ from typing import Protocol
 
 from server.clock import Clock
 from server.owner.messages import Answer
-from server.robot.control import ControlDesk
+from server.robot.control import ControlService
 from server.robot.robot import Robot
 from server.store.experiments import ExperimentStore
 from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 
 
-class Told(Protocol):
+class RecordEvent(Protocol):
     """Who is told what the queue does."""
 
     def __call__(self, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
@@ -24,16 +24,16 @@ class Told(Protocol):
 
 
 @dataclass(frozen=True)
-class QueueParts:
+class QueueContext:
     """What the queue works with."""
 
     robot: Robot
-    control: ControlDesk
+    control: ControlService
     experiments: ExperimentStore
     schedules: ScheduleStore
     queues: QueueStore
     clock: Clock
-    told: Told
+    record_event: RecordEvent
     recorded: Callable[[Answer], None]
     """Called with the answer of every run that left a trace."""
     unfinished: Callable[[], None]

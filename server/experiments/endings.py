@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from daq.contracts.trace import Outcome
+from server.experiments.states import Event
 from server.owner.messages import Answer
-from server.queue.states import Event
 
 EXIT_REFUSED = (2, 4)
 EXIT_NOT_REACHED = 3

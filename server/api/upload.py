@@ -14,8 +14,8 @@ from server.access.caller import Caller
 from server.bounded.messages import ReadUpload, UploadedTrace
 from server.bounded.workers import ExhaustedError
 from server.catalogue.catalogue import UPLOAD
+from server.catalogue.room import require_room
 from server.problems import ProblemError, conflict
-from server.queue.room import require_room
 from server.services import RobotServices, Services
 
 KINDS = {"application/octet-stream": ".mcap", "text/csv": ".csv"}
@@ -24,19 +24,19 @@ LOOK_EVERY = 4 << 20
 ADVICE = "docs/traces.md tells what a trace looks like"
 
 
-async def store_upload(request: Request, one: RobotServices, found: Services, who: Caller) -> CatalogueEntry:
+async def store_upload(request: Request, rig: RobotServices, services: Services, caller: Caller) -> CatalogueEntry:
     """Writes the body to a temporary file, then takes it in. Raises a 413, 415, 422, 409, 507."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind not in KINDS:
         allowed = " or ".join(KINDS)
         raise ProblemError(415, "not-a-trace", f"Content-Type {kind!r:.100} is not supported", f"send {allowed}")
-    one.catalogue.folder.mkdir(parents=True, exist_ok=True)
-    await run_in_threadpool(require_room, one.catalogue.folder)
-    with tempfile.TemporaryDirectory(prefix=UPLOAD, dir=one.catalogue.folder) as folder:
+    rig.catalogue.folder.mkdir(parents=True, exist_ok=True)
+    await run_in_threadpool(require_room, rig.catalogue.folder)
+    with tempfile.TemporaryDirectory(prefix=UPLOAD, dir=rig.catalogue.folder) as folder:
         path = Path(folder) / f"upload{KINDS[kind]}"
-        await _write_body(request, path, found.settings.server.upload_size << 20)
-        async with found.lanes.turn(who.name):  # not before: a body that never ends would keep it
-            return await run_in_threadpool(_take_in, path, one, found, who)
+        await _write_body(request, path, services.settings.server.upload_size << 20)
+        async with services.lanes.turn(caller.name):  # not before: a body that never ends would keep it
+            return await run_in_threadpool(_take_in, path, rig, services, caller)
 
 
 async def _write_body(request: Request, path: Path, largest: int) -> None:
@@ -55,21 +55,21 @@ async def _write_body(request: Request, path: Path, largest: int) -> None:
         raise ProblemError(422, "not-a-trace", "the body is empty", "send a trace")
 
 
-def _take_in(path: Path, one: RobotServices, found: Services, who: Caller) -> CatalogueEntry:
-    made = _read(path, one, found)
-    target = one.catalogue.folder / made.name
+def _take_in(path: Path, rig: RobotServices, services: Services, caller: Caller) -> CatalogueEntry:
+    made = _read(path, rig, services)
+    target = rig.catalogue.folder / made.name
     number = made.summary.trace_id or ""
-    if not one.catalogue.move_in(made.path, target, made.summary):
+    if not rig.catalogue.move_in(made.path, target, made.summary):
         raise conflict("trace-exists", f"trace {number} is there already", "nothing needs to be done")
-    found.tell(one.robot.name, "trace", f"trace {number} was uploaded", actor=who.name)
-    return found.traces.get(one.robot.name, number)
+    services.record_event(rig.robot.name, "trace", f"trace {number} was uploaded", actor=caller.name)
+    return services.traces.get(rig.robot.name, number)
 
 
-def _read(path: Path, one: RobotServices, found: Services) -> UploadedTrace:
+def _read(path: Path, rig: RobotServices, services: Services) -> UploadedTrace:
     """Raises a 413 for what takes too much, a 422 for what is no trace."""
     try:
-        limits = found.settings.traces.limits
-        answer = found.uploads.ask(ReadUpload(path=path, folder=one.catalogue.folder, limits=limits))
+        limits = services.settings.traces.limits
+        answer = services.uploads.ask(ReadUpload(path=path, folder=rig.catalogue.folder, limits=limits))
     except ExhaustedError as error:
         raise _too_much(str(error)) from error
     if answer.exhausted:

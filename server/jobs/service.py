@@ -20,13 +20,13 @@ from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import MACHINE, DiagnoseRequest, FitRequest, Job, JobRequest
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock
+from server.experiments.states import Event
 from server.jobs.lanes import LANES, SHORT_LANE_WORKERS, Lane, lane_of, with_what_it_waits_for
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
 from server.jobs.models import Models
 from server.jobs.work import Ended, Task, carry_out
 from server.jobs.yielding import begin_worker
 from server.problems import ProblemError, conflict, not_found
-from server.queue.states import Event
 from server.store.jobs import JobStore, models_of, traces_of
 
 LOOK_EVERY = 0.5
@@ -43,7 +43,7 @@ def worker_processes(count: int) -> Executor:
 
 
 @dataclass(frozen=True)
-class JobParts:
+class JobContext:
     """What the desk works with. `changed` is told of every job that has changed; it must not wait. `at_once`: workers
     of the long lane."""
 
@@ -59,17 +59,17 @@ class JobParts:
     make_executor: Callable[[int], Executor] = worker_processes
 
 
-class JobDesk:
+class JobService:
     """Gives jobs to an executor, and follows them. Safe to use from any thread."""
 
-    def __init__(self, parts: JobParts) -> None:
-        self._parts = parts
+    def __init__(self, context: JobContext) -> None:
+        self._context = context
         self._wake = threading.Event()
         self._closing = False
         self._executors: dict[Lane, Executor] = {}
         self._running: dict[str, tuple[Job, Future[Ended]]] = {}
         self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
-        parts.jobs.settle_after_restart(parts.robot, parts.clock.utc())
+        context.jobs.settle_after_restart(context.robot, context.clock.utc())
 
     def start(self) -> None:
         """Begins to compute what waits: a job moves nothing."""
@@ -77,17 +77,17 @@ class JobDesk:
 
     def submit(self, request: JobRequest, by: str, key: str | None) -> tuple[Job, bool]:
         """Takes a job in. Raises a 404 for a trace or model that is not there, a 409 for a key used otherwise."""
-        parts = self._parts
-        before = parts.jobs.made_before(parts.robot, request, key)
+        context = self._context
+        before = context.jobs.made_before(context.robot, request, key)
         if before is not None:  # whatever has become of its traces and models since
             return before, False
         task = Task(
             request=request,
-            machine=parts.machine,
-            traces={number: parts.catalogue.path_of(number) for number in traces_of(request)},
-            models={number: parts.models.path_of(number) for number in models_of(request) if number != MACHINE},
-            names={number: parts.models.name_of(number) for number in models_of(request)},
-            limits=parts.catalogue.limits,
+            machine=context.machine,
+            traces={number: context.catalogue.path_of(number) for number in traces_of(request)},
+            models={number: context.models.path_of(number) for number in models_of(request) if number != MACHINE},
+            names={number: context.models.name_of(number) for number in models_of(request)},
+            limits=context.catalogue.limits,
         )
 
         def prepare(identity: str) -> None:
@@ -99,7 +99,7 @@ class JobDesk:
                 shutil.rmtree(folder, ignore_errors=True)
                 raise
 
-        job, new = parts.jobs.submit(parts.robot, request, parts.clock.utc(), by, key, prepare)
+        job, new = context.jobs.submit(context.robot, request, context.clock.utc(), by, key, prepare)
         if new:
             self._tell(job)
             self._wake.set()
@@ -107,26 +107,28 @@ class JobDesk:
 
     def cancel(self, identity: str, by: str) -> Job:
         """Takes back what waits; asks what runs to end. Raises a 404, and a 409 for what has ended."""
-        parts = self._parts
+        context = self._context
         try:
-            job = parts.jobs.change(parts.robot, identity, Event.CANCELLED, parts.clock.utc(), f"cancelled by {by}")
+            job = context.jobs.change(
+                context.robot, identity, Event.CANCELLED, context.clock.utc(), f"cancelled by {by}"
+            )
         except ProblemError:  # it does not wait, or not any more
-            job = parts.jobs.get(parts.robot, identity)
+            job = context.jobs.get(context.robot, identity)
             if job.state != "running":
                 raise
             Mailbox(self._folder(identity)).cancel()
-            return self.as_told(job)
+            return self.with_progress(job)
         self._tell(job)
         return job
 
     def remove(self, identity: str) -> None:
         """Takes an ended job and its results away; a model that it made stays. Raises a 404, 409."""
-        self._parts.jobs.remove(self._parts.robot, identity)
+        self._context.jobs.remove(self._context.robot, identity)
         shutil.rmtree(self._folder(identity), ignore_errors=True)
 
     def result_file(self, identity: str, name: str) -> Path:
         """The result (`RESULT`) or report (`REPORT`) of a job. Raises a 404, and a 409 while there is none."""
-        job = self._parts.jobs.get(self._parts.robot, identity)
+        job = self._context.jobs.get(self._context.robot, identity)
         if job.state != "done":
             line = f"job {identity} is {job.state}{': ' if job.reason else ''}{job.reason}"
             raise conflict("job-state", line, "only a job that is done has a result")
@@ -135,14 +137,14 @@ class JobDesk:
             raise not_found(f"{name} of job {identity} any more", "run it again")
         return path
 
-    def as_told(self, job: Job) -> Job:
+    def with_progress(self, job: Job) -> Job:
         """With its progress while it runs, and with what it waits behind while it waits."""
-        return self.all_as_told((job,))[0]
+        return self.with_progress_all((job,))[0]
 
-    def all_as_told(self, jobs: Iterable[Job]) -> tuple[Job, ...]:
+    def with_progress_all(self, jobs: Iterable[Job]) -> tuple[Job, ...]:
         """The same for several, with one look at what waits."""
         jobs = tuple(jobs)
-        waiting = self._parts.jobs.waiting(self._parts.robot) if any(job.state == "queued" for job in jobs) else []
+        waiting = self._context.jobs.waiting(self._context.robot) if any(job.state == "queued" for job in jobs) else []
         running = [job for job, _future in list(self._running.values())]
         return tuple(
             with_what_it_waits_for(job, running, waiting) if job.state == "queued" else self._with_progress(job)
@@ -173,7 +175,7 @@ class JobDesk:
         self._executors.clear()
 
     def _folder(self, identity: str) -> Path:
-        return self._parts.folder / identity
+        return self._context.folder / identity
 
     def _reported(self, identity: str) -> Reported | None:
         try:
@@ -182,7 +184,7 @@ class JobDesk:
             return None
 
     def _tell(self, job: Job) -> None:
-        self._parts.changed(self.as_told(job))
+        self._context.changed(self.with_progress(job))
 
     def _follow(self) -> None:
         told: dict[str, Reported] = {}
@@ -201,16 +203,16 @@ class JobDesk:
 
     def _begin(self) -> bool:
         """Gives what waits to the free workers of its lane. Whether anything has begun."""
-        parts = self._parts
-        places = {"short": SHORT_LANE_WORKERS, "long": parts.at_once}
+        context = self._context
+        places = {"short": SHORT_LANE_WORKERS, "long": context.at_once}
         free = {lane: places[lane] - self._at_work(lane) for lane in LANES}
         has_begun = False
-        for job in parts.jobs.waiting(parts.robot):
+        for job in context.jobs.waiting(context.robot):
             lane = lane_of(job.request)
             if free[lane] <= 0:
                 continue
             try:  # its state first: what is cancelled before that is never computed
-                begun = parts.jobs.change(parts.robot, job.id, Event.TAKEN, parts.clock.utc())
+                begun = context.jobs.change(context.robot, job.id, Event.TAKEN, context.clock.utc())
             except ProblemError:  # cancelled in this moment
                 continue
             future = self._handed_over(job.id, lane, places[lane])
@@ -231,7 +233,7 @@ class JobDesk:
         for _ in range(2):
             executor = self._executors.get(lane)
             if executor is None:
-                executor = self._executors[lane] = self._parts.make_executor(workers)
+                executor = self._executors[lane] = self._context.make_executor(workers)
             try:
                 return executor.submit(carry_out, self._folder(identity))
             except BrokenExecutor:
@@ -260,7 +262,7 @@ class JobDesk:
         return has_ended
 
     def _end(self, identity: str, lane: Lane, future: Future[Ended]) -> None:
-        parts = self._parts
+        context = self._context
         event, reason, model, headline = Event.COMPLETED, "", None, ""
         try:
             ended = future.result()
@@ -284,27 +286,27 @@ class JobDesk:
                 except Exception as error:
                     log.exception("job %s: its model", identity)
                     event, reason = Event.FAULT, _fault(error)
-        self._tell(parts.jobs.change(parts.robot, identity, event, parts.clock.utc(), reason, model, headline))
+        self._tell(context.jobs.change(context.robot, identity, event, context.clock.utc(), reason, model, headline))
         (self._folder(identity) / MODEL).unlink(missing_ok=True)  # not sooner: its end may have to be written again
 
     def _keep_model(self, identity: str) -> str:
-        parts = self._parts
-        job = parts.jobs.get(parts.robot, identity)
+        context = self._context
+        job = context.jobs.get(context.robot, identity)
         name = job.request.name if isinstance(job.request, FitRequest | DiagnoseRequest) else None
         path = self._folder(identity) / MODEL
-        return parts.models.take_in(path, name or f"{job.request.kind} {identity}", job.submitted_by, identity)
+        return context.models.take_in(path, name or f"{job.request.kind} {identity}", job.submitted_by, identity)
 
     def _tell_waiting(self) -> None:
         """What they wait behind has changed."""
-        for job in self.all_as_told(self._parts.jobs.waiting(self._parts.robot)[:MOST_TOLD]):
-            self._parts.changed(job)
+        for job in self.with_progress_all(self._context.jobs.waiting(self._context.robot)[:MOST_TOLD]):
+            self._context.changed(job)
 
     def _tell_progress(self, told: dict[str, Reported]) -> None:
         for identity in list(self._running):
             reported = self._reported(identity)
             if reported is not None and told.get(identity) != reported:
                 told[identity] = reported
-                self._tell(self._parts.jobs.get(self._parts.robot, identity))
+                self._tell(self._context.jobs.get(self._context.robot, identity))
 
 
 def _failed(error: Exception) -> Future[Ended]:
@@ -317,4 +319,4 @@ def _fault(error: Exception) -> str:
     return f"program fault: {type(error).__name__}: {error}"
 
 
-__all__ = ["REPORT", "RESULT", "JobDesk", "JobParts", "worker_processes"]
+__all__ = ["REPORT", "RESULT", "JobContext", "JobService", "worker_processes"]

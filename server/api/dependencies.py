@@ -21,28 +21,28 @@ from server.services import RobotServices, Services
 from server.store.pages import Cursor
 
 
-def services(connection: HTTPConnection) -> Services:
+def services_of(connection: HTTPConnection) -> Services:
     """All of them."""
-    found: Services = connection.app.state.services
-    return found
+    services: Services = connection.app.state.services
+    return services
 
 
 async def _services(connection: HTTPConnection) -> Services:
-    return services(connection)
+    return services_of(connection)
 
 
-ServicesPart = Annotated[Services, Depends(_services)]
+ServicesDep = Annotated[Services, Depends(_services)]
 
 
 async def robot_services(
     robot: Annotated[str, Path(max_length=64, examples=["ma2000"], description="Name of the robot.")],
-    found: ServicesPart,
+    services: ServicesDep,
 ) -> RobotServices:
     """Those of the robot in the address. Raises a 404."""
-    return found.robot(robot)
+    return services.robot(robot)
 
 
-RobotPart = Annotated[RobotServices, Depends(robot_services)]
+RobotDep = Annotated[RobotServices, Depends(robot_services)]
 
 
 async def _viewer(connection: HTTPConnection) -> Caller:
@@ -55,7 +55,7 @@ async def _operator(connection: HTTPConnection) -> Caller:
 
 async def _turn(connection: HTTPConnection) -> AsyncIterator[None]:
     let_others_ask(connection)
-    async with services(connection).lanes.turn(require_viewer(connection).name):
+    async with services_of(connection).lanes.turn(require_viewer(connection).name):
         yield
 
 

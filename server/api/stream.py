@@ -36,18 +36,18 @@ Heard = tuple[str | None, float]
 """A message's text, None where it is bytes, and when it arrived (s, monotonic)."""
 
 
-async def stream(socket: WebSocket, one: RobotServices, who: Caller) -> None:
+async def stream(socket: WebSocket, rig: RobotServices, caller: Caller) -> None:
     """Serves one client until it goes, or is dropped."""
     await socket.accept()
-    client = Client(Outbox(one.robot.clock.monotonic()), who.name)
-    one.hub.join(client)
+    client = Client(Outbox(rig.robot.clock.monotonic()), caller.name)
+    rig.hub.join(client)
     heard: asyncio.Queue[Heard] = asyncio.Queue(WAITING_MESSAGES)
-    dropping = asyncio.create_task(_drop_if_hopeless(one, client))
+    dropping = asyncio.create_task(_drop_if_hopeless(rig, client))
     tasks = [
         dropping,
-        asyncio.create_task(_send(socket, one, client)),
-        asyncio.create_task(_receive(socket, one, client, heard)),
-        asyncio.create_task(_carry_out(one, client, who, heard)),
+        asyncio.create_task(_send(socket, rig, client)),
+        asyncio.create_task(_receive(socket, rig, client, heard)),
+        asyncio.create_task(_carry_out(rig, client, caller, heard)),
     ]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -56,12 +56,12 @@ async def stream(socket: WebSocket, one: RobotServices, who: Caller) -> None:
             if error is not None and not isinstance(error, WebSocketDisconnect):
                 raise error
     finally:
-        one.hub.leave(client)
+        rig.hub.leave(client)
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
     if dropping in done:
-        one.hub.dropped += 1
+        rig.hub.dropped += 1
         log.warning("live client %s took nothing for too long and was dropped", client.name)
         # Whoever reads nothing would not take the close either: the server ends the connection when this returns.
         with suppress(TimeoutError, WebSocketDisconnect):
@@ -69,8 +69,8 @@ async def stream(socket: WebSocket, one: RobotServices, who: Caller) -> None:
                 await socket.close(TOO_SLOW, "this client read too slowly")
 
 
-async def _send(socket: WebSocket, one: RobotServices, client: Client) -> None:
-    clock = one.robot.clock
+async def _send(socket: WebSocket, rig: RobotServices, client: Client) -> None:
+    clock = rig.robot.clock
     while True:
         await client.something.wait()
         client.something.clear()
@@ -84,10 +84,10 @@ async def _send(socket: WebSocket, one: RobotServices, client: Client) -> None:
         await socket.send_text(head + ",".join(messages) + "]}")
 
 
-async def _receive(socket: WebSocket, one: RobotServices, client: Client, heard: asyncio.Queue[Heard]) -> None:
+async def _receive(socket: WebSocket, rig: RobotServices, client: Client, heard: asyncio.Queue[Heard]) -> None:
     """Waits for nothing but the client: the moment of a message is that of its arrival, whatever the one before it
     waits for."""
-    clock = one.robot.clock
+    clock = rig.robot.clock
     room = Bucket(MESSAGES_A_SECOND, MESSAGES_AT_ONCE, MESSAGES_AT_ONCE, clock.monotonic())
     while True:
         message = await socket.receive()
@@ -98,65 +98,65 @@ async def _receive(socket: WebSocket, one: RobotServices, client: Client, heard:
             await socket.close(NOT_ALLOWED, f"more than {MESSAGES_A_SECOND:g} messages a second")
             return
         try:
-            heard.put_nowait((message.get("text"), one.robot.clock.monotonic()))
+            heard.put_nowait((message.get("text"), rig.robot.clock.monotonic()))
         except asyncio.QueueFull:
-            _refuse(one, client, f"{WAITING_MESSAGES} messages wait already: this one is left out", "send fewer")
+            _refuse(rig, client, f"{WAITING_MESSAGES} messages wait already: this one is left out", "send fewer")
 
 
-async def _carry_out(one: RobotServices, client: Client, who: Caller, heard: asyncio.Queue[Heard]) -> None:
+async def _carry_out(rig: RobotServices, client: Client, caller: Caller, heard: asyncio.Queue[Heard]) -> None:
     while True:
         text, said = await heard.get()
         if text is None:
-            _refuse(one, client, "a message is text, not bytes", ADVICE)
+            _refuse(rig, client, "a message is text, not bytes", ADVICE)
             continue
         try:
-            await _take(LiveRequest.model_validate_json(text), one, client, who, said)
+            await _take(LiveRequest.model_validate_json(text), rig, client, caller, said)
         except ValidationError as error:
             first = error.errors()[0]
             where = field_of(first["loc"]) if first["loc"] else "message"
-            _refuse(one, client, f"{where}: {first['msg']}", ADVICE)
+            _refuse(rig, client, f"{where}: {first['msg']}", ADVICE)
         except ProblemError as error:
-            _refuse(one, client, error.detail, error.advice)
+            _refuse(rig, client, error.detail, error.advice)
         except DaqError as error:
-            _refuse(one, client, str(error), "")
+            _refuse(rig, client, str(error), "")
 
 
-async def _take(request: LiveRequest, one: RobotServices, client: Client, who: Caller, said: float) -> None:
-    now = one.robot.clock.monotonic()
+async def _take(request: LiveRequest, rig: RobotServices, client: Client, caller: Caller, said: float) -> None:
+    now = rig.robot.clock.monotonic()
     if request.rate is not None:
         client.every = BASE_RATE // request.rate
     fresh = set(request.subscribe) - client.topics
     client.topics = (client.topics | set(request.subscribe)) - set(request.unsubscribe)
-    for message in one.hub.shown(fresh & client.topics):
+    for message in rig.hub.shown(fresh & client.topics):
         client.outbox.put(message, now)
     if request.history is not None:
-        async with one.hub.looking_back:
-            past = await run_in_threadpool(_past, one, now - request.history, request.points)
+        async with rig.hub.looking_back:
+            past = await run_in_threadpool(_past, rig, now - request.history, request.points)
         client.outbox.put(past, now)
     if client.outbox:
         client.something.set()
     if request.jog is not None:
-        await run_in_threadpool(_jog, request.jog, one, who, said)
+        await run_in_threadpool(_jog, request.jog, rig, caller, said)
 
 
-def _past(one: RobotServices, begin: float, points: int) -> str:
-    return one.hub.history.since(begin, points).model_dump_json()
+def _past(rig: RobotServices, begin: float, points: int) -> str:
+    return rig.hub.history.since(begin, points).model_dump_json()
 
 
-def _jog(command: JogCommand, one: RobotServices, who: Caller, said: float) -> None:
-    if not who.may_operate:
-        raise ProblemError(403, "operator-needed", f"{who.name} may look only", "ask for the role operator")
-    one.require_motion(command.lease)
-    one.teaching.jog(dict(command.velocities), said)
+def _jog(command: JogCommand, rig: RobotServices, caller: Caller, said: float) -> None:
+    if not caller.may_operate:
+        raise ProblemError(403, "operator-needed", f"{caller.name} may look only", "ask for the role operator")
+    rig.require_motion(command.lease)
+    rig.teaching.jog(dict(command.velocities), said)
 
 
-def _refuse(one: RobotServices, client: Client, detail: str, advice: str) -> None:
+def _refuse(rig: RobotServices, client: Client, detail: str, advice: str) -> None:
     message = RefusedMessage(detail=detail, advice=advice)
-    client.outbox.put(message.model_dump_json(), one.robot.clock.monotonic())
+    client.outbox.put(message.model_dump_json(), rig.robot.clock.monotonic())
     client.something.set()
 
 
-async def _drop_if_hopeless(one: RobotServices, client: Client) -> None:
+async def _drop_if_hopeless(rig: RobotServices, client: Client) -> None:
     """Returns when the client is to be dropped."""
-    while not client.outbox.is_hopeless(one.robot.clock.monotonic()):
+    while not client.outbox.is_hopeless(rig.robot.clock.monotonic()):
         await asyncio.sleep(LOOK_EVERY)
