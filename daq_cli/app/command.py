@@ -17,9 +17,18 @@ from daq_cli.app.context import Invocation
 from daq_cli.app.lazy import HERE, LazyGroup
 from firmware_protocol.errors import ProtocolError
 
-WRONG_NAMES = frozenset({
-    errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS,
-})  # fmt: skip
+WRONG_NAMES = frozenset(
+    {
+        errno.ENAMETOOLONG,
+        errno.ENOENT,
+        errno.ENOTDIR,
+        errno.EISDIR,
+        errno.ELOOP,
+        errno.EACCES,
+        errno.EPERM,
+        errno.EROFS,
+    }
+)
 """What the operating system says of files that were named wrongly; the rest is its own trouble."""
 LONGEST_LINE = 800
 """Characters of an error; a command line may hold a megabyte."""

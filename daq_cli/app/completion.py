@@ -9,9 +9,7 @@ from pathlib import Path
 
 import typer
 
-PRESETS = (
-    "ramp", "diagnostic", "diagnostic-a", "diagnostic-b", "diagnostic-c", "diagnostic-d", "diagnostic-e", "held-out",
-)  # fmt: skip
+PRESETS = ("ramp", "diagnostic", *(f"diagnostic-{letter}" for letter in "abcde"), "held-out")
 """Names of `daq.trajectories.presets`, which would load numpy; a test keeps the two alike."""
 JOINTS = ("1-3", "1", "2", "3", "4", "5", "6", "1-2", "2-3", "1-6")
 SUFFIXES = (".mcap", ".csv")

@@ -16,7 +16,7 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "ports": ("daq_cli.commands.ports", "Serial ports that could be a robot."),
     "gains": ("daq_cli.commands.gains", "Show or set the controller's PID gains."),
     "io": ("daq_cli.commands.process_io", "Process inputs and outputs, and the gripper."),
-    "teach": ("daq_cli.commands.teach", "Jog, lead by the nose, steps, and playing back."),
+    "teach": ("daq_cli.commands.teach.motion", "Jog, lead by the nose, steps, and playing back."),
     "calibrate": ("daq_cli.commands.calibrate", "Find what the machine really does."),
     "serve": ("daq_cli.commands.serve", "Serve experiments and traces to people and programs."),
     "queue": ("daq_cli.commands.queue", "The queue of a server's robot: show, pause, resume."),
@@ -38,11 +38,24 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("daq_cli.commands.demo", "The ramp step on the mock, from command to plot."),
 }
 
-HERE = frozenset({
-    "ports", "serve", "token", "backup", "restore", "config", "mock", "simulate", "sensitivity", "design", "thesis",
-    "blind", "demo",
-})  # fmt: skip
-"""Subcommands that are about this computer alone: `--server` is refused, DAQ_SERVER does not concern them."""
+HERE = frozenset(
+    [
+        "ports",
+        "serve",
+        "token",
+        "backup",
+        "restore",
+        "config",
+        "mock",
+        "simulate",
+        "sensitivity",
+        "design",
+        "thesis",
+        "blind",
+        "demo",
+    ]
+)
+"""Subcommands about this computer alone: `--server` is refused, and DAQ_SERVER is ignored."""
 
 
 class LazyGroup(typer.core.TyperGroup):

@@ -19,7 +19,7 @@ def backup(
     json: JsonOption = False,
 ) -> None:
     """Copy the service's database, traces, models and results into one file; the service may go on meanwhile."""
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
     from server.backup.places import places_of
     from server.backup.write import back_up
     from server.clock import SystemClock
@@ -28,8 +28,8 @@ def backup(
     with shown_progress("backup") as tell:
         made = back_up(places, file, SystemClock().utc(), tell)
     if json:
-        print_json({"file": file, **made.model_dump(mode="json", exclude={"files"}), "bytes": made.size,
-                    "traces": made.count("traces"), "models": made.count("models")})  # fmt: skip
+        counted = {"bytes": made.size, "traces": made.count("traces"), "models": made.count("models")}
+        print_json({"file": file, **made.model_dump(mode="json", exclude={"files"}), **counted})
         return
     for name in made.left_out:
         console().print(f"left out, deleted meanwhile: {name}", markup=False)

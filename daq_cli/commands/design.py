@@ -50,7 +50,7 @@ def design(
     Nothing is run: `daq run spec FILE` runs a proposed experiment.
     """
     from daq.safety.planned import planned
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
     from model.design.information import information_gain
     from model.design.search import DesignOptions
     from model.design.search import design as search
@@ -64,7 +64,7 @@ def design(
         return planned(spec, chosen.machine)
 
     if judge:
-        from daq_cli.models.spec_file import read_spec
+        from daq_cli.robot.experiment import read_spec
 
         specs = [read_spec(p) for p in judge]
         gain = information_gain(chosen, specs, plan, options=options, fitted=_fitted(model, parameters))
@@ -99,9 +99,13 @@ def _print_design(found: DesignedExperiments, files: Sequence[Path]) -> None:
 
 
 def _report(
-    path: Path | None, model: Model, specs: Sequence[ExperimentSpec], gain: InformationGain, how: str,
+    path: Path | None,
+    model: Model,
+    specs: Sequence[ExperimentSpec],
+    gain: InformationGain,
+    how: str,
     nats: Sequence[float] | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """The page of these experiments, where one is asked for."""
     if path is None:
         return

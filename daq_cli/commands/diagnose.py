@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq.contracts import exit_codes
-from daq.contracts.carried_load import carrying
 from daq_cli.app import completion
-from daq_cli.app.context import Invocation, JsonOption, YesOption, console, invocation, print_json
+from daq_cli.app.consent import Consent
+from daq_cli.app.context import JsonOption, YesOption, console, print_json
 from daq_cli.app.output_file import replacing
-from daq_cli.models.held_load import check_held
 from daq_cli.models.model_input import (
     MODEL_HELP,
     EffectFileOption,
@@ -26,8 +25,9 @@ from daq_cli.models.model_input import (
     machine_of,
     read_model,
     read_traces,
-)  # fmt: skip
-from daq_cli.robot.remote.jobs import numbers_of, require_no_programs
+)
+from daq_cli.models.service_jobs import NamedTraces, service_jobs
+from daq_cli.robot.access import RobotAccess, robot_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -75,37 +75,35 @@ def diagnose(
     json: JsonOption = False,
 ) -> None:
     """Find where a model and traces disagree, name the effect that is missing, add it, and show the gap shrink."""
-    from daq_cli.models.diagnose_acquire import acquired
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
+    from daq_cli.models.acquire_loop import diagnose_and_acquire
+    from model.discrepancy.carried_load import require_load_held
     from model.discrepancy.workflow import diagnose as run_diagnosis
     from server.jobs.asking import asker
 
-    call = invocation(context)
-    require_no_programs(effect_file, call)
-    load_effects(effect_file)
+    robot = robot_of(context)
+    load_effects(effect_file, robot)
     options = _options(effects, joints, most)
-    fitted_to = read_traces(call, folder, traces)
-    held = read_traces(call, folder, holdout) if holdout else []
-    begin = _beginning(call, fitted_to, traces, model, load)
+    fitted_to = read_traces(robot, folder, traces)
+    held = read_traces(robot, folder, holdout) if holdout else []
+    begin = _beginning(robot, fitted_to, traces, model, load)
     check_made_for(begin.machine, [*fitted_to, *held], [*traces, *(holdout or [])])
     if load is not None:
-        check_held(begin, fitted_to)
+        require_load_held(begin, fitted_to)
     failure: DaqError | None = None
 
     def once(traces: Sequence[Trace], ask: Asker) -> Diagnosis:
         with shown_progress("diagnosing") as tell:
             return run_diagnosis(begin, traces, held, options, tell, ask=ask)
 
-    if call.server is not None and not acquire:
-        from daq_cli.robot.remote.diagnose import diagnose_at_server
-
-        wanted = (numbers_of(call, traces, fitted_to), numbers_of(call, holdout or [], held))
-        found = diagnose_at_server(call, begin, *wanted, options, out, report)
+    if not acquire and (jobs := service_jobs(robot)) is not None:
+        named, held_out = NamedTraces(traces, fitted_to), NamedTraces(holdout or [], held)
+        found = jobs.diagnose(begin, named, held_out, options, out, report)
         _save(found, out)
         _tell(found, out, None, as_json=json)
         return
     if acquire:
-        ended = acquired(call, begin.machine, fitted_to, folder, budget, yes, once)
+        ended = diagnose_and_acquire(robot, begin.machine, fitted_to, folder, budget, Consent(yes), once)
         found, fitted_to, failure = ended.found, ended.traces, ended.failure
     else:
         found = once(fitted_to, asker(begin.machine))
@@ -148,28 +146,20 @@ def _options(effects: str | None, joints: str | None, most: int) -> DiagnosisOpt
 
     return DiagnosisOptions(
         effects=None if effects is None else effect_names(effects),
-        joints=None if joints is None else tuple(parse_joints(joints)), most_steps=most,
-    )  # fmt: skip
+        joints=None if joints is None else tuple(parse_joints(joints)),
+        most_steps=most,
+    )
 
 
 def _beginning(
-    call: Invocation, traces: Sequence[Trace], names: Sequence[str], model: str | None, load: float | None
+    robot: RobotAccess, traces: Sequence[Trace], names: Sequence[str], model: str | None, load: float | None
 ) -> Model:
     """The model that is doubted, with the load that was carried. names: what the command line calls the traces."""
+    from model.discrepancy.carried_load import with_load
     from model.machine_model.model import base_model
 
-    begin = base_model(machine_of(traces, call, names)) if model is None else read_model(model)
+    begin = base_model(machine_of(traces, robot, names)) if model is None else read_model(model)
     return begin if load is None else with_load(begin, load)
-
-
-def with_load(model: Model, kilograms: float) -> Model:
-    """The model of the same machine with another load at its end. Raises SpecError as `carrying` does."""
-    from model.machine_model.model import Model
-
-    machine = carrying(model.machine, kilograms, "given with --load")
-    values = {name: value for name, value in model.values.items() if name != "load.mass"}
-    fields = {name: getattr(model, name) for name in type(model).model_fields}
-    return Model(**{**fields, "machine": machine, "values": values})
 
 
 def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], path: Path) -> Path:

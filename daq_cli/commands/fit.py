@@ -10,7 +10,7 @@ import typer
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from daq_cli.app import completion
-from daq_cli.app.context import Invocation, JsonOption, console, invocation, print_json
+from daq_cli.app.context import JsonOption, console, print_json
 from daq_cli.app.output_file import replacing
 from daq_cli.models.effect_choice import bounds, patterns, with_effects
 from daq_cli.models.model_input import (
@@ -27,7 +27,8 @@ from daq_cli.models.model_input import (
     read_traces,
 )
 from daq_cli.models.parameter_table import print_parameters
-from daq_cli.robot.remote.jobs import numbers_of, require_no_programs
+from daq_cli.models.service_jobs import NamedTraces, service_jobs
+from daq_cli.robot.access import RobotAccess, robot_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -79,7 +80,7 @@ def fit(
     json: JsonOption = False,
 ) -> None:
     """Find the parameters with which a model best repeats traces, and name what the traces cannot tell."""
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
     from model.comparison.compare import compare
     from model.fitting.fit import fit as run_fit
     from model.fitting.options import FitOptions
@@ -87,24 +88,27 @@ def fit(
 
     if torques and (method != "least_squares" or starts > 1 or seed or open_loop):
         raise SpecError("--torques: --method, --starts, --seed and --open-loop are of a fit of motion; leave them out")
-    call = invocation(context)
-    require_no_programs(effect_file, call)
-    load_effects(effect_file)
-    fitted_to = read_traces(call, folder, traces)
-    held = read_traces(call, folder, holdout or []) if holdout else []
-    begin = _beginning(call, fitted_to, model, machine, effects)
+    robot = robot_of(context)
+    if torques:
+        robot.require_local("--torques: is computed here, not by a service; fetch the traces, then leave --server out")
+    load_effects(effect_file, robot)
+    fitted_to = read_traces(robot, folder, traces)
+    held = read_traces(robot, folder, holdout or []) if holdout else []
+    begin = _beginning(robot, fitted_to, model, machine, effects)
     loop: Literal["open", "closed"] | None = "open" if open_loop else None
     options = FitOptions(
-        parameters=patterns(parameters), held=patterns(hold) or (), bounds=bounds(bound or []),
-        use_priors=not no_priors, method=method, starts=starts, seed=seed, loop=loop,
-    )  # fmt: skip
-    if call.server is not None:
-        from daq_cli.robot.remote.fit import fit_at_server
-
-        if torques:
-            raise SpecError("--torques: is computed here, not by a service; fetch the traces, then leave --server out")
-        wanted = (numbers_of(call, traces, fitted_to), numbers_of(call, holdout or [], held))
-        done = fit_at_server(call, begin, *wanted, options, out, report)
+        parameters=patterns(parameters),
+        held=patterns(hold) or (),
+        bounds=bounds(bound or []),
+        use_priors=not no_priors,
+        method=method,
+        starts=starts,
+        seed=seed,
+        loop=loop,
+    )
+    if (jobs := service_jobs(robot)) is not None:
+        named, held_out = NamedTraces(traces, fitted_to), NamedTraces(holdout or [], held)
+        done = jobs.fit(begin, named, held_out, options, out, report)
         _save(done, out, quiet=json)
         _tell(done, done.models, out, as_json=json)
         return
@@ -117,9 +121,12 @@ def fit(
         found = run_fit(begin, fitted_to, options, lambda f, text: tell(0.9 * f, text))
         _save(found, out, quiet=json)
         comparison = compare(
-            [("before", begin), ("fitted", found.model)], [*fitted_to, *held], [t.record.trace_id for t in held],
-            options=Options(loop=loop or "closed"), progress=lambda f, text: tell(0.9 + 0.1 * f, text),
-        )  # fmt: skip
+            [("before", begin), ("fitted", found.model)],
+            [*fitted_to, *held],
+            [t.record.trace_id for t in held],
+            options=Options(loop=loop or "closed"),
+            progress=lambda f, text: tell(0.9 + 0.1 * f, text),
+        )
     _tell(found, comparison.models, out, as_json=json)
     if report is not None:
         from model.reports.fit_report import fit_report
@@ -137,7 +144,7 @@ def _save(found: FitResult, out: Path, *, quiet: bool) -> None:
 
 
 def _beginning(
-    call: Invocation, traces: Sequence[Trace], model: str | None, machine: str | None, effects: str | None
+    robot: RobotAccess, traces: Sequence[Trace], model: str | None, machine: str | None, effects: str | None
 ) -> Model:
     """The model that the search begins from."""
     from model.machine_model.model import base_model
@@ -147,7 +154,7 @@ def _beginning(
     if model is not None:
         begin = read_model(model)
         return begin if effects is None else with_effects(begin, effects)
-    chosen = machine_of(traces, call) if machine is None else load_machine(machine)
+    chosen = machine_of(traces, robot) if machine is None else load_machine(machine)
     if effects is None:
         return base_model(chosen)
     return with_effects(base_model(chosen, friction=False), effects)
@@ -163,17 +170,19 @@ def _tell(found: FitResult, agreement: Sequence[ModelAgreement], out: Path, *, a
 def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path) -> None:
     from daq_cli.models.agreement_table import agreement_data
 
-    print_json({
-        "model": found.model.identity,
-        "file": out,
-        "parameters": [p.model_dump(mode="json") for p in found.parameters],
-        "undetermined": [c.model_dump(mode="json") for c in found.identifiability.undetermined],
-        "agreement": agreement_data(agreement),
-        "whitened_mean_square": found.whitened_mean_square,
-        "converged": found.converged,
-        "evaluations": found.evaluations,
-        "seconds": found.seconds,
-    })  # fmt: skip
+    print_json(
+        {
+            "model": found.model.identity,
+            "file": out,
+            "parameters": [p.model_dump(mode="json") for p in found.parameters],
+            "undetermined": [c.model_dump(mode="json") for c in found.identifiability.undetermined],
+            "agreement": agreement_data(agreement),
+            "whitened_mean_square": found.whitened_mean_square,
+            "converged": found.converged,
+            "evaluations": found.evaluations,
+            "seconds": found.seconds,
+        }
+    )
 
 
 def _print(found: FitResult, agreement: Sequence[ModelAgreement]) -> None:

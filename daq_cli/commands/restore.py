@@ -24,7 +24,7 @@ def restore(
     json: JsonOption = False,
 ) -> None:
     """Bring back the database, traces, models and results of a backup. The service must not run."""
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
     from server.backup.manifest import verify
     from server.backup.places import places_of
     from server.backup.restore import restore as bring_back

@@ -19,6 +19,8 @@ from daq.contracts.experiment import ExperimentSpec, parse_joints, parse_spec
 from daq_cli.app import completion
 from daq_cli.app.context import JsonOption, YesOption, invocation, print_json
 from daq_cli.app.quantities import parse_angle, parse_gains, parse_per_joint_angles
+from daq_cli.robot.access import robot_of
+from daq_cli.robot.experiment import RunOptions, carry_out
 
 app = typer.Typer(add_completion=False, help="Run an experiment and record its trace.", no_args_is_help=True)
 
@@ -155,16 +157,8 @@ def spec_from_options(trajectory: dict[str, Any], values: dict[str, Any], operat
 
 
 def _carry_out(context: typer.Context, spec: ExperimentSpec, values: dict[str, Any]) -> None:
-    from daq_cli.robot.run_result import carry_out
-
-    carry_out(
-        invocation(context),
-        spec,
-        folder=values["folder"],
-        dry_run=values["dry_run"],
-        consent=values["yes"],
-        as_json=values["json"],
-    )
+    options = RunOptions(values["folder"], values["dry_run"], values["yes"], values["json"])
+    carry_out(robot_of(context), spec, options)
 
 
 def _command(kind: type[BaseModel]) -> Callable[..., None]:
@@ -201,7 +195,7 @@ def from_file(
     json: JsonOption = False,
 ) -> None:
     """Run an experiment from a file: any kind, also paths and sequences."""
-    from daq_cli.models.spec_file import read_spec
+    from daq_cli.robot.experiment import read_spec
 
     _carry_out(context, read_spec(file), {"folder": folder, "dry_run": dry_run, "yes": yes, "json": json})
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq.contracts.errors import SpecError
-from daq_cli.app.context import JsonOption, console, invocation, print_json, print_table
+from daq_cli.app.context import JsonOption, console, print_json, print_table
 from daq_cli.app.output_file import check_folder, replacing
 from daq_cli.models.effect_choice import patterns
 from daq_cli.models.model_input import (
@@ -22,6 +22,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
+from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
@@ -67,13 +68,13 @@ def sensitivity(
     The change is exact to first order, and each parameter changes alone. A parameter whose curve stays within the noise
     of a reading cannot be found from this trace; two whose curves have one shape cannot be told apart.
     """
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
     from model.analysis.sensitivity import sensitivity_curves
     from model.simulation.simulate import Options
     from model.validation.names import names_to_validate
 
     load_effects(effect_file)
-    (read,) = read_traces(invocation(context), folder, [trace])
+    (read,) = read_traces(robot_of(context), folder, [trace])
     chosen = read_model(model)
     names = names_to_validate(chosen, patterns(parameters))
     with shown_progress("sensitivities") as tell:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq.contracts.errors import SpecError
-from daq_cli.app.context import JsonOption, console, invocation, print_json
+from daq_cli.app.context import JsonOption, console, print_json
 from daq_cli.app.csv_output import check_csv, write_csv
 from daq_cli.app.output_file import check_folder
 from daq_cli.models.model_input import (
@@ -22,7 +22,8 @@ from daq_cli.models.model_input import (
     model_label,
     read_model,
     read_traces,
-)  # fmt: skip
+)
+from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
@@ -58,14 +59,13 @@ def simulate(
 
     Nothing is fitted. A machine is taken as its file has it, with the friction it states.
     """
+    from daq_cli.app.progress import shown_progress
     from daq_cli.models.agreement_table import agreement_data, print_agreement
-    from daq_cli.models.model_progress import shown_progress
     from model.comparison.compare import compare
     from model.simulation.simulate import Options
 
-    call = invocation(context)
     load_effects(effect_file)
-    found = read_traces(call, folder, traces)
+    found = read_traces(robot_of(context), folder, traces)
     if output is not None and len(found) != 1:
         raise SpecError(f"--output {output}: is for one trace, {len(found)} are named")
     if output is not None:
@@ -107,9 +107,15 @@ def _simulated(model: Model, trace: Trace, options: Options) -> Trace:
         }
     )
     made = Trace(
-        record, run.joints, trace.time, run.at_samples(run.reading), error=run.at_samples(run.error),
-        drive=run.at_samples(run.drive), velocity=run.at_samples(run.velocity), tick=trace.tick,
-    )  # fmt: skip
+        record,
+        run.joints,
+        trace.time,
+        run.at_samples(run.reading),
+        error=run.at_samples(run.error),
+        drive=run.at_samples(run.drive),
+        velocity=run.at_samples(run.velocity),
+        tick=trace.tick,
+    )
     if trace.set_point is None:
         return replace(made, error=None)
     return replace(made, set_point=trace.set_point[:, columns])

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq_cli.app.context import JsonOption, console, invocation, print_json, print_table
+from daq_cli.app.context import JsonOption, console, print_json, print_table
 from daq_cli.models.effect_choice import patterns
 from daq_cli.models.model_input import (
     MODEL_HELP,
@@ -19,7 +19,8 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
-from daq_cli.robot.remote.jobs import numbers_of, require_no_programs
+from daq_cli.models.service_jobs import NamedTraces, service_jobs
+from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -54,31 +55,34 @@ def validate(
 
     The time-domain form says of every parameter how it would have to vary with time, and what that goes with.
     """
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
     from model.simulation.simulate import Options
     from model.validation.conventions import in_convention
     from model.validation.fidelity import validate_by_distortion
     from model.validation.names import names_to_validate
     from model.validation.time_domain import vary_in_time
 
-    call = invocation(context)
-    require_no_programs(effect_file, call)
-    load_effects(effect_file)
-    found = read_traces(call, folder, traces)
+    robot = robot_of(context)
+    load_effects(effect_file, robot)
+    found = read_traces(robot, folder, traces)
     chosen = read_model(model)
-    if call.server is not None:
-        from daq_cli.robot.remote.validate import validate_at_server
-
-        numbers = numbers_of(call, traces, found)
-        done = validate_at_server(call, chosen, model, numbers, patterns(parameters), output, damping_ratio, report)
+    if (jobs := service_jobs(robot)) is not None:
+        named = NamedTraces(traces, found)
+        done = jobs.validate(chosen, model, named, patterns(parameters), output, damping_ratio, report)
         _tell(done.fidelity, done.three_sigma, done.time_domain, chosen.machine, as_json=json)
         return
     names = names_to_validate(chosen, patterns(parameters))
     with shown_progress("validating") as tell:
         fidelity = validate_by_distortion(
-            chosen, found, names, outputs=output, damping_ratio=damping_ratio, curve_points=CURVE_POINTS,
-            options=Options(quantise=False), progress=lambda f, text: tell(0.7 * f, text),
-        )  # fmt: skip
+            chosen,
+            found,
+            names,
+            outputs=output,
+            damping_ratio=damping_ratio,
+            curve_points=CURVE_POINTS,
+            options=Options(quantise=False),
+            progress=lambda f, text: tell(0.7 * f, text),
+        )
         in_time = []
         for number, trace in enumerate(found):
             tell(0.7 + 0.3 * number / len(found), f"variation with time: {trace.record.trace_id}")
@@ -97,11 +101,11 @@ def _tell(
     fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], machine: Machine, *, as_json: bool
 ) -> None:
     if as_json:
-        print_json({
-            "fidelity": fidelity.model_dump(mode="json"),
-            "three_sigma": {"sum_of_contributions": three.sum_of_contributions},
-            "time_domain": [one.model_dump(mode="json") for one in in_time],
-        })  # fmt: skip
+        three_sigma = {"sum_of_contributions": three.sum_of_contributions}
+        time_domain = [one.model_dump(mode="json") for one in in_time]
+        print_json(
+            {"fidelity": fidelity.model_dump(mode="json"), "three_sigma": three_sigma, "time_domain": time_domain}
+        )
     else:
         _print(fidelity, three, in_time, machine)
 
@@ -142,10 +146,8 @@ def _print_in_time(one: TimeDomain, machine: Machine) -> None:
         table.add_column(name, justify="left" if name in ("parameter", "goes with") else "right")
     for v in one.parameters:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in v.against if c.significant][:2]
-        table.add_row(
-            v.name, f"{v.deviation:.3g}", f"{v.expected:.3g}", f"{100 * v.significant:.0f} %",
-            f"{100 * v.alone_constant:.0f} %", f"{100 * v.alone_varying:.0f} %", ", ".join(strongest),
-        )  # fmt: skip
+        shares = (f"{100 * share:.0f} %" for share in (v.significant, v.alone_constant, v.alone_varying))
+        table.add_row(v.name, f"{v.deviation:.3g}", f"{v.expected:.3g}", *shares, ", ".join(strongest))
     print_table(table, 160)
     for j in one.joints:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in j.against if c.significant][:3]

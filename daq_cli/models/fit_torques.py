@@ -22,11 +22,17 @@ MOST_DRAWN = 6
 
 
 def fit_recorded_torques(
-    begin: Model, traces: Sequence[Trace], held_out: Sequence[Trace], options: FitOptions, out: Path, *,
-    as_json: bool, report: Path | None,
-) -> None:  # fmt: skip
+    begin: Model,
+    traces: Sequence[Trace],
+    held_out: Sequence[Trace],
+    options: FitOptions,
+    out: Path,
+    *,
+    as_json: bool,
+    report: Path | None,
+) -> None:
     """Fit, save the model, and print what came of it. Raises SpecError and TraceError as the fit does."""
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
     from model.machine_model.model_file import save_model
     from model.torque_space.fit import fit_torques
 

@@ -11,11 +11,12 @@ import typer
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, load_machine, shipped_machines
 from daq_cli.app import completion
-from daq_cli.app.context import Invocation, console
+from daq_cli.app.context import console
 from daq_cli.app.output_file import check_folder
 
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
+    from daq_cli.robot.access import RobotAccess
     from model.machine_model.model import Model
 
 TracesArgument = Annotated[
@@ -79,9 +80,17 @@ def read_model(name: str) -> Model:
     return base_model(load_machine(name))
 
 
-def load_effects(files: Sequence[Path] | None) -> None:
-    """Effects of the user's own, from files that the command line names. Raises SpecError with one line."""
+def load_effects(files: Sequence[Path] | None, robot: RobotAccess | None = None) -> None:
+    """Loads effects of the user's own, from files that the command line names. Raises SpecError with one line.
+
+    Args:
+        robot: where the effects are to be used, if that may be at a service, which runs no programs that it is sent.
+    """
     if files:
+        if robot is not None:
+            robot.require_local(
+                "--effect-file: a service runs no programs that it is sent; fetch the traces and compute here"
+            )
         from model.effects.effect_files import load_effect_file
 
         for file in files:
@@ -99,11 +108,12 @@ def model_labels(names: Sequence[str]) -> list[str]:
     return labels if len(set(labels)) == len(labels) else list(names)
 
 
-def read_traces(call: Invocation, folder: Path | None, names: Sequence[str]) -> list[Trace]:
+def read_traces(robot: RobotAccess, folder: Path | None, names: Sequence[str]) -> list[Trace]:
     """Traces by file, number, name or `last`; CSV files are read as they are. Raises TraceError, SpecError."""
     from daq.traces.csv_table import import_csv
     from daq.traces.reader import read_trace
 
+    call = robot.call
     place = folder or call.trace_folder
     if not names:
         raise SpecError("no traces named: at least one is needed")
@@ -112,12 +122,12 @@ def read_traces(call: Invocation, folder: Path | None, names: Sequence[str]) -> 
         if Path(name).suffix == ".csv" and Path(name).is_file():
             trace = import_csv(Path(name), call.trace_limits)
         else:
-            trace = read_trace(call.find_trace(place, name), call.trace_limits)
+            trace = read_trace(robot.find_trace(place, name), call.trace_limits)
         found.append(trace)
     return found
 
 
-def machine_of(traces: Sequence[Trace], call: Invocation, names: Sequence[str] = ()) -> Machine:
+def machine_of(traces: Sequence[Trace], robot: RobotAccess, names: Sequence[str] = ()) -> Machine:
     """The machine that the traces were made on; the configured one where they do not say, which is then said aloud.
 
     Limits may differ: the last trace's are taken.
@@ -137,10 +147,9 @@ def machine_of(traces: Sequence[Trace], call: Invocation, names: Sequence[str] =
                 f"the traces were made on different machines that are both called {machine.name}: {place} differs; "
                 "one at a time, or name the machine or model to use"
             )
-    taken = machines[-1] if machines else call.machine
-    unnamed = [
-        (name, t) for name, t in zip(_names(traces, names), traces, strict=True) if t.record.machine is None
-    ]  # fmt: skip
+    taken = machines[-1] if machines else robot.machine
+    named = zip(_names(traces, names), traces, strict=True)
+    unnamed = [(name, trace) for name, trace in named if trace.record.machine is None]
     for name, trace in unnamed:
         if lacking := [joint for joint in taken.modelled_joints if joint not in trace.joints]:
             raise SpecError(

@@ -18,9 +18,9 @@ def print_parameters(parameters: Sequence[FittedParameter]) -> None:
     from rich.table import Table
 
     table = Table(box=None, header_style="bold")
-    for name, side in (("parameter", "left"), ("value", "right"), ("95 % interval", "right"), ("unit", "left"),
-                       ("before", "right"), ("", "left")):  # fmt: skip
-        table.add_column(name, justify="right" if side == "right" else "left", overflow="fold")
+    for name in ("parameter", "value", "95 % interval", "unit", "before", ""):
+        number = name in ("value", "95 % interval", "before")
+        table.add_column(name, justify="right" if number else "left", overflow="fold")
     for p in parameters:
         table.add_row(*_row(p))
     print_table(table, 140)

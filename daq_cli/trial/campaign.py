@@ -13,7 +13,7 @@ from typing import Any
 
 from daq.contracts.machine import Machine
 from daq.traces.reader import read_trace
-from daq_cli.models.diagnose_asking import as_run, next_to_run, time_left
+from daq_cli.models.stopping_rule import as_run, next_to_run, time_left
 from daq_cli.trial.experiments import machine_with_load, trial_experiment, write_set_points
 from daq_cli.trial.folder import STAGES, Stage, TrialFolder
 from daq_cli.trial.mock_side import TrialStageError, detect, reveal
@@ -148,7 +148,9 @@ class Campaign:
         file = self.folder.path / "answers" / f"{case}.json"
         file.write_bytes(answers[-1].text)
         return {
-            **row, "answer": file.name, "sha256": answers[-1].digest,
+            **row,
+            "answer": file.name,
+            "sha256": answers[-1].digest,
             "seconds": sum(given.seconds for given in answers),
             "robot_seconds": recorded["robot_seconds"] + budget - time_left(runs, budget),
             "traces": [trace.name for trace in traces],
@@ -156,7 +158,7 @@ class Campaign:
                 {"experiment": r.experiment, "trace": Path(r.file).name, "outcome": r.outcome, "duration": r.duration}
                 for r in runs
             ],
-        }  # fmt: skip
+        }
 
     def _answer(self, seed: int, traces: list[Path], held_out: str, runs: Sequence[Acquired]) -> SealedAnswer:
         left = time_left(runs, ROBOT_TIME) if self.folder.asked.acquire else None

@@ -47,9 +47,13 @@ class TrialFolder:
 
     @classmethod
     def open(
-        cls, path: Path, experiment: Literal["diagnostic", "ramp"], acquire: bool, registration: dict[str, str] | None,
+        cls,
+        path: Path,
+        experiment: Literal["diagnostic", "ramp"],
+        acquire: bool,
+        registration: dict[str, str] | None,
         shard: str,
-    ) -> TrialFolder:  # fmt: skip
+    ) -> TrialFolder:
         """The folder, made when it is new. Raises SpecError when it holds another trial."""
         try:
             for part in ("traces", "answers"):

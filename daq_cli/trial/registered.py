@@ -42,7 +42,7 @@ REGISTERED = (
     "daq/safety",
     "daq_cli/trial",
     "daq_cli/commands/blind.py",
-    "daq_cli/models/diagnose_asking.py",
+    "daq_cli/models/stopping_rule.py",
     "server/jobs/asking.py",
 )
 """Parts of the source tree that decide the outcome. A test follows the imports of every stage and misses none."""

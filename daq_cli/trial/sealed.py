@@ -58,9 +58,12 @@ class SealedAnswer:
 
 
 def diagnose_sealed(
-    traces: Sequence[Path], holdout: Path | None, model: Model, diagnoser: Sequence[str] = DIAGNOSER,
+    traces: Sequence[Path],
+    holdout: Path | None,
+    model: Model,
+    diagnoser: Sequence[str] = DIAGNOSER,
     budget: float | None = None,
-) -> SealedAnswer:  # fmt: skip
+) -> SealedAnswer:
     """Starts `diagnoser` in a new folder with copies of the traces and the model; its answer.
 
     Arguments are those of `diagnoser` alone; the environment is what any program needs to run. `budget`: s of robot
@@ -78,9 +81,16 @@ def diagnose_sealed(
         begun = time.monotonic()
         try:
             done = subprocess.run(
-                diagnoser, cwd=place, env=_environment(), stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                check=False, timeout=TIME_LIMIT, start_new_session=True,
-            )  # fmt: skip
+                diagnoser,
+                cwd=place,
+                env=_environment(),
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                check=False,
+                timeout=TIME_LIMIT,
+                start_new_session=True,
+            )
         except subprocess.TimeoutExpired:
             raise DiagnosisFailedError(f"no answer within {TIME_LIMIT:g} s") from None
         seconds = time.monotonic() - begun

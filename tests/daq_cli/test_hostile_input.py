@@ -106,10 +106,19 @@ def test_a_number_that_nobody_means(daq: CommandLine, kind: str, option: str, va
 
 @pytest.mark.parametrize(
     "words",
-    ["teach lead -o lead.json --seconds={}", "serve --port={}", "teach step --by 1={}", "teach jog --speed={}",
-     "gains set 1={}/0/0", "io set {} on", "blind --folder t --seeds={}", "run ramp --joints={}",
-     "run ramp --start=1=1,1={}", "run ramp --gains=1=2/{}/0"],
-)  # fmt: skip
+    [
+        "teach lead -o lead.json --seconds={}",
+        "serve --port={}",
+        "teach step --by 1={}",
+        "teach jog --speed={}",
+        "gains set 1={}/0/0",
+        "io set {} on",
+        "blind --folder t --seeds={}",
+        "run ramp --joints={}",
+        "run ramp --start=1=1,1={}",
+        "run ramp --gains=1=2/{}/0",
+    ],
+)
 @pytest.mark.parametrize("value", [value for value in NUMBERS if value])
 def test_a_number_of_another_command(daq: CommandLine, words: str, value: str) -> None:
     refuses(daq("--port", "serial:///dev/nowhere", *words.format(value).split()))

@@ -111,6 +111,7 @@ def test_what_was_not_salvaged_is_told_with_where_it_is(daq: CommandLine, tmp_pa
     said = daq("traces", "salvage", "--folder", tmp_path)
     assert said.code == 5
     first, second = said.out.splitlines()
-    assert first.endswith("a.mcap: salvaged from a.mcap.part up to its damage; "
-                          "the 13 bytes after it are in a.mcap.part.damaged")  # fmt: skip
+    assert first.endswith(
+        "a.mcap: salvaged from a.mcap.part up to its damage; the 13 bytes after it are in a.mcap.part.damaged"
+    )
     assert second.endswith("b.mcap.part: holds no trace; it was renamed to b.mcap.part.unreadable")

@@ -9,6 +9,7 @@ import pytest
 from daq.acquisition.messages import Finished
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Outcome, Trace
+from daq_cli.robot.local import LocalRobot
 from tests.daq.traces.samples import record, write
 from tests.daq_cli.invoke import CommandLine
 
@@ -26,7 +27,7 @@ def test_nothing_is_made_of_it(
         missing=0,
         counters={},
     )
-    monkeypatch.setattr("daq_cli.robot.run_result.acquire", lambda *_, **__: made)
+    monkeypatch.setattr(LocalRobot, "acquire", lambda *_, **__: made)
     said = daq(*words.split())
     assert said.code == code
     assert said.out == ""

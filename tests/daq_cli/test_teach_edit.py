@@ -69,14 +69,16 @@ def test_deleting_moving_and_renaming(daq: CommandLine) -> None:
     ("options", "made"),
     [
         ("--wait 2", Wait(duration=2)),
-        ("--to 1=170,3=-20 --speed 5", Absolute(angles={1: math.radians(170), 3: math.radians(-20)},
-                                                speed=math.radians(5))),
+        (
+            "--to 1=170,3=-20 --speed 5",
+            Absolute(angles={1: math.radians(170), 3: math.radians(-20)}, speed=math.radians(5)),
+        ),
         ("--by 2=3", Relative(angles={2: math.radians(3)})),
         ("--output 3=on", SetOutput(line=3, on=True)),
         ("--input 0=off", AwaitInput(line=0, on=False)),
         ("--gripper open", Gripper(closed=False)),
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("place", [1, 5])
 def test_inserting(daq: CommandLine, options: str, made: object, place: int) -> None:
     said = daq(*EDIT, "insert", FILE, place, *options.split())
@@ -135,8 +137,10 @@ def test_the_only_instruction_stays(daq: CommandLine) -> None:
 
 
 def test_a_program_that_was_outside_the_limits_can_be_mended(daq: CommandLine) -> None:
-    FILE.write_text('{"name": "low", "instructions": [{"kind": "absolute", "angles": {"2": -1.5}}, '
-                    '{"kind": "absolute", "angles": {"2": -1.4}}]}')  # fmt: skip
+    FILE.write_text(
+        '{"name": "low", "instructions": [{"kind": "absolute", "angles": {"2": -1.5}}, '
+        '{"kind": "absolute", "angles": {"2": -1.4}}]}'
+    )
     assert daq(*EDIT, "change", FILE, 1, "--angles", "2=45").code == 0
     assert daq(*EDIT, "change", FILE, 2, "--angles", "2=50").code == 0
 

@@ -11,7 +11,7 @@ from daq.client.stopping import NoSuchRobot
 from daq.contracts.errors import DaqError
 from daq.contracts.service.robot import StopResult
 from daq_cli.app.context import Invocation
-from daq_cli.robot.remote.robot import TOKEN_VARIABLE
+from daq_cli.robot.remote.connection import TOKEN_VARIABLE
 
 DEFAULT_ROBOT = "ma2000"
 NAMES_WITHIN = 1.0

@@ -6,16 +6,17 @@ import select
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SafetyError
-from daq_cli.app.context import Invocation, console
+from daq_cli.app.context import console
+from daq_cli.app.keyboard import keys as keyboard_keys
 from daq_cli.app.stop_keys import StopKeys
-from daq_cli.robot.remote.control import controlled
+from daq_cli.robot.pendant import HELP, Pendant, StatusLine
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -25,21 +26,25 @@ if TYPE_CHECKING:
     from daq.contracts.service.teaching import TeachingStatus
     from daq.teaching import RecordedPath
 
+    Controlled = AbstractContextManager[tuple[Robot, HeldControl]]
+
 LOOK_EVERY = 0.1
-"""s between two looks at how it goes on."""
+"""s between two looks at what has become of a program or a lead."""
+KEYS_EVERY = 0.05
+"""s between two looks at the keyboard."""
 
 
 class StoppedAtServerError(DaqError):
-    """A person has stopped the arm."""
+    """A person at this terminal has stopped the arm."""
 
     exit_code = exit_codes.STOPPED
 
 
 @contextmanager
-def taught(call: Invocation, consent: bool) -> Iterator[tuple[Robot, HeldControl, Stopped]]:
-    """The robot, its control, and whether a key has stopped it: Ctrl-C and its like do so within, on a thread that does
-    nothing else."""
-    with StopKeys() as keys, controlled(call, consent) as (robot, control), Stopped(robot) as stopped:
+def taught(held: Controlled) -> Iterator[tuple[Robot, HeldControl, Stopped]]:
+    """The robot, its control, and whether a key has stopped it: within the block Ctrl-C and its like do so, on a thread
+    that does nothing else."""
+    with StopKeys() as keys, held as (robot, control), Stopped(robot) as stopped:
         keys.stops(stopped.press)
         try:
             yield robot, control, stopped
@@ -48,7 +53,7 @@ def taught(call: Invocation, consent: bool) -> Iterator[tuple[Robot, HeldControl
 
 
 class Stopped:
-    """Stops the robot when `press` is called; `result` says then what became of it.
+    """Stops the robot when `press` is called; `result` then says what became of the stop.
 
     Leaving raises StoppedAtServerError after a press, whatever the work has ended with: a stop counts.
     """
@@ -73,7 +78,7 @@ class Stopped:
             self.raise_if_answered()
 
     def press(self) -> None:
-        """A key that stops. As quick as a signal wants it; again and again."""
+        """A key that stops was pressed. Called by a signal handler, so it is quick, and may be called again."""
         if not self.pressed:  # a signal that interrupts this one finds its lock taken, and need not wake again
             self.pressed = True
             self._wake.set()
@@ -94,22 +99,54 @@ class Stopped:
             raise StoppedAtServerError(self.result.text)
 
 
-def perform_at_server(call: Invocation, program: BaseModel, consent: bool) -> None:
-    """As `daq teach program`. Raises SafetyError, StoppedAtServerError, and what the service refuses."""
-    with taught(call, consent) as (robot, control, stopped):
+def jog_at_server(
+    held: Controlled, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine
+) -> None:
+    """Drives joints with the keys; `keep` is given the set points (rad) of a posture to be kept.
+
+    Each press drives for 0.3 s at most, so that the arm holds when the line is lost.
+
+    Raises StoppedAtServerError after Ctrl-C, and what the service refuses.
+    """
+    with keyboard_keys() as keyboard, taught(held) as (robot, control, stopped):
+        line.tell(HELP)
+        while not pendant.ended:
+            stopped.raise_if_answered()
+            typed = keyboard.pressed()
+            now = time.monotonic()
+            command = pendant.command(typed, now)
+            if command is not None and command.time == now:  # said just now: an older one is not repeated
+                control.jog(command.velocities)
+            if pendant.gripper is not None:
+                control.set_gripper(closed=pendant.gripper)
+                pendant.gripper = None
+            if pendant.keep and (sample := robot.status().sample) is not None:
+                pendant.keep = False
+                keep(dict(zip(sample.joints, sample.set_point, strict=True)))
+            line.show(pendant)
+            time.sleep(KEYS_EVERY)
+        control.finish()
+
+
+def perform_at_server(held: Controlled, program: BaseModel) -> str:
+    """Carries out a taught program; how it ended.
+
+    Raises SafetyError, StoppedAtServerError, and what the service refuses.
+    """
+    with taught(held) as (robot, control, stopped):
         before = _newest(robot.teaching())
         control.perform(program)
         ended = _end_of(robot, control, stopped, before)
-    print(ended.result)
+    return ended.result
 
 
 def lead_at_server(
-    call: Invocation, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None], consent: bool
+    held: Controlled, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]
 ) -> None:
     """As `daq teach lead`: the path is kept also of a lead that was stopped."""
     from daq.teaching import RecordedPath
 
-    with taught(call, consent) as (robot, control, stopped):
+    with taught(held) as (robot, control, stopped):
         before = robot.teaching().path
         control.lead(joints)
         console().print("recording: lead the arm" + ("; Enter ends it" if seconds is None else f" for {seconds:g} s"))
@@ -128,7 +165,7 @@ def lead_at_server(
 
 
 def _end_of_lead(robot: Robot, control: HeldControl, stopped: Stopped) -> TeachingStatus:
-    """Ends it, and waits for the end and its path: that of one that is stopped comes after the stop's own answer."""
+    """Ends the lead, and waits for its path: that of a stopped lead comes after the answer to the stop."""
     stopped.wait_for_answer()
     try:
         return control.finish()
@@ -140,7 +177,7 @@ def _end_of_lead(robot: Robot, control: HeldControl, stopped: Stopped) -> Teachi
 
 
 def _end_of(robot: Robot, control: HeldControl, stopped: Stopped, shown: int) -> TeachingStatus:
-    """Waits for it, showing what the service tells whoever teaches, from line `shown` on."""
+    """Waits for the end of a program, showing the service's lines about it from number `shown` on."""
     while True:
         status = robot.teaching()
         for line in status.lines:
@@ -157,5 +194,5 @@ def _end_of(robot: Robot, control: HeldControl, stopped: Stopped, shown: int) ->
 
 
 def _newest(status: TeachingStatus) -> int:
-    """Number of the newest line."""
+    """Number of the newest line that the service has about the teaching."""
     return max((line.number for line in status.lines), default=0)

@@ -11,7 +11,7 @@ import pytest
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
 from daq.traces.reader import read_trace
-from daq_cli.models.diagnose_asking import as_run, next_to_run, time_left
+from daq_cli.models.stopping_rule import as_run, next_to_run, time_left
 from daq_cli.trial import diagnoser
 from daq_cli.trial.campaign import ROBOT_TIME, Campaign
 from daq_cli.trial.experiments import trial_experiment
@@ -30,17 +30,28 @@ SOUND = compose(7654321, "clean", "nominal")
 
 def asked(duration: float) -> NextExperiment:
     return NextExperiment(
-        name="ramp", spec=ExperimentSpec(name="ramp"), duration=duration, separates=("a", "b"),
-        predicted_separation=4.0, reason="a and b would differ",
-    )  # fmt: skip
+        name="ramp",
+        spec=ExperimentSpec(name="ramp"),
+        duration=duration,
+        separates=("a", "b"),
+        predicted_separation=4.0,
+        reason="a and b would differ",
+    )
 
 
 def answered(wanted: NextExperiment | None, verdict: Any = "ambiguous") -> Diagnosis:
     model = base_model(MACHINE)
     return Diagnosis(
-        verdict=verdict, summary="", steps=(), model_before=model, model_after=model, traces=(),
-        next_experiment=wanted, seconds=0.0, robot_seconds=0.0,
-    )  # fmt: skip
+        verdict=verdict,
+        summary="",
+        steps=(),
+        model_before=model,
+        model_after=model,
+        traces=(),
+        next_experiment=wanted,
+        seconds=0.0,
+        robot_seconds=0.0,
+    )
 
 
 def run(duration: float, outcome: str = "complete") -> Acquired:

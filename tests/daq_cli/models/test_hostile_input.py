@@ -37,13 +37,19 @@ def test_a_file_that_nobody_means(daq: CommandLine, words: str, kind: str) -> No
 @pytest.mark.parametrize("value", ["nan", "inf", "-1", "1e400", "0", "x", "9" * 6000])
 @pytest.mark.parametrize(
     "words",
-    ["validate single.toml good.csv --damping-ratio={}", "diagnose good.csv --model single.toml --load={}",
-     "design single.toml --duration={}", "diagnose good.csv --acquire --budget={}",
-     "design single.toml --experiments={}",
-     "fit good.csv --machine single.toml -o out.json --starts={}", "validate single.toml good.csv --joint={}",
-     "fit good.csv --machine single.toml -o out.json --bound=link1.mass={}:{}", "blind --folder t --seeds=1 --shard={}",
-     "blind --folder t --seeds=1 --cases={}"],
-)  # fmt: skip
+    [
+        "validate single.toml good.csv --damping-ratio={}",
+        "diagnose good.csv --model single.toml --load={}",
+        "design single.toml --duration={}",
+        "diagnose good.csv --acquire --budget={}",
+        "design single.toml --experiments={}",
+        "fit good.csv --machine single.toml -o out.json --starts={}",
+        "validate single.toml good.csv --joint={}",
+        "fit good.csv --machine single.toml -o out.json --bound=link1.mass={}:{}",
+        "blind --folder t --seeds=1 --shard={}",
+        "blind --folder t --seeds=1 --cases={}",
+    ],
+)
 def test_a_number_that_nobody_means(daq: CommandLine, words: str, value: str) -> None:
     if "--load" in words and value == "0":
         return

@@ -86,9 +86,13 @@ def test_a_model_of_a_newer_version(daq: CommandLine, tmp_path: Path, command: s
 
 @pytest.mark.parametrize(
     ("text", "says"),
-    [("{", ("not JSON",)), ("[]", ("neither a model",)), ('{"machine": {}}', ("no version",)),
-     ('{"format": 1, "machine": {}}', ("machine.version",))],
-)  # fmt: skip
+    [
+        ("{", ("not JSON",)),
+        ("[]", ("neither a model",)),
+        ('{"machine": {}}', ("no version",)),
+        ('{"format": 1, "machine": {}}', ("machine.version",)),
+    ],
+)
 def test_a_file_that_is_no_model(daq: CommandLine, tmp_path: Path, text: str, says: tuple[str, ...]) -> None:
     (tmp_path / "model.json").write_text(text)
     trace = write_csv(tmp_path / "good.csv")

@@ -32,6 +32,10 @@ def time_left(runs: Sequence[Acquired], budget: float) -> float:
 def as_run(asked: NextExperiment, trace: Trace, file: Path, outcome: str) -> Acquired:
     """What was asked for as it was run. outcome: how the run ended; only a complete one's trace is used."""
     return Acquired(
-        experiment=asked.name, trace=trace.record.trace_id, file=str(file), outcome=outcome,
-        duration=float(trace.time[-1] - trace.time[0]) if len(trace) else 0.0, reason=asked.reason,
-    )  # fmt: skip
+        experiment=asked.name,
+        trace=trace.record.trace_id,
+        file=str(file),
+        outcome=outcome,
+        duration=float(trace.time[-1] - trace.time[0]) if len(trace) else 0.0,
+        reason=asked.reason,
+    )
