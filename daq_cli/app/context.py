@@ -24,7 +24,7 @@ YesOption = Annotated[bool, typer.Option("--yes", help="Consent to moving a real
 
 @cache
 def console() -> Console:
-    """For people: progress, questions, remarks, on standard error. Results go to standard output.
+    """The console for people: progress, questions and remarks on standard error. Results go to standard output.
 
     Text is printed as it is: square brackets in a path or a message are no markup.
     """
@@ -34,12 +34,12 @@ def console() -> Console:
 
 
 def printable(text: str) -> str:
-    """Text of a file that somebody else may have made, without what would command the terminal."""
+    """Text of a file that somebody else may have made, without control characters for the terminal."""
     return "".join(sign if sign.isprintable() or sign == "\n" else "\N{REPLACEMENT CHARACTER}" for sign in text)
 
 
 def print_table(table: Table, width: int | None = None) -> None:
-    """A table of results on standard output, its text as it is."""
+    """Prints a table of results on standard output; brackets in its text are no markup."""
     from rich.console import Console
 
     Console(highlight=False, markup=False, width=width).print(table)
@@ -71,7 +71,7 @@ class Invocation:
 
     @property
     def port(self) -> str:
-        """The port of the command line or the configuration; the mock by default, which is then said aloud."""
+        """The port of the command line or the configuration; the mock by default, which is announced once."""
         if self.port_option is not None:
             return self.port_option
         if self.settings.robot.port is None and not self._mock_announced:
@@ -93,23 +93,23 @@ class Invocation:
 
     @property
     def trace_folder(self) -> Path:
-        """Where traces are kept."""
+        """The configured folder of traces."""
         return self.settings.traces.folder
 
     @property
     def trace_limits(self) -> TraceLimits:
-        """How large a trace may be that is read."""
+        """The largest trace that is read."""
         return self.settings.traces.limits
 
 
 def invocation(context: typer.Context) -> Invocation:
-    """The invocation that the callback made."""
+    """The invocation of this call, made from the global options."""
     found = context.find_object(Invocation)
     assert found is not None
     return found
 
 
 def print_json(data: Any) -> None:
-    """Data on standard output, as one JSON document."""
+    """Prints data on standard output as one JSON document."""
     json.dump(data, sys.stdout, indent=2, ensure_ascii=False, default=str)
     sys.stdout.write("\n")

@@ -1,4 +1,4 @@
-"""Traces as CSV: never over a TOML that is somebody else's."""
+"""Traces as CSV, which never overwrite a TOML file that belongs to something else."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ if TYPE_CHECKING:
     from daq.contracts.trace import Trace
 
 WRITTEN = frozenset({"source", "joints", "created"})
-"""What every TOML has that was written beside a CSV; one by hand, such as a configuration, has not all of it."""
+"""Fields of every TOML file that was written beside a CSV; another one, such as a configuration, lacks some of them."""
 
 
 def write_csv(trace: Trace, path: Path) -> Path:
-    """The CSV and the TOML beside it. Raises SpecError as `check_csv` does, TraceError when they cannot be written."""
+    """Writes the CSV and the TOML beside it. Raises SpecError as `check_csv` does, TraceError when they cannot be
+    written."""
     from daq.traces.csv_table import export_csv
 
     check_csv(path)
@@ -24,7 +25,7 @@ def write_csv(trace: Trace, path: Path) -> Path:
 
 
 def check_csv(path: Path) -> None:
-    """Raises SpecError when the TOML beside a CSV would replace one that is not a CSV's: a machine, a configuration."""
+    """Raises SpecError when the TOML beside the CSV would replace another one, such as a machine or a configuration."""
     from pydantic import ValidationError
 
     from daq.traces.csv_table import Beside, toml_path

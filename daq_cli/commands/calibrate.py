@@ -12,12 +12,12 @@ from daq_cli.app.consent import Consent
 from daq_cli.app.context import JsonOption, YesOption, print_json
 from daq_cli.robot.access import robot_of
 
-app = typer.Typer(add_completion=False, help="Find what the machine really does.", no_args_is_help=True)
+app = typer.Typer(add_completion=False, help="Measure what the machine really does.", no_args_is_help=True)
 
 
 @app.callback()
 def calibrations() -> None:
-    """Find what the machine really does."""
+    """Measure what the machine really does."""
 
 
 @app.command()
@@ -32,11 +32,12 @@ def gain(
             help="Use this trace instead of moving: a file, a number, `last`.", autocompletion=completion.traces
         ),
     ] = None,
-    folder: Annotated[Path | None, typer.Option(help="Where the trace goes (default: configured folder).")] = None,
+    folder: Annotated[Path | None, typer.Option(help="Folder for the trace (default: the configured one).")] = None,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Find the actual proportional gain from errors and powers at several postures, as the source did (section 6.5)."""
+    """Measure the actual proportional gain from errors and powers at several postures, as the 1991 source did
+    (section 6.5)."""
     from daq.calibration import gain_experiment, gains_from_trace
     from daq.contracts.experiment import parse_joints
     from daq.traces.reader import read_trace

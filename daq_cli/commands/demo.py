@@ -16,11 +16,11 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def demo(
-    folder: Annotated[Path, typer.Option(help="Where trace and plots go.")] = Path("demo"),
+    folder: Annotated[Path, typer.Option(help="Folder for the trace and the plots.")] = Path("demo"),
     seed: Annotated[int, typer.Option(help="Seed of the mock's noise.")] = 1991,
-    real_time: Annotated[bool, typer.Option("--real-time", help="In real time instead of lock-step.")] = False,
+    real_time: Annotated[bool, typer.Option("--real-time", help="Run in real time instead of lock-step.")] = False,
 ) -> None:
-    """Start the mock controller, run the ramp step on joints 1-3, record the trace, and show what came of it."""
+    """Start the mock controller, run the ramp step on joints 1-3, record the trace, and show the results."""
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import load_machine
     from daq.traces.plot import plot_trace

@@ -53,24 +53,26 @@ def diagnose(
     effects: Annotated[
         str | None,
         typer.Option(
-            help="Candidates: backlash,coulomb and so on (default: every effect known).",
+            help="Candidate effects, such as backlash,coulomb (default: every effect of the library).",
             autocompletion=completion.effects,
         ),
     ] = None,
     joints: Annotated[
         str | None,
-        typer.Option(help="Look on these joints only: 1-3, 2 (default: all).", autocompletion=completion.joints),
+        typer.Option(help="Examine these joints only: 1-3, 2 (default: all).", autocompletion=completion.joints),
     ] = None,
-    load: Annotated[float | None, typer.Option(min=0.0, help="The load that the arm carried, kg.")] = None,
-    most: Annotated[int, typer.Option(min=1, max=10, help="Effects to add at most, one after the other.")] = 3,
+    load: Annotated[float | None, typer.Option(min=0.0, help="Load that the arm carried, in kg.")] = None,
+    most: Annotated[
+        int, typer.Option(min=1, max=10, help="Largest number of effects to add, one after the other.")
+    ] = 3,
     out: Annotated[Path | None, OutOption] = None,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     effect_file: EffectFileOption = None,
     acquire: Annotated[
-        bool, typer.Option("--acquire", help="Run the experiment that tells what is left, and diagnose again.")
+        bool, typer.Option("--acquire", help="Run the experiment that the diagnosis asks for, and diagnose again.")
     ] = False,
-    budget: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Robot time for --acquire, s.")] = 60.0,
+    budget: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Robot time for --acquire in s.")] = 60.0,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
@@ -93,14 +95,14 @@ def diagnose(
     failure: DaqError | None = None
 
     def once(traces: Sequence[Trace], ask: Asker) -> Diagnosis:
-        with shown_progress("diagnosing") as tell:
-            return run_diagnosis(begin, traces, held, options, tell, ask=ask)
+        with shown_progress("diagnosing") as progress:
+            return run_diagnosis(begin, traces, held, options, progress, ask=ask)
 
     if not acquire and (jobs := service_jobs(robot)) is not None:
         named, held_out = NamedTraces(traces, fitted_to), NamedTraces(holdout or [], held)
         found = jobs.diagnose(begin, named, held_out, options, out, report)
         _save(found, out)
-        _tell(found, out, None, as_json=json)
+        _print_result(found, out, None, as_json=json)
         return
     if acquire:
         ended = diagnose_and_acquire(robot, begin.machine, fitted_to, folder, budget, Consent(yes), once)
@@ -109,7 +111,7 @@ def diagnose(
         found = once(fitted_to, asker(begin.machine))
     _save(found, out)
     page = None if report is None else _written(found, fitted_to, held, report)
-    _tell(found, out, page, as_json=json)
+    _print_result(found, out, page, as_json=json)
     if failure is not None:
         raise failure
     if found.acquired and (outcome := found.acquired[-1].outcome) != "complete":
@@ -117,7 +119,7 @@ def diagnose(
 
 
 def _save(found: Diagnosis, out: Path | None) -> None:
-    """The model, where it is wanted; before anything else is made of the answer, which may fail."""
+    """Writes the model, if it is wanted, before the report is made, which may fail."""
     from model.machine_model.model_file import save_model
 
     if out is not None:
@@ -125,8 +127,8 @@ def _save(found: Diagnosis, out: Path | None) -> None:
             save_model(found.model_after, part)
 
 
-def _tell(found: Diagnosis, out: Path | None, page: Path | None, *, as_json: bool) -> None:
-    """The answer, and where the model and the page are."""
+def _print_result(found: Diagnosis, out: Path | None, page: Path | None, *, as_json: bool) -> None:
+    """Prints the answer, and where the model and the report are."""
     from daq_cli.models.diagnosis_text import answer_text
 
     if as_json:
@@ -154,7 +156,7 @@ def _options(effects: str | None, joints: str | None, most: int) -> DiagnosisOpt
 def _beginning(
     robot: RobotAccess, traces: Sequence[Trace], names: Sequence[str], model: str | None, load: float | None
 ) -> Model:
-    """The model that is doubted, with the load that was carried. names: what the command line calls the traces."""
+    """The model to be examined, with the load that was carried. names: what the command line calls the traces."""
     from model.discrepancy.carried_load import with_load
     from model.machine_model.model import base_model
 
@@ -163,7 +165,7 @@ def _beginning(
 
 
 def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], path: Path) -> Path:
-    """The page, with what the models before and after make of every trace where a simulation can follow it."""
+    """Writes the report; where the traces can be simulated, it compares the models before and after on every trace."""
     from daq.contracts.machine import NoController
     from model.comparison.compare import compare
     from model.reports.diagnosis_report import LABELS, diagnosis_report

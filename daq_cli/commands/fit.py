@@ -1,4 +1,4 @@
-"""`daq fit`: a model's parameters from traces, with what the traces cannot tell."""
+"""`daq fit`: a model's parameters from traces, and which of them the traces do not determine."""
 
 from __future__ import annotations
 
@@ -43,12 +43,13 @@ app = typer.Typer(add_completion=False)
 EffectsOption = Annotated[
     str | None,
     typer.Option(
-        help="Effects beside rigid bodies and motors: viscous,coulomb:2-3 or none (default: the machine's).",
+        help="Effects besides rigid bodies and motors, such as viscous,coulomb:2-3, or none (default: the machine's).",
         autocompletion=completion.effects,
     ),
 ]
 ParametersOption = Annotated[
-    str | None, typer.Option(help="What to find: names or patterns such as *.mass,joint2.* (default: all uncertain).")
+    str | None,
+    typer.Option(help="Parameters to fit: names or patterns such as *.mass,joint2.* (default: all uncertain ones)."),
 ]
 
 
@@ -62,24 +63,35 @@ def fit(
     effects: EffectsOption = None,
     effect_file: EffectFileOption = None,
     parameters: ParametersOption = None,
-    hold: Annotated[str | None, typer.Option(help="Names or patterns to leave as they are.")] = None,
-    bound: Annotated[list[str] | None, typer.Option(help="name=low:high, instead of the model's own bounds.")] = None,
+    hold: Annotated[str | None, typer.Option(help="Parameters to hold at their values: names or patterns.")] = None,
+    bound: Annotated[
+        list[str] | None,
+        typer.Option(help="Bounds of a parameter, name=low:high, instead of the model's own. May be repeated."),
+    ] = None,
     holdout: HoldoutOption = None,
-    no_priors: Annotated[bool, typer.Option("--no-priors", help="Leave expected deviations out.")] = False,
+    no_priors: Annotated[
+        bool, typer.Option("--no-priors", help="Fit without the expected deviations of the parameters.")
+    ] = False,
     method: Annotated[
         Literal["least_squares", "nelder_mead"], typer.Option(help="nelder_mead is the source's hill climbing.")
     ] = "least_squares",
-    starts: Annotated[int, typer.Option(min=1, max=100, help="Searches, from different beginnings.")] = 1,
-    seed: Annotated[int, typer.Option(min=0, help="Of the beginnings.")] = 0,
-    open_loop: Annotated[bool, typer.Option("--open-loop", help="Apply the recorded drive.")] = False,
+    starts: Annotated[int, typer.Option(min=1, max=100, help="Number of fits from different starting values.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the starting values.")] = 0,
+    open_loop: Annotated[
+        bool, typer.Option("--open-loop", help="Apply the recorded drive instead of closing the loop.")
+    ] = False,
     torques: Annotated[
-        bool, typer.Option("--torques", help="Compare torques instead of motion: no simulation, needs the drive.")
+        bool,
+        typer.Option(
+            "--torques", help="Compare torques instead of motion: nothing is simulated, and the drive must be recorded."
+        ),
     ] = False,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Find the parameters with which a model best repeats traces, and name what the traces cannot tell."""
+    """Find the parameters with which a model best reproduces traces, and name those that the traces do not
+    determine."""
     from daq_cli.app.progress import shown_progress
     from model.comparison.compare import compare
     from model.fitting.fit import fit as run_fit
@@ -110,24 +122,24 @@ def fit(
         named, held_out = NamedTraces(traces, fitted_to), NamedTraces(holdout or [], held)
         done = jobs.fit(begin, named, held_out, options, out, report)
         _save(done, out, quiet=json)
-        _tell(done, done.models, out, as_json=json)
+        _print_result(done, done.models, out, as_json=json)
         return
     if torques:
         from daq_cli.models.fit_torques import fit_recorded_torques
 
         fit_recorded_torques(begin, fitted_to, held, options, out, as_json=json, report=report)
         return
-    with shown_progress("fitting") as tell:
-        found = run_fit(begin, fitted_to, options, lambda f, text: tell(0.9 * f, text))
+    with shown_progress("fitting") as progress:
+        found = run_fit(begin, fitted_to, options, lambda f, text: progress(0.9 * f, text))
         _save(found, out, quiet=json)
         comparison = compare(
             [("before", begin), ("fitted", found.model)],
             [*fitted_to, *held],
             [t.record.trace_id for t in held],
             options=Options(loop=loop or "closed"),
-            progress=lambda f, text: tell(0.9 + 0.1 * f, text),
+            progress=lambda f, text: progress(0.9 + 0.1 * f, text),
         )
-    _tell(found, comparison.models, out, as_json=json)
+    _print_result(found, comparison.models, out, as_json=json)
     if report is not None:
         from model.reports.fit_report import fit_report
         from model.reports.page import write_report
@@ -136,7 +148,7 @@ def fit(
 
 
 def _save(found: FitResult, out: Path, *, quiet: bool) -> None:
-    """The model, and where it is; before anything else is made of it, which may fail."""
+    """Writes the model and says where, before the comparison is made, which may fail."""
     with replacing(out) as part:
         found.save(part)
     if not quiet:
@@ -146,7 +158,7 @@ def _save(found: FitResult, out: Path, *, quiet: bool) -> None:
 def _beginning(
     robot: RobotAccess, traces: Sequence[Trace], model: str | None, machine: str | None, effects: str | None
 ) -> Model:
-    """The model that the search begins from."""
+    """The model that the fit starts from."""
     from model.machine_model.model import base_model
 
     if model is not None and machine is not None:
@@ -160,7 +172,7 @@ def _beginning(
     return with_effects(base_model(chosen, friction=False), effects)
 
 
-def _tell(found: FitResult, agreement: Sequence[ModelAgreement], out: Path, *, as_json: bool) -> None:
+def _print_result(found: FitResult, agreement: Sequence[ModelAgreement], out: Path, *, as_json: bool) -> None:
     if as_json:
         _print_json(found, agreement, out)
     else:

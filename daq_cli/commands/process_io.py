@@ -21,7 +21,7 @@ WhileStoppedOption = Annotated[
 
 
 class NotSwitchedError(DaqError):
-    """The controller reads back something else than was written."""
+    """The controller reads back another value than was written."""
 
     exit_code = exit_codes.NOT_REACHED
 

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from daq.contracts.service.queue import QueueStatus
 
 app = typer.Typer(
-    add_completion=False, help="The queue of a server's robot: show, pause, resume.", no_args_is_help=True
+    add_completion=False, help="Show, pause and resume the queue of a server's robot.", no_args_is_help=True
 )
 
 
 @app.command()
 def show(context: typer.Context, json: JsonOption = False) -> None:
-    """Whether experiments are taken, why not, and what waits."""
+    """Show whether experiments are started, why not, and which wait."""
     with robot_of(context).service("queue") as robot:
         status, waiting = robot.queue.status(), robot.queue.waiting()
     if json:
@@ -34,14 +34,14 @@ def show(context: typer.Context, json: JsonOption = False) -> None:
 
 @app.command()
 def pause(context: typer.Context) -> None:
-    """Let no other experiment begin; one that runs goes on."""
+    """Let no further experiment start; a running one goes on."""
     with robot_of(context).service("queue") as robot:
         _print_status(robot.queue.pause())
 
 
 @app.command()
 def resume(context: typer.Context, yes: YesOption = False) -> None:
-    """Let the queue move the arm again. LOOK AT IT FIRST: what waits begins."""
+    """Let the queue move the arm again. LOOK AT THE ARM FIRST: waiting experiments start."""
     from daq_cli.robot.remote.connection import connected_status, require_consent
 
     with robot_of(context).service("queue") as robot:

@@ -1,4 +1,4 @@
-"""`daq run`: one subcommand a kind of trajectory, its options made from the kind's own fields."""
+"""`daq run`: one subcommand for each kind of trajectory, with options made from the fields of that kind."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ _HELP = {
     "period": "Seconds.",
     "dwell": "Seconds on each step.",
     "steps": "Number of steps one way.",
-    "back": "Down again afterwards.",
+    "back": "Go down again afterwards.",
     "reversals": "Changes of direction.",
     "cycles": "Periods of the sine.",
     "lowest": "Lowest frequency in Hz.",
     "highest": "Highest frequency in Hz.",
     "tones": "Number of sines.",
-    "seed": "Of the phases.",
+    "seed": "Seed of the phases.",
     "lift": "Metres of the lift-off and set-down points above the ends.",
     "pick": "Seconds up to the lift-off point.",
     "travel": "Seconds from the lift-off to the set-down point.",
@@ -70,12 +70,12 @@ StartOption = Annotated[str | None, typer.Option(help="Start angles, such as 1=1
 GainsOption = Annotated[str | None, typer.Option(help="Gains P/I/D, such as 1=2/0/0,2=2/0/0 (each 0-20).")]
 SettleOption = Annotated[float, typer.Option(help="Seconds held before the motion, recorded.")]
 HoldOption = Annotated[float, typer.Option(help="Seconds held after the motion, recorded.")]
-RepeatsOption = Annotated[int, typer.Option(help="How often the motion is made.")]
-RecordOption = Annotated[str | None, typer.Option(help="Joints to record (default: all the line has room for).")]
+RepeatsOption = Annotated[int, typer.Option(help="Number of times that the motion is made.")]
+RecordOption = Annotated[str | None, typer.Option(help="Joints to record (default: as many as the line has room for).")]
 NameOption = Annotated[str | None, typer.Option(help="A name for the experiment.")]
 OperatorOption = Annotated[str | None, typer.Option(help="Who runs it.")]
 NotesOption = Annotated[str, typer.Option(help="Anything worth knowing later.")]
-FolderOption = Annotated[Path | None, typer.Option(help="Where the trace goes (default: configured folder).")]
+FolderOption = Annotated[Path | None, typer.Option(help="Folder for the trace (default: the configured one).")]
 DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Check and show the motion; connect to nothing.")]
 
 COMMON: dict[str, tuple[Any, Any]] = {
@@ -102,7 +102,9 @@ def _option(name: str, field: FieldInfo) -> tuple[Any, Any]:
     """Type and default of the option that stands for a field of a trajectory."""
     default = field.get_default()
     if name == "amplitude":
-        return Annotated[str, typer.Option(help="Degrees, or one a joint: 1=21.6,2=-10.")], f"{_degrees(default)}"
+        return Annotated[
+            str, typer.Option(help="Amplitude in degrees, or one for each joint: 1=21.6,2=-10.")
+        ], f"{_degrees(default)}"
     if name == "points":
         text = "Degrees from the start, a point after the other: 10;20 or, one a joint, 1=10,2=5;1=20,2=0."
         return Annotated[str, typer.Option(help=text)], inspect.Parameter.empty
@@ -204,7 +206,7 @@ def from_file(
 def by_name(
     context: typer.Context,
     name: Annotated[
-        str, typer.Argument(help="Name of a preset; none lists them.", autocompletion=completion.presets)
+        str, typer.Argument(help="Name of a preset; without one, all are listed.", autocompletion=completion.presets)
     ] = "",
     folder: FolderOption = None,
     dry_run: DryRunOption = False,
@@ -233,5 +235,5 @@ def diagnostic(
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Run the set of about 55 s that tells hidden effects apart (the preset of that name)."""
+    """Run the preset `diagnostic`: about 55 s of motion that tells hidden effects apart."""
     by_name(context, "diagnostic", folder, dry_run, yes, json)

@@ -48,16 +48,16 @@ def simulate(
         bool, typer.Option("--open-loop", help="Apply the recorded drive instead of closing the loop.")
     ] = False,
     no_rounding: Annotated[
-        bool, typer.Option("--no-rounding", help="Leave readings and power unrounded, as no board does.")
+        bool, typer.Option("--no-rounding", help="Leave readings and drive unrounded, unlike a real board.")
     ] = False,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     effect_file: EffectFileOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Simulate traces from their recorded set points, and show what is left between measured and simulated.
+    """Simulate traces from their recorded set points, and show the difference between measured and simulated.
 
-    Nothing is fitted. A machine is taken as its file has it, with the friction it states.
+    Nothing is fitted. A machine is taken as its file describes it, with the friction stated there.
     """
     from daq_cli.app.progress import shown_progress
     from daq_cli.models.agreement_table import agreement_data, print_agreement
@@ -74,8 +74,8 @@ def simulate(
             check_csv(output)
     chosen = read_model(model)
     options = Options(loop="open" if open_loop else "closed", quantise=not no_rounding)
-    with shown_progress("simulating") as tell:
-        comparison = compare([(model_label(model), chosen)], found, options=options, progress=tell)
+    with shown_progress("simulating") as progress:
+        comparison = compare([(model_label(model), chosen)], found, options=options, progress=progress)
     if json:
         print_json({"model": chosen.identity, "agreement": agreement_data(comparison.models)[0]})
     else:
@@ -91,7 +91,7 @@ def simulate(
 
 
 def _simulated(model: Model, trace: Trace, options: Options) -> Trace:
-    """The trace that the model would have left."""
+    """The trace that the model would have recorded."""
     from daq.contracts.trace import Trace
     from model.simulation.simulate import simulate
 

@@ -1,4 +1,4 @@
-"""`daq stop`: at once, from any terminal, never asking first."""
+"""`daq stop`: stops every robot at once, from any terminal, without asking first."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ app = typer.Typer(add_completion=False)
 def stop(context: typer.Context, json: JsonOption = False) -> None:
     """Freeze every robot that is being moved, and the configured one: set points become the measured posture.
 
-    With --server the robots of that service; with DAQ_SERVER those and the ones that are moved from here.
+    With --server this stops the robots of that service; with DAQ_SERVER, those and the ones that are moved from here.
 
     Ends with 0 when every stop was confirmed by its board, with 3 when one was NOT DELIVERED or NOT CONFIRMED, or there
     was no robot. A program's stop never replaces the hardware's own.

@@ -27,7 +27,7 @@ TraceArgument = Annotated[
 FolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (default: the configured one).")]
 
 SHOWN_DIGITS = 8
-"""Of a trace's number in the list, which then fits into 80 columns; the beginning of a number names the trace."""
+"""Digits of a trace's number in the list, so that it fits into 80 columns; they suffice to name the trace."""
 
 
 def _path(context: typer.Context, wanted: str, folder: Path | None) -> Path:
@@ -153,11 +153,11 @@ def plot(
     folder: FolderOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Draw a trace: set point and position, error and drive of every joint."""
+    """Plot a trace: set point and position, error and drive of every joint."""
     from daq.traces.plot import plot_trace
 
     path, found = _read(context, trace, folder)
-    _tell_file(path, plot_trace(found, output or path.with_suffix(".png")), as_json=json)
+    _print_file(path, plot_trace(found, output or path.with_suffix(".png")), as_json=json)
 
 
 @app.command("export")
@@ -165,19 +165,19 @@ def export(
     context: typer.Context,
     trace: TraceArgument = "last",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="A .csv file; a .toml is put beside it.")
+        Path | None, typer.Option("--output", "-o", help="The .csv file to write; a .toml file is put beside it.")
     ] = None,
     folder: FolderOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Write a trace as plain CSV, with a TOML file for what columns cannot say."""
+    """Write a trace as plain CSV, with a TOML file for the data that have no column."""
     from daq_cli.app.csv_output import write_csv
 
     path, found = _read(context, trace, folder)
-    _tell_file(path, write_csv(found, output or path.with_suffix(".csv")), as_json=json)
+    _print_file(path, write_csv(found, output or path.with_suffix(".csv")), as_json=json)
 
 
-def _tell_file(made_from: Path, file: Path, *, as_json: bool) -> None:
+def _print_file(made_from: Path, file: Path, *, as_json: bool) -> None:
     if as_json:
         print_json({"trace": made_from, "file": file})
     else:
@@ -197,7 +197,7 @@ def import_(
     folder: FolderOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Take in a trace of another rig or tool."""
+    """Import a trace of another rig or tool."""
     robot = robot_of(context)
     made = robot.import_trace(file, folder)
     if json:
@@ -210,7 +210,7 @@ def import_(
 def check(
     context: typer.Context, trace: TraceArgument = "last", folder: FolderOption = None, json: JsonOption = False
 ) -> None:
-    """Check a trace from its checksums to its signals; ends with 5 when it is not to be trusted."""
+    """Check a trace, from its checksums to its signals; the exit code is 5 when it cannot be trusted."""
     from daq.traces.verify import verify
 
     found = verify(_path(context, trace, folder), robot_of(context).call.trace_limits)

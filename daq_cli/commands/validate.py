@@ -51,9 +51,9 @@ def validate(
     effect_file: EffectFileOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Validate a model by distortion: Σλ² says whether expected deviations explain what the model misses.
+    """Validate a model by distortion: Σλ² says whether expected parameter deviations explain the model's errors.
 
-    The time-domain form says of every parameter how it would have to vary with time, and what that goes with.
+    The time-domain form shows how every parameter would have to vary with time, and with what that correlates.
     """
     from daq_cli.app.progress import shown_progress
     from model.simulation.simulate import Options
@@ -69,10 +69,10 @@ def validate(
     if (jobs := service_jobs(robot)) is not None:
         named = NamedTraces(traces, found)
         done = jobs.validate(chosen, model, named, patterns(parameters), output, damping_ratio, report)
-        _tell(done.fidelity, done.three_sigma, done.time_domain, chosen.machine, as_json=json)
+        _print_result(done.fidelity, done.three_sigma, done.time_domain, chosen.machine, as_json=json)
         return
     names = names_to_validate(chosen, patterns(parameters))
-    with shown_progress("validating") as tell:
+    with shown_progress("validating") as progress:
         fidelity = validate_by_distortion(
             chosen,
             found,
@@ -81,14 +81,14 @@ def validate(
             damping_ratio=damping_ratio,
             curve_points=CURVE_POINTS,
             options=Options(quantise=False),
-            progress=lambda f, text: tell(0.7 * f, text),
+            progress=lambda f, text: progress(0.7 * f, text),
         )
         in_time = []
         for number, trace in enumerate(found):
-            tell(0.7 + 0.3 * number / len(found), f"variation with time: {trace.record.trace_id}")
+            progress(0.7 + 0.3 * number / len(found), f"variation with time: {trace.record.trace_id}")
             in_time.append(vary_in_time(chosen, trace, names))
     three = in_convention(fidelity, chosen, "three_sigma")
-    _tell(fidelity, three, in_time, chosen.machine, as_json=json)
+    _print_result(fidelity, three, in_time, chosen.machine, as_json=json)
     if report is not None:
         from model.reports.page import write_report
         from model.reports.validation_report import validation_report
@@ -97,7 +97,7 @@ def validate(
         console().print(f"report: {write_report(page, report)}")
 
 
-def _tell(
+def _print_result(
     fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], machine: Machine, *, as_json: bool
 ) -> None:
     if as_json:

@@ -1,4 +1,5 @@
-"""`daq diagnose --acquire`: run what the diagnosis asks for, diagnose again, until nothing is left to ask."""
+"""`daq diagnose --acquire`: runs the experiment that the diagnosis asks for and diagnoses again, until it asks for
+none."""
 
 from __future__ import annotations
 
@@ -25,10 +26,10 @@ Diagnose = Callable[["Sequence[Trace]", "Asker"], "Diagnosis"]
 
 @dataclass(frozen=True)
 class LoopEnd:
-    """How a diagnosis that ran what it asked for has ended.
+    """The end of a diagnosis with experiments of its own.
 
-    found: the latest answer. traces: what it rests on. failure: why a run that was asked for could not be begun, or
-    used; None where none failed. Nothing that was found before is lost to it.
+    found: the latest answer. traces: those that it is based on. failure: why an experiment could not be run, or its
+    trace not used; None where none failed. A failure loses nothing that was found before.
     """
 
     found: Diagnosis
@@ -45,11 +46,11 @@ def diagnose_and_acquire(
     consent: Consent,
     diagnose: Diagnose,
 ) -> LoopEnd:
-    """The answer after all that was asked for has been run, as far as that could be.
+    """Diagnoses, runs the experiment asked for, and diagnoses again, as long as `next_to_run` names one.
 
-    `next_to_run` says when it ends; `budget`: s of robot time; `machine`: that of the model in doubt. Planned for, and
-    moved, is the configured one, within the limits that hold for it now. Raises SpecError for another machine, and what
-    connecting raises, before anything is computed; what fails after the first answer is told beside it.
+    `budget` is the robot time in s, `machine` that of the examined model. Experiments are planned for the configured
+    machine, within its present limits. Raises SpecError for another machine, and what connecting raises, before
+    anything is computed; a later failure is returned with the answer.
     """
     arm = robot.machine
     _check_same_machine(arm, machine)
@@ -85,7 +86,7 @@ def _run(
 
 
 def _check_same_machine(arm: Machine, machine: Machine) -> None:
-    """Raises SpecError when the configured arm is another machine than the traces', or reads its joints otherwise."""
+    """Raises SpecError when the configured arm is another machine than that of the traces, or has other sensors."""
     if arm.name != machine.name:
         raise SpecError(
             f"--acquire: the traces were made on {machine.name}, the configured robot is {arm.name}; "
@@ -100,7 +101,7 @@ def _check_same_machine(arm: Machine, machine: Machine) -> None:
 
 
 def _readings(machine: Machine) -> dict[int, tuple[object, ...] | None]:
-    """By joint what makes an angle of its sensor's counts; None for a joint without a sensor."""
+    """The conversion of each joint's sensor from counts to angles; None for a joint without a sensor."""
     return {
         number: None if s is None else (s.bits, s.range.value, s.at_zero.value, s.direction, s.measures)
         for number, s in enumerate((joint.sensor for joint in machine.joints), start=1)

@@ -1,4 +1,4 @@
-"""Models beside measurements as a table on standard output."""
+"""The agreement of models with measurements, as a table on standard output."""
 
 from __future__ import annotations
 

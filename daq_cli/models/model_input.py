@@ -1,4 +1,4 @@
-"""Models, machines and traces as the command line names them."""
+"""Reads the models, machines and traces that the command line names."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TraceFolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (
 
 
 def _page(path: Path | None) -> Path | None:
-    """Refuses another kind of file, and one that cannot be made, before anything is computed."""
+    """Refuses a file of another kind, or one that cannot be written, before anything is computed."""
     if path is not None:
         if path.suffix != ".html":
             raise SpecError(f"report {path}: is written as .html")
@@ -38,12 +38,12 @@ def _page(path: Path | None) -> Path | None:
 
 
 ReportOption = Annotated[
-    Path | None, typer.Option("--report", callback=_page, help="Write a self-contained page, an .html file.")
+    Path | None, typer.Option("--report", callback=_page, help="Write a report as one self-contained .html file.")
 ]
 
 
 def _model_file(path: Path | None) -> Path | None:
-    """Refuses another kind of file, and one that cannot be made, before anything is computed."""
+    """Refuses a file of another kind, or one that cannot be written, before anything is computed."""
     if path is not None:
         if path.suffix != ".json":
             raise SpecError(f"--out {path}: a model is written as .json")
@@ -51,11 +51,13 @@ def _model_file(path: Path | None) -> Path | None:
     return path
 
 
-OutOption = typer.Option("--out", "-o", callback=_model_file, help="Where the model that is made goes, a .json file.")
+OutOption = typer.Option("--out", "-o", callback=_model_file, help="File for the resulting model (.json).")
 HoldoutOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--holdout", help="A trace to judge by, not fitted to. May be repeated.", autocompletion=completion.traces
+        "--holdout",
+        help="A held-out trace, used to judge and not to fit. May be repeated.",
+        autocompletion=completion.traces,
     ),
 ]
 
@@ -103,7 +105,7 @@ def model_label(name: str) -> str:
 
 
 def model_labels(names: Sequence[str]) -> list[str]:
-    """Labels that differ: whole names where file names are alike."""
+    """Distinct labels of models: their whole names where the file names are equal."""
     labels = [model_label(name) for name in names]
     return labels if len(set(labels)) == len(labels) else list(names)
 
@@ -128,7 +130,7 @@ def read_traces(robot: RobotAccess, folder: Path | None, names: Sequence[str]) -
 
 
 def machine_of(traces: Sequence[Trace], robot: RobotAccess, names: Sequence[str] = ()) -> Machine:
-    """The machine that the traces were made on; the configured one where they do not say, which is then said aloud.
+    """The machine that recorded the traces; where they do not say, the configured one, which is then announced.
 
     Limits may differ: the last trace's are taken.
 
@@ -190,13 +192,13 @@ def _listed(joints: Sequence[int]) -> str:
 
 
 def _described(machine: Machine) -> dict[str, Any]:
-    """What a machine file says of the machine: not what people call it, nor where it may go."""
+    """The physical description of a machine, without its title, notes, limits and rest posture."""
     return machine.model_dump(exclude={"title", "notes", "limits", "rest_posture"})
 
 
 def _difference(one: Any, other: Any, place: str = "") -> str:
-    """Where two descriptions first differ, such as `joints.2.link.mass.value`; empty where they agree. The sources of
-    numbers are words, and may differ."""
+    """The place where two descriptions first differ, such as `joints.2.link.mass.value`; empty where they agree.
+    Sources of numbers are only words, and may differ."""
     if isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other):
         one, other = dict(enumerate(one, start=1)), dict(enumerate(other, start=1))
     if isinstance(one, dict) and isinstance(other, dict):

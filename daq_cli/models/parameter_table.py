@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def print_parameters(parameters: Sequence[FittedParameter]) -> None:
-    """One line a parameter; no number where the data give none."""
+    """Prints one line for each parameter; without a number where the data do not determine one."""
     from rich.table import Table
 
     table = Table(box=None, header_style="bold")
@@ -43,7 +43,7 @@ def _row(p: FittedParameter) -> tuple[str, ...]:
 
 
 def significant(value: float, deviation: float) -> int:
-    """Digits of a value so that its deviation shows with two; at most seven."""
+    """Number of digits of a value that shows its deviation with two digits, at most seven."""
     if value == 0 or deviation <= 0:
         return 3
     return max(2, min(7, 2 + math.floor(math.log10(abs(value))) - math.floor(math.log10(deviation))))

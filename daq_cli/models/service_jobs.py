@@ -217,13 +217,13 @@ class ServiceJobs:
 
 
 def model_name(text: str) -> str:
-    """A name as the service takes it."""
+    """A name in the form that the service accepts."""
     kept = re.sub(r"[^A-Za-z0-9 _.-]+", "-", Path(text).stem).lstrip(" _.-")[:64]
     return kept or "model"
 
 
 def standing_of(job: Job, now: datetime) -> str:
-    """How far a job is, or what it waits behind, in a few words."""
+    """The progress of a job, or what it waits for, in a few words."""
     behind = job.waits_behind
     if job.state != "queued" or behind is None:
         return job.progress_text or job.state
@@ -237,10 +237,10 @@ def standing_of(job: Job, now: datetime) -> str:
 def _followed(robot: Robot, request: JobRequest) -> Job:
     job = robot.jobs.submit(request)
     try:
-        with shown_progress(f"{request.kind} at the server") as tell:
+        with shown_progress(f"{request.kind} at the server") as progress:
             return robot.jobs.wait(
                 job.id,
-                lambda job: tell(job.progress or 0.0, standing_of(job, datetime.now(UTC))),
+                lambda job: progress(job.progress or 0.0, standing_of(job, datetime.now(UTC))),
                 look_every=LOOK_EVERY,
             )
     except KeyboardInterrupt:

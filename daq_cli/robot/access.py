@@ -60,7 +60,7 @@ class RobotAccess(Protocol):
         """Moves the gripper; what is read back then."""
 
     def stop(self, reached: set[str]) -> list[StopAnswer]:
-        """Stops the robot that the command line or the configuration names. Never raises: the answers tell.
+        """Stops the robot that the command line or the configuration names. Never raises: failures are answers.
 
         Args:
             reached: ports whose processes have been asked already.

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RobotView:
-    """One look at the robot: all that is known of it, and how it is told in one line."""
+    """One look at the robot: all that is known of it, and its state in one line."""
 
     report: StatusReport
     headline: str

@@ -1,4 +1,4 @@
-"""An experiment from the command line: its preview, its run, and how its end is told."""
+"""An experiment from the command line: its preview, its run, and its result."""
 
 from __future__ import annotations
 

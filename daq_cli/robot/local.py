@@ -55,7 +55,7 @@ class LocalRobot:
     def _connected(self) -> Iterator[Controller]:
         """The configured controller, greeted; closed afterwards. Nothing is sent that could move it.
 
-        Raises ReachError when no robot is configured: a mock of its own would have nothing to tell.
+        Raises ReachError when no robot is configured: a new mock would have no state worth showing.
         """
         if self.call.port_option is None and self.call.settings.robot.port is None:
             raise ReachError("no robot is configured: give --port, or set robot.port in daq.toml (`daq config show`)")

@@ -12,7 +12,7 @@ from daq.contracts.errors import SafetyError, SpecError
 from daq.contracts.limp import require_drive
 from daq_cli.app.consent import Consent
 from daq_cli.app.context import Invocation, console
-from daq_cli.app.keyboard import keys
+from daq_cli.app.keyboard import open_keyboard
 from daq_cli.robot.pendant import HELP, Pendant, StatusLine
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def jog_locally(
     """Drives joints with the keys until the pendant has ended."""
     from daq.teaching import jog
 
-    with keys() as keyboard, _owned(call, consent, lambda robot: _arm(robot, machine)) as (robot, arm):
+    with open_keyboard() as keyboard, _owned(call, consent, lambda robot: _arm(robot, machine)) as (robot, arm):
         line.tell(HELP)
 
         def commands(row: SampleRow) -> JogCommand | None:

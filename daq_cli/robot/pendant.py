@@ -1,4 +1,4 @@
-"""What the keys of `daq teach jog` mean, and the line that shows which joint they drive and how fast."""
+"""The meaning of the keys of `daq teach jog`, and the line that shows which joint they drive and how fast."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FASTER, SLOWER = 1.25, 0.8
 
 
 def require_jog_speed(speed: float) -> float:
-    """`speed` (rad/s) when keys may begin with it. Raises SpecError, in degrees/s."""
+    """Checks the speed (rad/s) that jogging begins with. Raises SpecError, in degrees/s."""
     if not 0 < speed <= JOG_SPEED:
         raise SpecError(
             f"jog speed of {math.degrees(speed):.4g}°/s: allowed are above 0 and up to {math.degrees(JOG_SPEED):.0f}°/s"
@@ -24,7 +24,8 @@ def require_jog_speed(speed: float) -> float:
 
 
 class Pendant:
-    """Which joint, which way, how fast (rad/s). A joint is never driven faster than its own limit."""
+    """The joint, direction and speed (rad/s) that the keys have chosen. No joint is driven faster than its own
+    limit."""
 
     def __init__(self, machine: Machine, speed: float) -> None:
         self.joint = 1
@@ -37,7 +38,7 @@ class Pendant:
 
     @property
     def speed(self) -> float:
-        """Of the chosen joint, in rad/s."""
+        """Speed of the chosen joint in rad/s."""
         return min(self.wish, top_speed(self._machine.limits, self.joint))
 
     def command(self, typed: str, now: float) -> JogCommand | None:
@@ -75,12 +76,12 @@ class StatusLine:
             self._shown = line
 
     def tell(self, line: str) -> None:
-        """A line of its own; the status comes again below it."""
+        """Prints a line of its own; the status follows below it."""
         self.close()
         print(line, file=sys.stderr)
 
     def close(self) -> None:
-        """Leaves the line."""
+        """Ends the line."""
         if self._shown:
             print(file=sys.stderr)
             self._shown = ""

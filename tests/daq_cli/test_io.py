@@ -28,7 +28,7 @@ def _untouched(daq: CommandLine, port: str) -> Iterator[None]:
 
 
 @pytest.mark.parametrize(("words", "told"), SWITCHES)
-def test_what_was_switched_is_read_back_and_told(
+def test_a_switched_signal_is_read_back_and_printed(
     daq: CommandLine, port: str, words: tuple[str, ...], told: str
 ) -> None:
     assert daq("--port", port, "io", *words).out == told
@@ -45,7 +45,7 @@ def test_a_real_arm_is_switched_only_with_the_operators_word(
 
 
 @pytest.mark.parametrize(("words", "told"), SWITCHES)
-def test_what_a_person_has_agreed_to_is_switched(
+def test_a_real_arm_is_switched_when_a_person_agrees(
     daq: CommandLine, port: str, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], told: str
 ) -> None:
     asked_operator(monkeypatch, lambda _question: True)
@@ -80,7 +80,7 @@ def test_a_stop_gets_through_while_a_person_is_asked_and_nothing_is_switched_the
 
 
 @pytest.mark.parametrize(("words", "told"), SWITCHES)
-def test_a_stopped_arm_is_switched_only_by_who_says_so(
+def test_a_stopped_arm_is_switched_only_with_while_stopped(
     daq: CommandLine, mock: MockProcess, port: str, words: tuple[str, ...], told: str
 ) -> None:
     assert daq("--port", port, "stop").code == 0

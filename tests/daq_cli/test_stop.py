@@ -17,7 +17,7 @@ from tests.daq_cli.board import ask
 from tests.daq_cli.invoke import CommandLine
 
 
-def test_with_nothing_running_and_nothing_configured(daq: CommandLine) -> None:
+def test_a_stop_with_nothing_running_and_nothing_configured_fails(daq: CommandLine) -> None:
     said = daq("stop")
     assert (said.code, said.err) == (3, "")
     assert said.out == "no robot is being moved from here, and none is configured: nothing to stop\n"
@@ -35,7 +35,7 @@ def test_a_robot_that_nobody_holds_is_stopped_over_its_port(daq: CommandLine, mo
 
 
 @pytest.mark.parametrize("words", [("reset",), ("reset", "--here")])
-def test_a_reset_ends_no_stop_that_comes_after_it_has_looked(
+def test_a_reset_does_not_end_a_later_stop(
     daq: CommandLine, mock: MockProcess, port: str, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
 ) -> None:
     assert daq("--port", port, "stop").code == 0
@@ -65,7 +65,7 @@ def test_the_configured_robot_is_stopped_beside_those_that_run(daq: CommandLine,
     daq("reset")
 
 
-def test_a_port_that_somebody_else_holds_is_told_as_not_delivered(daq: CommandLine) -> None:
+def test_a_stop_at_a_port_in_use_is_reported_as_not_delivered(daq: CommandLine) -> None:
     master, slave = pty.openpty()
     try:
         with serial.Serial(os.ttyname(slave), exclusive=True):
@@ -79,7 +79,7 @@ def test_a_port_that_somebody_else_holds_is_told_as_not_delivered(daq: CommandLi
     assert "emergency stop" in said.out
 
 
-def test_a_board_that_does_not_answer_is_told_as_not_confirmed(daq: CommandLine) -> None:
+def test_a_stop_at_a_silent_board_is_reported_as_not_confirmed(daq: CommandLine) -> None:
     master, slave = pty.openpty()
     try:
         said = daq("--port", f"serial://{os.ttyname(slave)}", "stop")
@@ -91,7 +91,7 @@ def test_a_board_that_does_not_answer_is_told_as_not_confirmed(daq: CommandLine)
     assert "emergency stop" in said.out
 
 
-def test_a_configuration_that_cannot_be_read_is_told_and_stops_nobody_from_stopping(daq: CommandLine) -> None:
+def test_a_broken_configuration_is_reported_and_prevents_no_stop(daq: CommandLine) -> None:
     Path("daq.toml").write_text("[robot\n")
     said = daq("stop")
     assert said.code == 3
@@ -99,9 +99,7 @@ def test_a_configuration_that_cannot_be_read_is_told_and_stops_nobody_from_stopp
     assert "not TOML" in said.out
 
 
-def test_with_a_service_by_default_what_is_moved_from_here_is_stopped_too(
-    daq: CommandLine, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_stop_at_a_default_service_stops_local_robots_too(daq: CommandLine, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DAQ_SERVER", "http://127.0.0.1:1")
     Path("mine.toml").touch()
     with stop_listener("another"):  # does not answer
@@ -111,7 +109,7 @@ def test_with_a_service_by_default_what_is_moved_from_here_is_stopped_too(
     assert [answer["robot"] for answer in named] == ["ma2000"]
 
 
-def test_a_port_that_is_named_goes_before_the_service_by_default(
+def test_a_named_port_goes_before_the_default_service(
     daq: CommandLine, mock: MockProcess, port: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DAQ_SERVER", "http://127.0.0.1:1")
@@ -123,7 +121,7 @@ def test_a_port_that_is_named_goes_before_the_service_by_default(
 
 
 @pytest.mark.parametrize("written", ["serial://{device}?baud=9600", "serial://{link}", "serial://{link}?baud=115200"])
-def test_a_port_whose_process_has_been_asked_is_not_opened_however_it_is_written(
+def test_a_port_whose_process_was_asked_is_not_opened_again(
     daq: CommandLine, monkeypatch: pytest.MonkeyPatch, written: str
 ) -> None:
     device, link = Path("device").absolute(), Path("link").absolute()

@@ -91,7 +91,7 @@ def patient_companion(robot: Any, *, ends_within: float = 60.0) -> Companion:
     [raising(refused(status)) for status in (401, 429, 500, 503)] + [raising(ServiceNotReachedError("no answer"))],
     ids=["401", "429", "500", "503", "no answer"],
 )
-def test_a_cancel_that_is_not_carried_out_becomes_a_stop_that_is_told(
+def test_a_cancel_that_fails_becomes_a_stop_that_is_reported(
     cancel: Callable[[], object], capsys: pytest.CaptureFixture[str]
 ) -> None:
     robot: Any = Robot(cancel)
@@ -113,14 +113,14 @@ def test_an_experiment_that_still_runs_after_its_cancel_is_stopped(cancel: Calla
         assert stopped.wait(60)
 
 
-def test_what_waits_is_taken_back_and_nobody_else_is_stopped() -> None:
+def test_a_key_cancels_a_waiting_experiment_and_stops_no_other() -> None:
     robot: Any = Robot(state("cancelled"))
     with patient_companion(robot) as keys:
         keys.press()
     assert (robot.stops, len(robot.patience)) == (0, 1)
 
 
-def test_the_end_of_the_experiment_needs_no_stop() -> None:
+def test_an_experiment_that_has_ended_is_not_stopped() -> None:
     robot: Any = Robot(raising(refused(404)))
     with patient_companion(robot) as keys:
         keys.press()
@@ -264,7 +264,7 @@ def asked_for_names(monkeypatch: pytest.MonkeyPatch) -> list[float | None]:
     return waited
 
 
-def test_a_service_that_does_not_answer_is_told_at_once(
+def test_a_service_that_does_not_answer_a_stop_is_reported_at_once(
     daq: CommandLine, asked_for_names: list[float | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def silent(url: str, **_: object) -> httpx.Response:
@@ -277,7 +277,7 @@ def test_a_service_that_does_not_answer_is_told_at_once(
     assert asked_for_names == []
 
 
-def test_a_robot_of_another_name_is_stopped_and_the_name_that_is_not_known_is_told_first(
+def test_a_stop_with_an_unknown_name_says_so_and_stops_the_robots_of_the_service(
     daq: CommandLine, asked_for_names: list[float | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def post(url: str, **_: object) -> httpx.Response:
@@ -295,7 +295,7 @@ def test_a_robot_of_another_name_is_stopped_and_the_name_that_is_not_known_is_to
     assert asked_for_names[0] <= 1.0
 
 
-def test_a_token_that_no_header_can_carry_is_told_and_not_shown(
+def test_a_token_that_is_not_ascii_is_refused_without_being_shown(
     daq: CommandLine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DAQ_TOKEN", "daq_schlüssel")

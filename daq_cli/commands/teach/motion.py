@@ -1,4 +1,4 @@
-"""`daq teach`: the four ways of teaching of the original (section 6.4), without its limit of 60 s."""
+"""`daq teach`: the four ways of teaching that the original controller had (section 6.4), without its limit of 60 s."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from daq_cli.commands.teach import edit, programs
 from daq_cli.robot.access import robot_of
 
 LONGEST_LEAD = 3600.0
-"""s for which an arm may be led in one go: somebody holds it."""
+"""Longest lead in s, because somebody has to hold the arm."""
 
 app = typer.Typer(
     add_completion=False,
-    help="Jog, lead by the nose, steps, and playing back. Needs a configured robot, or --port.",
+    help="Jog the arm, lead it by the nose, make steps, and play back. Needs a configured robot, or --port.",
     no_args_is_help=True,
 )
 app.add_typer(programs.app, name="programs")
@@ -31,8 +31,10 @@ app.add_typer(edit.app, name="edit")
 @app.command()
 def jog(
     context: typer.Context,
-    speed: Annotated[str, typer.Option(help="Degrees/s to begin with, up to 20.")] = "10",
-    program: Annotated[Path | None, typer.Option(help="Where postures kept with `p` go (a program, .json).")] = None,
+    speed: Annotated[str, typer.Option(help="Speed to begin with, up to 20 degrees/s.")] = "10",
+    program: Annotated[
+        Path | None, typer.Option(help="File for the postures that are kept with `p` (a program, .json).")
+    ] = None,
     yes: YesOption = False,
 ) -> None:
     """Drive joints with the keys, as the teach pendant did; a joint moves only while its key repeats."""
@@ -65,10 +67,10 @@ def step(
     context: typer.Context,
     to: Annotated[str | None, typer.Option(help="Absolute angles, such as 1=180,2=45 (degrees).")] = None,
     by: Annotated[str | None, typer.Option(help="Relative angles, such as 2=-5 (degrees).")] = None,
-    speed: Annotated[str, typer.Option(help="Degrees/s of the fastest joint.")] = "14",
+    speed: Annotated[str, typer.Option(help="Speed of the fastest joint in degrees/s.")] = "14",
     yes: YesOption = False,
 ) -> None:
-    """One off-line step, all joints arriving together: to absolute angles, or by relative ones."""
+    """Make one off-line step, to absolute angles or by relative ones; all joints arrive together."""
     from pydantic import ValidationError
 
     from daq.teaching.program import Absolute, Instruction, Program, Relative
@@ -106,11 +108,13 @@ def run_file(
 @app.command()
 def lead(
     context: typer.Context,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Where the recorded path goes (.json).")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File for the recorded path (.json).")],
     joints: Annotated[
         str, typer.Option(help="Joints to be led: 1-3, 1,3 or 2.", autocompletion=completion.joints)
     ] = "1-3",
-    seconds: Annotated[float | None, typer.Option(help="End by itself after so long; else with Enter.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Length of the recording in s (default: until Enter is pressed).")
+    ] = None,
     yes: YesOption = False,
 ) -> None:
     """Record a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive and may sink."""
@@ -141,8 +145,8 @@ def lead(
 def play(
     context: typer.Context,
     file: Annotated[Path, typer.Argument(help="A path recorded by `daq teach lead`.")],
-    rate: Annotated[float, typer.Option(help="How many times as fast as it was led.")] = 1.0,
-    folder: Annotated[Path | None, typer.Option(help="Where the trace goes (default: configured folder).")] = None,
+    rate: Annotated[float, typer.Option(help="Speed of the path, as a multiple of that at which it was led.")] = 1.0,
+    folder: Annotated[Path | None, typer.Option(help="Folder for the trace (default: the configured one).")] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Check and show the motion; connect to nothing.")] = False,
     yes: YesOption = False,
     json: JsonOption = False,

@@ -22,7 +22,7 @@ Name = Annotated[str, typer.Argument(help="Name of a kept program.")]
 
 @app.command("ls")
 def list_kept(context: typer.Context, json: JsonOption = False) -> None:
-    """Programs that the service keeps, the one changed last first."""
+    """List the programs that the service keeps, the one changed last first."""
     from rich.table import Table
 
     with robot_of(context).service(WHAT) as robot:
@@ -58,7 +58,7 @@ def keep(
 def fetch(
     context: typer.Context,
     name: Name,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Where it goes (default: NAME.json).")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write (default: NAME.json).")] = None,
 ) -> None:
     """Write a kept program into a file of this computer."""
     from daq.teaching.program import require_program_file, save_program

@@ -5,11 +5,11 @@ from __future__ import annotations
 import threading
 from contextlib import suppress
 from types import TracebackType
-from typing import Self
 
 from daq.client import Robot, ServiceError, ServiceNotReachedError
 from daq.contracts.service.experiments import ENDS
 from daq_cli.app.context import console
+from daq_cli.app.stop_keys import StopThread
 
 ATTEND_EVERY = 20.0
 """s between two confirmations that an operator is present; the service waits a minute for one."""
@@ -23,7 +23,7 @@ GONE = (404, 409)
 """HTTP status of an experiment that has ended by itself at this moment."""
 
 
-class Companion:
+class Companion(StopThread):
     """Within the block, on a thread of its own: `press` cancels the experiment, or stops the arm; and where `attends`,
     for a real arm, the service is told at intervals that an operator is present."""
 
@@ -37,21 +37,15 @@ class Companion:
         ends_within: float = ENDS_WITHIN,
         leaves_within: float = LEAVES_WITHIN,
     ) -> None:
+        super().__init__()
         self._robot = robot
         self._experiment = experiment
         self._attends = attends
         self._attend_every = attend_every
         self._ends_within = ends_within
         self._leaves_within = leaves_within
-        self._wake = threading.Event()
-        self._pressed = False
         self._left = threading.Event()
         self._ended = False
-        self._thread = threading.Thread(target=self._wait, name="stop-keys", daemon=True)
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -61,18 +55,12 @@ class Companion:
         self._wake.set()
         self._thread.join(self._leaves_within)
 
-    def press(self) -> None:
-        """A key that stops was pressed. Called by a signal handler, so it is quick, and may be called again."""
-        if not self._pressed:  # a signal that interrupts this one finds its lock taken, and need not wake again
-            self._pressed = True
-            self._wake.set()
-
     def _wait(self) -> None:
-        while self._pressed or not self._left.is_set():  # a key that came before the end is never lost
+        while self.pressed or not self._left.is_set():  # a key that came before the end is never lost
             woken = self._wake.wait(self._attend_every)
             self._wake.clear()
-            if self._pressed:
-                self._pressed = False
+            if self.pressed:
+                self.pressed = False
                 self._stop()
             elif self._attends and not woken:
                 with suppress(ServiceError, ServiceNotReachedError):  # said again in time, or the service ends the run

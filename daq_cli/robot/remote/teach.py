@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import select
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -14,8 +13,8 @@ from typing import TYPE_CHECKING
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SafetyError
 from daq_cli.app.context import console
-from daq_cli.app.keyboard import keys as keyboard_keys
-from daq_cli.app.stop_keys import StopKeys
+from daq_cli.app.keyboard import open_keyboard
+from daq_cli.app.stop_keys import StopKeys, StopThread
 from daq_cli.robot.pendant import HELP, Pendant, StatusLine
 
 if TYPE_CHECKING:
@@ -52,22 +51,16 @@ def taught(held: Controlled) -> Iterator[tuple[Robot, HeldControl, Stopped]]:
             keys.stops(lambda: None)
 
 
-class Stopped:
+class Stopped(StopThread):
     """Stops the robot when `press` is called; `result` then says what became of the stop.
 
     Leaving raises StoppedAtServerError after a press, whatever the work has ended with: a stop counts.
     """
 
     def __init__(self, robot: Robot) -> None:
-        self.pressed = False
+        super().__init__()
         self.result: StopResult | None = None
         self._robot = robot
-        self._wake = threading.Event()
-        self._thread = threading.Thread(target=self._wait, name="stop-keys", daemon=True)
-
-    def __enter__(self) -> Stopped:
-        self._thread.start()
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -76,12 +69,6 @@ class Stopped:
         self._thread.join()  # a stop is answered within seconds, and raises nothing
         if kind is None or issubclass(kind, DaqError):
             self.raise_if_answered()
-
-    def press(self) -> None:
-        """A key that stops was pressed. Called by a signal handler, so it is quick, and may be called again."""
-        if not self.pressed:  # a signal that interrupts this one finds its lock taken, and need not wake again
-            self.pressed = True
-            self._wake.set()
 
     def _wait(self) -> None:
         self._wake.wait()
@@ -108,7 +95,7 @@ def jog_at_server(
 
     Raises StoppedAtServerError after Ctrl-C, and what the service refuses.
     """
-    with keyboard_keys() as keyboard, taught(held) as (robot, control, stopped):
+    with open_keyboard() as keyboard, taught(held) as (robot, control, stopped):
         line.tell(HELP)
         while not pendant.ended:
             stopped.raise_if_answered()

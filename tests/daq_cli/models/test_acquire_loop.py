@@ -42,7 +42,9 @@ def ramp(made: dict[str, Path], daq: CommandLine, tmp_path_factory: pytest.TempP
     return made["ramp"]
 
 
-def test_what_is_asked_for_is_run_within_the_budget_and_used(daq: CommandLine, ramp: Path, tmp_path: Path) -> None:
+def test_an_experiment_that_is_asked_for_is_run_within_the_budget_and_used(
+    daq: CommandLine, ramp: Path, tmp_path: Path
+) -> None:
     said = daq(
         "--port",
         PORT,
@@ -127,7 +129,7 @@ def loop(arm: LocalRobot, traces: list[Trace], budget: float, diagnose: Diagnose
     return diagnose_and_acquire(arm, machine, traces, None, budget, Consent(given=False), diagnose)
 
 
-def test_the_robot_time_that_is_left_bounds_what_is_asked(ramp: Path) -> None:
+def test_remaining_robot_time_limits_further_experiments(ramp: Path) -> None:
     trace = read_trace(ramp)
     duration = float(trace.time[-1] - trace.time[0])
     answers = Answers(duration)
@@ -140,7 +142,7 @@ def test_the_robot_time_that_is_left_bounds_what_is_asked(ramp: Path) -> None:
     assert [left for _, left in answers.given] == pytest.approx([2.5 * duration, 1.5 * duration, 0.5 * duration])
 
 
-def test_a_run_that_is_stopped_ends_it_and_is_not_used(ramp: Path) -> None:
+def test_a_stopped_run_ends_the_loop_and_is_not_used(ramp: Path) -> None:
     answers = Answers(3.0)
     ended = loop(Arm(ramp, "stopped"), [read_trace(ramp)], 60.0, answers)
     assert [run.outcome for run in ended.found.acquired] == ["stopped"]
@@ -153,7 +155,7 @@ def test_another_machine_than_the_configured_one_is_refused(ramp: Path) -> None:
         diagnose_and_acquire(Arm(ramp), machine, [read_trace(ramp)], None, 60.0, Consent(False), Answers(3.0))
 
 
-def test_what_moves_is_the_configured_machine_within_its_limits(ramp: Path) -> None:
+def test_experiments_stay_within_the_limits_of_the_configured_machine(ramp: Path) -> None:
     """The limits were tightened after the trace was recorded: its own no longer hold."""
     Path("daq.toml").write_text("[robot.limits]\nreach = 0.01\n")
     answers, arm = Answers(3.0), Arm(ramp, "complete")
@@ -176,7 +178,7 @@ def test_another_sensor_than_the_traces_is_refused(ramp: Path) -> None:
 
 
 @pytest.mark.parametrize(("outcome", "code"), [("complete", 0), ("stopped", 6), ("fault", 5), ("interrupted", 5)])
-def test_the_answer_is_given_and_the_exit_code_is_the_last_runs(
+def test_the_answer_is_printed_and_the_exit_code_is_that_of_the_last_run(
     daq: CommandLine, ramp: Path, monkeypatch: pytest.MonkeyPatch, outcome: str, code: int
 ) -> None:
     run = Acquired(experiment="ramp", trace="abc", file="abc.mcap", outcome=outcome, duration=3.0, reason="")
@@ -191,7 +193,7 @@ def test_the_answer_is_given_and_the_exit_code_is_the_last_runs(
     assert Diagnosis.model_validate(json.loads(said.out)).acquired == (run,)
 
 
-def test_a_robot_that_is_not_there_is_said_before_anything_is_computed(
+def test_an_absent_robot_is_reported_before_anything_is_computed(
     daq: CommandLine, ramp: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("model.discrepancy.workflow.diagnose", lambda *_, **__: pytest.fail("it was computed"))
@@ -200,7 +202,7 @@ def test_a_robot_that_is_not_there_is_said_before_anything_is_computed(
     daq("--port", "mock://?modify=gremlin", "diagnose", ramp, "--acquire").complains(3, "mock controller did not start")
 
 
-def test_the_answer_is_not_lost_to_a_run_that_cannot_be_begun(
+def test_the_answer_survives_a_run_that_cannot_begin(
     daq: CommandLine, ramp: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def gone(*_: object) -> Finished:
@@ -220,7 +222,7 @@ def test_the_answer_is_not_lost_to_a_run_that_cannot_be_begun(
     assert Path("so_far.json").exists()
 
 
-def test_the_answer_is_not_lost_to_a_trace_that_cannot_be_used(ramp: Path) -> None:
+def test_the_answer_survives_a_trace_that_cannot_be_used(ramp: Path) -> None:
     answers = Answers(3.0)
 
     def once(traces: Sequence[Trace], ask: Asker) -> Diagnosis:
