@@ -298,7 +298,7 @@ AROUND = ("daq_cli", "daq.client", "daq.config")
 
 
 def test_nothing_that_a_stage_imports_is_left_out_of_a_registration() -> None:
-    every = ("daq", "model", "server", "mock_controller", "firmware_protocol")
+    every = ("daq", "daq_cli", "model", "server", "mock_controller", "firmware_protocol")
     graph = grimp.build_graph(*every, exclude_type_checking_imports=True, cache_dir=None)
     begun = {name for name in graph.modules if any(f"{name}.".startswith(f"{stage}.") for stage in STAGE_MODULES)}
     used = begun.union(*(graph.find_upstream_modules(name) for name in begun))
