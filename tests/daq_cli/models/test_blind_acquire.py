@@ -87,6 +87,7 @@ def ramp(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made.file
 
 
+@pytest.mark.slow
 def test_the_diagnoser_asks_for_an_experiment_only_where_it_may(
     ramp: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,6 +12,7 @@ from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.explanation.notes import on_what_is_stated
 from model.discrepancy.options import DiagnosisOptions
 from model.fitting.unknowns import Unknown
+from model.machine_model.parameter import Kind, Parameter
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.models.conftest import write_csv
 from tests.model.discrepancy.answers import an_answer
@@ -47,7 +48,8 @@ def test_other_verdicts_are_said_as_what_they_are(answer: Diagnosis) -> None:
 
 
 def test_numbers_far_from_what_is_stated_stand_right_under_the_verdict(answer: Diagnosis) -> None:
-    mass = Unknown("load.mass", "kg", start=500.0, expected=500.0, deviation=50.0)
+    load = Parameter(name="load.mass", kind=Kind.INERTIA, part="mass", unit="kg", value=500.0)
+    mass = Unknown(load, start=500.0, expected=500.0, deviation=50.0)
     warned = answer.model_copy(update={"notes": (*answer.notes, *on_what_is_stated([mass], {"load.mass": 1.3}))})
     lines = [line for line in answer_text(warned).splitlines() if line]
     assert lines[1].startswith("WARNING  this number came out more than 4 of its stated deviations")
