@@ -18,12 +18,11 @@ if TYPE_CHECKING:
     from daq.contracts.experiment import ExperimentSpec, Gain
     from daq.contracts.machine import Machine
     from daq.contracts.service.robot import ProcessState
-    from daq.teaching import RecordedPath
     from daq.teaching.program import Program
     from daq.traces.catalogue import TraceSummary
     from daq_cli.app.consent import Consent
     from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotView
-    from daq_cli.robot.pendant import Pendant, StatusLine
+    from daq_cli.robot.pendant import Teaching
 
 
 class RobotAccess(Protocol):
@@ -87,18 +86,8 @@ class RobotAccess(Protocol):
     def program(self, name: Path) -> Program:
         """A taught program: of a file, or one that a service keeps."""
 
-    def jog(
-        self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], consent: Consent, line: StatusLine
-    ) -> None:
-        """Drives joints with the keys; `keep` is given the set points of a posture to be kept."""
-
-    def perform(self, program: Program, consent: Consent) -> str:
-        """Carries out a taught program; how it ended, in one line."""
-
-    def lead(
-        self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None], consent: Consent
-    ) -> None:
-        """Records a path while the arm is led by hand; `keep` is given the path of a stopped lead, too."""
+    def teaching(self, consent: Consent) -> Teaching:
+        """Jogging, programs and leading by hand, one of them at a time."""
 
     def service(self, what: str) -> AbstractContextManager[Robot]:
         """The robot of a service, for what only a service has. Raises SpecError, beginning with `what`, without one."""

@@ -25,10 +25,9 @@ if TYPE_CHECKING:
     from daq.contracts.service.robot import ProcessState
     from daq.contracts.status import StatusReport
     from daq.driver import Controller
-    from daq.teaching import RecordedPath
     from daq.teaching.program import Program
     from daq.traces.catalogue import TraceSummary
-    from daq_cli.robot.pendant import Pendant, StatusLine
+    from daq_cli.robot.pendant import Teaching
 
 SIGNALS = 8
 """Number of process inputs, and of outputs."""
@@ -208,27 +207,11 @@ class LocalRobot:
 
         return load_program(name)
 
-    def jog(
-        self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], consent: Consent, line: StatusLine
-    ) -> None:
+    def teaching(self, consent: Consent) -> Teaching:
         """With the port held by this process."""
-        from daq_cli.robot.local_teaching import jog_locally
+        from daq_cli.robot.local_teaching import LocalTeaching
 
-        jog_locally(self.call, self.machine, pendant, keep, consent, line)
-
-    def perform(self, program: Program, consent: Consent) -> str:
-        """With the port held by this process."""
-        from daq_cli.robot.local_teaching import perform_locally
-
-        return perform_locally(self.call, self.machine, program, consent)
-
-    def lead(
-        self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None], consent: Consent
-    ) -> None:
-        """With the port held by this process."""
-        from daq_cli.robot.local_teaching import lead_locally
-
-        lead_locally(self.call, self.machine, joints, seconds, keep, consent)
+        return LocalTeaching(self.call, self.machine, consent)
 
     def service(self, what: str) -> AbstractContextManager[Robot]:
         """Raises SpecError: there is no service."""

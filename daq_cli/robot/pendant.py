@@ -1,14 +1,21 @@
-"""The meaning of the keys of `daq teach jog`, and the line that shows which joint they drive and how fast."""
+"""What teaching shares on both sides: its operations, the keys of `daq teach jog`, and what the terminal shows."""
 
 from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from daq.teaching.jog import JOG_SPEED, JogCommand, top_speed
+from daq_cli.app.context import console
 from daq_cli.app.keyboard import LEFT, RIGHT
+
+if TYPE_CHECKING:
+    from daq.teaching import RecordedPath
+    from daq.teaching.program import Program
 
 HELP = "1-6 joint   ← → drive while held   + - speed   o c gripper   p keep this posture   q end   Ctrl-C stop"
 FASTER, SLOWER = 1.25, 0.8
@@ -85,3 +92,21 @@ class StatusLine:
         if self._shown:
             print(file=sys.stderr)
             self._shown = ""
+
+
+def announce_lead(seconds: float | None) -> None:
+    """Says that the arm may be led now, and until when."""
+    console().print("recording: lead the arm" + ("; Enter ends it" if seconds is None else f" for {seconds:g} s"))
+
+
+class Teaching(Protocol):
+    """The arm, to be taught by a person. Ctrl-C stops it. Angles are in rad."""
+
+    def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
+        """Drives joints with the keys; `keep` is given the set points of a posture to be kept."""
+
+    def perform(self, program: Program) -> str:
+        """Carries out a taught program; how it ended, in one line."""
+
+    def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
+        """Records a path while the arm is led by hand; `keep` is given the path of a stopped lead, too."""

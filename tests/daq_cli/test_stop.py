@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import os
 import pty
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 import serial
 
-from daq.acquisition.stop_socket import StopAnswer, StopAttempt, stop_listener
+from daq.acquisition.stop_socket import StopAnswer, stop_listener
 from daq.driver import Controller
 from daq.transport.mock_process import MockProcess
 from tests.daq_cli.board import ask
@@ -120,15 +124,30 @@ def test_a_named_port_goes_before_the_default_service(
     assert daq("--port", port, "reset").code == 0
 
 
+@contextmanager
+def moving_process(answer: StopAnswer) -> Iterator[None]:
+    """A process that moves a robot, and answers one stop."""
+
+    def answer_stop(listener: socket.socket) -> None:
+        connection, _ = listener.accept()
+        with connection:
+            connection.sendall(answer.to_json())
+
+    with stop_listener(answer.robot) as listener:
+        listener.setblocking(True)
+        thread = threading.Thread(target=answer_stop, args=(listener,))
+        thread.start()
+        yield
+        thread.join()
+
+
 @pytest.mark.parametrize("written", ["serial://{device}?baud=9600", "serial://{link}", "serial://{link}?baud=115200"])
-def test_a_port_whose_process_was_asked_is_not_opened_again(
-    daq: CommandLine, monkeypatch: pytest.MonkeyPatch, written: str
-) -> None:
+def test_a_port_whose_process_was_asked_is_not_opened_again(daq: CommandLine, written: str) -> None:
     device, link = Path("device").absolute(), Path("link").absolute()
     device.touch()
     link.symlink_to(device)
     answer = StopAnswer(robot="arm", port=f"serial://{device}", delivered=True, confirmed=True, tick=7)
-    monkeypatch.setattr("daq_cli.app.early_stop._asked", [StopAttempt(Path("arm-1.sock"), answer, 0.0)])
-    said = daq("--port", written.format(device=device, link=link), "stop")
+    with moving_process(answer):
+        said = daq("--port", written.format(device=device, link=link), "stop")
     assert said.code == 0, said
     assert said.out == "arm: stopped, confirmed by the board: set points frozen at tick 7\n"

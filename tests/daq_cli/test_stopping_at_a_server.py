@@ -25,7 +25,7 @@ from daq_cli.app.consent import Consent
 from daq_cli.robot.remote import companion
 from daq_cli.robot.remote.companion import Companion
 from daq_cli.robot.remote.run import acquire_remotely
-from daq_cli.robot.remote.teach import Stopped, StoppedAtServerError, lead_at_server, perform_at_server
+from daq_cli.robot.remote.teach import RemoteTeaching, Stopped, StoppedAtServerError
 from tests.daq.client.service_stand_in import problem
 from tests.daq_cli.invoke import CommandLine
 
@@ -221,7 +221,7 @@ def control() -> Control:
 def test_a_program_that_ends_while_the_stop_is_in_flight(control: Control, capsys: pytest.CaptureFixture[str]) -> None:
     control.perform = lambda _: signal.raise_signal(signal.SIGINT)
     with pytest.raises(StoppedAtServerError):
-        perform_at_server(control.held(), PROGRAM)
+        RemoteTeaching(control.held()).perform(PROGRAM)
     assert control.robot.stops == 1
     assert capsys.readouterr().out == ""
 
@@ -244,7 +244,7 @@ def test_a_lead_that_is_stopped_keeps_its_path(control: Control, finish: Service
     control.lead = lambda _: signal.raise_signal(signal.SIGINT)
     control.finish = end
     with pytest.raises(StoppedAtServerError):
-        lead_at_server(control.held(), (1,), 60.0, kept.append)
+        RemoteTeaching(control.held()).lead((1,), 60.0, kept.append)
     assert [one.joints for one in kept] == [(1,)]
 
 

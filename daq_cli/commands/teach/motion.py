@@ -54,7 +54,7 @@ def jog(
         line.tell(f"posture {len(kept)} kept")
 
     try:
-        robot.jog(pendant, keep, Consent(yes), line)
+        robot.teaching(Consent(yes)).jog(pendant, keep, line)
     finally:
         line.close()
         if program is not None and kept:
@@ -89,7 +89,7 @@ def step(
         where = ".".join(map(str, first["loc"]))
         raise SpecError(f"step: {where} = {first['input']:.5g} rad or rad/s: {first['msg']}") from error
     program = Program(name="step", machine=robot.machine.name, instructions=(instruction,))
-    print(robot.perform(program, Consent(yes)))
+    print(robot.teaching(Consent(yes)).perform(program))
 
 
 @app.command("program")
@@ -102,7 +102,8 @@ def run_file(
 ) -> None:
     """Carry out a taught program: steps, paths, waits, process signals."""
     robot = robot_of(context)
-    print(robot.perform(robot.program(file), Consent(yes)))
+    program = robot.program(file)
+    print(robot.teaching(Consent(yes)).perform(program))
 
 
 @app.command()
@@ -138,7 +139,7 @@ def lead(
         save_path(path, output)
         print(f"{output}: {path.duration:.2f} s on joints {', '.join(map(str, path.joints))}")
 
-    robot_of(context).lead(led, seconds, keep, Consent(yes))
+    robot_of(context).teaching(Consent(yes)).lead(led, seconds, keep)
 
 
 @app.command()

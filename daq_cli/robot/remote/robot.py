@@ -22,10 +22,9 @@ if TYPE_CHECKING:
     from daq.contracts.experiment import ExperimentSpec, Gain
     from daq.contracts.machine import Machine
     from daq.contracts.service.robot import ProcessState, RobotStatus
-    from daq.teaching import RecordedPath
     from daq.teaching.program import Program
     from daq.traces.catalogue import TraceSummary
-    from daq_cli.robot.pendant import Pendant, StatusLine
+    from daq_cli.robot.pendant import Teaching
 
 
 @dataclass
@@ -139,27 +138,11 @@ class RemoteRobot:
         with remote_robot(self.call) as robot:
             return kept_program(robot, str(name))
 
-    def jog(
-        self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], consent: Consent, line: StatusLine
-    ) -> None:
-        """With the control of the robot. Raises StoppedAtServerError after Ctrl-C."""
-        from daq_cli.robot.remote.teach import jog_at_server
+    def teaching(self, consent: Consent) -> Teaching:
+        """With the control of the service's robot."""
+        from daq_cli.robot.remote.teach import RemoteTeaching
 
-        jog_at_server(controlled(self.call, consent), pendant, keep, line)
-
-    def perform(self, program: Program, consent: Consent) -> str:
-        """With the control of the robot. Raises SafetyError, StoppedAtServerError."""
-        from daq_cli.robot.remote.teach import perform_at_server
-
-        return perform_at_server(controlled(self.call, consent), program)
-
-    def lead(
-        self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None], consent: Consent
-    ) -> None:
-        """With the control of the robot. Raises SafetyError, StoppedAtServerError."""
-        from daq_cli.robot.remote.teach import lead_at_server
-
-        lead_at_server(controlled(self.call, consent), joints, seconds, keep)
+        return RemoteTeaching(controlled(self.call, consent))
 
     def service(self, what: str) -> AbstractContextManager[Robot]:
         """The service's robot, connected to for the block."""

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -15,15 +16,14 @@ from daq.contracts.errors import DaqError, SafetyError
 from daq_cli.app.context import console
 from daq_cli.app.keyboard import open_keyboard
 from daq_cli.app.stop_keys import StopKeys, StopThread
-from daq_cli.robot.pendant import HELP, Pendant, StatusLine
+from daq_cli.robot.pendant import HELP, Pendant, StatusLine, announce_lead
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel
-
     from daq.client import HeldControl, Robot
     from daq.contracts.service.robot import StopResult
     from daq.contracts.service.teaching import TeachingStatus
     from daq.teaching import RecordedPath
+    from daq.teaching.program import Program
 
     Controlled = AbstractContextManager[tuple[Robot, HeldControl]]
 
@@ -86,69 +86,61 @@ class Stopped(StopThread):
             raise StoppedAtServerError(self.result.text)
 
 
-def jog_at_server(
-    held: Controlled, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine
-) -> None:
-    """Drives joints with the keys; `keep` is given the set points (rad) of a posture to be kept.
+@dataclass(frozen=True)
+class RemoteTeaching:
+    """`Teaching` with the control of a service's robot. Raises StoppedAtServerError after Ctrl-C."""
 
-    Each press drives for 0.3 s at most, so that the arm holds when the line is lost.
+    held: Controlled
 
-    Raises StoppedAtServerError after Ctrl-C, and what the service refuses.
-    """
-    with open_keyboard() as keyboard, taught(held) as (robot, control, stopped):
-        line.tell(HELP)
-        while not pendant.ended:
+    def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
+        """Each press drives for 0.3 s at most, so that the arm holds when the connection is lost."""
+        with open_keyboard() as keyboard, taught(self.held) as (robot, control, stopped):
+            line.tell(HELP)
+            while not pendant.ended:
+                stopped.raise_if_answered()
+                typed = keyboard.pressed()
+                now = time.monotonic()
+                command = pendant.command(typed, now)
+                if command is not None and command.time == now:  # said just now: an older one is not repeated
+                    control.jog(command.velocities)
+                if pendant.gripper is not None:
+                    control.set_gripper(closed=pendant.gripper)
+                    pendant.gripper = None
+                if pendant.keep and (sample := robot.status().sample) is not None:
+                    pendant.keep = False
+                    keep(dict(zip(sample.joints, sample.set_point, strict=True)))
+                line.show(pendant)
+                time.sleep(KEYS_EVERY)
+            control.finish()
+
+    def perform(self, program: Program) -> str:
+        """The program, planned and checked by the service."""
+        with taught(self.held) as (robot, control, stopped):
+            before = _newest(robot.teaching())
+            control.perform(program)
+            ended = _end_of(robot, control, stopped, before)
+        return ended.result
+
+    def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
+        """Until `seconds` are over, or Enter is pressed."""
+        from daq.teaching import RecordedPath
+
+        with taught(self.held) as (robot, control, stopped):
+            before = robot.teaching().path
+            control.lead(joints)
+            announce_lead(seconds)
+            until = None if seconds is None else time.monotonic() + seconds
+            while not stopped.pressed and robot.teaching().activity == "lead":
+                if until is not None and time.monotonic() >= until:
+                    break
+                if select.select([] if until is not None else [sys.stdin], [], [], LOOK_EVERY)[0]:
+                    break
+            found = _end_of_lead(robot, control, stopped)
+            if found.path is not None and found.path != before:
+                keep(RecordedPath.model_validate(found.path.model_dump()))
             stopped.raise_if_answered()
-            typed = keyboard.pressed()
-            now = time.monotonic()
-            command = pendant.command(typed, now)
-            if command is not None and command.time == now:  # said just now: an older one is not repeated
-                control.jog(command.velocities)
-            if pendant.gripper is not None:
-                control.set_gripper(closed=pendant.gripper)
-                pendant.gripper = None
-            if pendant.keep and (sample := robot.status().sample) is not None:
-                pendant.keep = False
-                keep(dict(zip(sample.joints, sample.set_point, strict=True)))
-            line.show(pendant)
-            time.sleep(KEYS_EVERY)
-        control.finish()
-
-
-def perform_at_server(held: Controlled, program: BaseModel) -> str:
-    """Carries out a taught program; how it ended.
-
-    Raises SafetyError, StoppedAtServerError, and what the service refuses.
-    """
-    with taught(held) as (robot, control, stopped):
-        before = _newest(robot.teaching())
-        control.perform(program)
-        ended = _end_of(robot, control, stopped, before)
-    return ended.result
-
-
-def lead_at_server(
-    held: Controlled, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]
-) -> None:
-    """As `daq teach lead`: the path is kept also of a lead that was stopped."""
-    from daq.teaching import RecordedPath
-
-    with taught(held) as (robot, control, stopped):
-        before = robot.teaching().path
-        control.lead(joints)
-        console().print("recording: lead the arm" + ("; Enter ends it" if seconds is None else f" for {seconds:g} s"))
-        until = None if seconds is None else time.monotonic() + seconds
-        while not stopped.pressed and robot.teaching().activity == "lead":
-            if until is not None and time.monotonic() >= until:
-                break
-            if select.select([] if until is not None else [sys.stdin], [], [], LOOK_EVERY)[0]:
-                break
-        found = _end_of_lead(robot, control, stopped)
-        if found.path is not None and found.path != before:
-            keep(RecordedPath.model_validate(found.path.model_dump()))
-        stopped.raise_if_answered()
-        if found.problem:
-            raise SafetyError(found.problem)
+            if found.problem:
+                raise SafetyError(found.problem)
 
 
 def _end_of_lead(robot: Robot, control: HeldControl, stopped: Stopped) -> TeachingStatus:
