@@ -32,7 +32,7 @@ def check_csv(path: Path) -> None:
 
     toml = toml_path(path)
     if toml == path:
-        raise SpecError(f"{path}: a .toml is put beside the CSV, under this very name; name a .csv file")
+        raise SpecError(f"{path}: a .toml of this name is put beside the CSV; name a .csv file")
     if not toml.exists():
         return
     try:
@@ -40,4 +40,4 @@ def check_csv(path: Path) -> None:
     except (SpecError, ValidationError):
         found = Beside()
     if not found.model_fields_set >= WRITTEN:
-        raise SpecError(f"{path}: {toml} would be replaced, and is no trace's; give the CSV another name or folder")
+        raise SpecError(f"{path}: {toml} would be replaced, and does not belong to a trace; give the CSV another name or folder")

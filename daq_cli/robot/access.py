@@ -47,16 +47,16 @@ class RobotAccess(Protocol):
         """P, I and D of every joint."""
 
     def set_gains(self, wanted: Mapping[int, Gain], consent: Consent, written: Callable[[int, Gain], None]) -> str:
-        """Writes gains, and calls `written` with what is read back. Returns a line on limp joints, or an empty one."""
+        """Writes gains, and calls `written` with those read back. Returns a line on limp joints, or an empty one."""
 
     def process(self) -> ProcessState:
         """Process inputs and outputs, and the gripper."""
 
     def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: Consent) -> ProcessState:
-        """Switches one process output; what is read back then."""
+        """Switches one process output, and returns what is read back."""
 
     def set_gripper(self, *, closed: bool, while_stopped: bool, consent: Consent) -> ProcessState:
-        """Moves the gripper; what is read back then."""
+        """Moves the gripper, and returns what is read back."""
 
     def stop(self, reached: set[str]) -> list[StopAnswer]:
         """Stops the robot that the command line or the configuration names. Never raises: failures are answers.
@@ -81,19 +81,20 @@ class RobotAccess(Protocol):
         """The file of a trace: by path, number, name or `last`, in `folder`; one of a service is fetched into it."""
 
     def import_trace(self, file: Path, folder: Path | None) -> ImportedTrace:
-        """Takes in a trace of another rig or tool."""
+        """Imports a trace of another rig or tool."""
 
     def program(self, name: Path) -> Program:
-        """A taught program: of a file, or one that a service keeps."""
+        """A taught program, from a file or kept by the service."""
 
     def teaching(self, consent: Consent) -> Teaching:
         """Jogging, programs and leading by hand, one of them at a time."""
 
     def service(self, what: str) -> AbstractContextManager[Robot]:
-        """The robot of a service, for what only a service has. Raises SpecError, beginning with `what`, without one."""
+        """The service's client, for what only a service has. Without a service raises SpecError, which begins with
+        `what`."""
 
     def require_local(self, why: str) -> None:
-        """For what only this computer can do: raises SpecError with this line at a service."""
+        """Called before something that only this computer can do: raises SpecError with the line `why` at a service."""
 
 
 def robot_access(call: Invocation) -> RobotAccess:

@@ -20,7 +20,7 @@ class RobotView:
     report: StatusReport
     headline: str
     gains: Mapping[int, Gain] = field(default_factory=dict)
-    """P, I and D by joint; may be left out where no joint is limp."""
+    """P, I and D by joint; may be empty where no joint is limp."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class ResetDone:
 
 @dataclass(frozen=True)
 class ImportedTrace:
-    """A trace that was taken in: its number, its file where it is kept, and where that is in one line."""
+    """An imported trace: its number, its file, and one line on where it is."""
 
     trace: str
     file: str
@@ -41,7 +41,7 @@ class ImportedTrace:
 
 
 class AcquisitionFailedError(SafetyError):
-    """What was reported in place of a trace, with an exit code of its own."""
+    """An acquisition that left no trace; it has the exit code that was reported."""
 
     def __init__(self, message: str, exit_code: int) -> None:
         super().__init__(message)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How an experiment is to be carried out: the options that every command which runs one has."""
+    """How to carry out an experiment: the options shared by every command that runs one."""
 
     folder: Path | None
     dry_run: bool
@@ -69,7 +69,7 @@ def acquire_complete(
 
 
 def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
-    """Prints what the motion would be, and what speaks against it. Raises SafetyError when something does."""
+    """Prints the planned motion and the limits that it violates. Raises SafetyError when it violates any."""
     from daq.safety import check_plan, unchecked
     from daq.trajectories import plan, start_angles
 
@@ -97,7 +97,7 @@ def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
 
 
 def print_result(finished: Finished) -> None:
-    """The end of a run, for people."""
+    """Prints the result of a run for people."""
     counters = finished.counters
     why = f" — {finished.reason}" if finished.reason else ""
     print(f"{finished.outcome}: {finished.samples} samples, {finished.missing} missing{why}")

@@ -73,7 +73,7 @@ class LocalRobot:
             pass
 
     def view(self) -> RobotView:
-        """As the board answers now."""
+        """The state that the board reports now."""
         from daq.contracts.limp import limp_joints
 
         machine = self.machine
@@ -86,12 +86,12 @@ class LocalRobot:
         return RobotView(report, f"{kind}, tick {board.tick}, {state}; {missed}; link {board.link}", gains)
 
     def gains(self) -> Mapping[int, Gain]:
-        """Read from the board."""
+        """Reads the board."""
         with self._connected() as controller:
             return controller.gains()
 
     def set_gains(self, wanted: Mapping[int, Gain], consent: Consent, written: Callable[[int, Gain], None]) -> str:
-        """Raises SafetyError for a joint off its set point, which would jump there; nothing is written then."""
+        """Raises SafetyError, and writes nothing, for a joint off its set point, which would jump there."""
         from daq.contracts.limp import limp_line, require_no_jump
 
         with self._connected() as controller:
@@ -104,18 +104,18 @@ class LocalRobot:
             return limp_line(controller.gains())
 
     def process(self) -> ProcessState:
-        """Read from the board."""
+        """Reads the board."""
         with self._connected() as controller:
             return _process(controller)
 
     def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: Consent) -> ProcessState:
-        """Raises SafetyError as `_switchable` does."""
+        """Switches and reads back. Raises SafetyError as `_switchable` does."""
         with self._switchable(while_stopped, consent) as controller:
             controller.write_outputs(1 << output, on << output)
             return _process(controller)
 
     def set_gripper(self, *, closed: bool, while_stopped: bool, consent: Consent) -> ProcessState:
-        """Raises SafetyError as `_switchable` does."""
+        """Switches and reads back. Raises SafetyError as `_switchable` does."""
         with self._switchable(while_stopped, consent) as controller:
             controller.set_gripper(closed=closed)
             return _process(controller)
@@ -139,13 +139,13 @@ class LocalRobot:
             yield controller
 
     def stop(self, reached: set[str]) -> list[StopAnswer]:
-        """At the configured port."""
+        """Stops the robot at the configured port."""
         from daq_cli.robot.local_stop import stop_configured
 
         return stop_configured(self.call, reached)
 
     def reset(self, *, here: bool) -> ResetDone:
-        """Raises NotFrozenError."""
+        """Ends the stop that the board is in. Raises NotFrozenError."""
         from daq.contracts.limp import limp_line
         from firmware_protocol.commands import StatusFlag
 
@@ -168,13 +168,13 @@ class LocalRobot:
         return ResetDone(f"released: {holds}{now}", limp)
 
     def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent) -> Finished:
-        """In an acquisition process of its own."""
+        """Runs the experiment in an acquisition process of its own."""
         from daq_cli.robot.local_run import acquire_locally
 
         return acquire_locally(self.call, spec, machine, folder, consent)
 
     def list_traces(self, folder: Path | None) -> tuple[Sequence[TraceSummary], str]:
-        """Of the folder; none where there is no such folder."""
+        """The traces of the folder; none where there is no such folder."""
         from daq.traces.catalogue import list_traces
 
         place = folder or self.call.trace_folder
@@ -187,7 +187,7 @@ class LocalRobot:
         return find_trace(folder, wanted, self.call.trace_limits)
 
     def import_trace(self, file: Path, folder: Path | None) -> ImportedTrace:
-        """Into the folder. Raises SpecError, TraceError."""
+        """Writes the trace into the folder. Raises SpecError, TraceError."""
         from daq.traces.csv_table import import_csv
         from daq.traces.naming import trace_path
         from daq.traces.store import write_trace
@@ -202,13 +202,13 @@ class LocalRobot:
         return ImportedTrace(found.record.trace_id, str(made), str(made))
 
     def program(self, name: Path) -> Program:
-        """Of a file. Raises SpecError."""
+        """A program in a file. Raises SpecError."""
         from daq.teaching.program import load_program
 
         return load_program(name)
 
     def teaching(self, consent: Consent) -> Teaching:
-        """With the port held by this process."""
+        """Teaching with the port held by this process."""
         from daq_cli.robot.local_teaching import LocalTeaching
 
         return LocalTeaching(self.call, self.machine, consent)
@@ -218,7 +218,7 @@ class LocalRobot:
         raise SpecError(f"{what}: only a service has this: `daq --server http://host:8300 {what} …`, or set DAQ_SERVER")
 
     def require_local(self, why: str) -> None:
-        """Nothing to refuse."""
+        """Refuses nothing."""
 
 
 def _require_switchable(controller: Controller, while_stopped: bool) -> None:
@@ -229,7 +229,7 @@ def _require_switchable(controller: Controller, while_stopped: bool) -> None:
 
 
 def _process(controller: Controller) -> ProcessState:
-    """What the board reads back, as a service says it."""
+    """The signals that the board reads back, in the form of a service."""
     from daq.contracts.service.robot import ProcessState
 
     found = controller.process()
@@ -238,7 +238,7 @@ def _process(controller: Controller) -> ProcessState:
 
 
 def _report(call: Invocation, machine: Machine, controller: Controller, limp: list[int]) -> StatusReport:
-    """What the board says now, as a service would say it."""
+    """The state of the board, in the form of a service's status."""
     from daq.contracts.service.robot import LinkStatus, RobotIdentity, Sample
     from daq.contracts.status import StatusReport
     from daq.runner.rows import RowMaker

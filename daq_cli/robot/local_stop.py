@@ -27,7 +27,7 @@ def stop_configured(call: Invocation, reached: set[str]) -> list[StopAnswer]:
 
 
 def _device(url: str) -> object:
-    """The device or address that a port's URL names, however it is written; the text itself where it is no URL."""
+    """The device or address that a port's URL names, whatever its spelling; the text itself where it is no URL."""
     from daq.transport.url import SerialPort, TcpPort, TransportError, parse_port_url
 
     try:

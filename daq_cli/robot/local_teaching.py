@@ -38,7 +38,7 @@ class LocalTeaching:
     consent: Consent
 
     def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
-        """Until the pendant has ended."""
+        """Drives until the pendant has ended."""
         from daq.teaching import jog as jog_arm
 
         with open_keyboard() as keyboard, self._owned(self._arm) as (robot, arm):
@@ -58,7 +58,7 @@ class LocalTeaching:
             jog_arm(arm, self.machine, self.machine.limits, commands, lambda: pendant.ended, line.tell)
 
     def perform(self, program: Program) -> str:
-        """The program is planned and checked from where the arm stands. Raises SafetyError."""
+        """Plans and checks the program from the arm's present posture first. Raises SafetyError."""
         from daq.teaching.performer import FollowingPerformer
         from daq.teaching.program_plan import check_program, plan_program, run_program
 
@@ -80,7 +80,7 @@ class LocalTeaching:
         return f"done: {len(planned)} instructions"
 
     def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
-        """Until `seconds` are over, or Enter is pressed."""
+        """Records until `seconds` are over, or Enter is pressed."""
         from daq.teaching import lead_by_nose
 
         with self._owned(self._arm) as (robot, arm):

@@ -75,7 +75,7 @@ class StatusLine:
         self._shown = ""
 
     def show(self, pendant: Pendant) -> None:
-        """The joint that the keys drive, and how fast."""
+        """Shows the joint that the keys drive, and its speed."""
         line = f"joint {pendant.joint}   {math.degrees(pendant.speed):.1f}°/s"
         if line != self._shown:
             sys.stderr.write(f"\r{line:<{len(self._shown)}}")
@@ -100,13 +100,13 @@ def announce_lead(seconds: float | None) -> None:
 
 
 class Teaching(Protocol):
-    """The arm, to be taught by a person. Ctrl-C stops it. Angles are in rad."""
+    """An arm that a person teaches. Ctrl-C stops it. Angles are in rad."""
 
     def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
         """Drives joints with the keys; `keep` is given the set points of a posture to be kept."""
 
     def perform(self, program: Program) -> str:
-        """Carries out a taught program; how it ended, in one line."""
+        """Carries out a taught program, and returns one line on how it ended."""
 
     def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
         """Records a path while the arm is led by hand; `keep` is given the path of a stopped lead, too."""

@@ -23,13 +23,13 @@ class RunDisplay:
         self._task = bar.add_task(kind, total=1.0, text="connecting")
 
     def progress(self, fraction: float, text: str) -> None:
-        """How far the run is."""
+        """Shows how far the run is."""
         from rich.markup import escape
 
         self._bar.update(self._task, completed=fraction, text=escape(text))
 
     def event(self, kind: str, time: float, message: str) -> None:
-        """An event that is in the trace, too; `time` in s from the start of the record."""
+        """Shows an event of the trace; `time` is in s from the start of the record."""
         from rich.markup import escape
 
         if kind not in self._quiet:

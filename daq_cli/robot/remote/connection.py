@@ -19,7 +19,7 @@ TOKEN_VARIABLE = "DAQ_TOKEN"
 
 @contextmanager
 def remote_robot(call: Invocation) -> Iterator[Robot]:
-    """The robot of `call.server`; a service has one. Raises SpecError, ServiceError, ServiceNotReachedError."""
+    """The client of the robot of `call.server`. Raises SpecError, ServiceError, ServiceNotReachedError."""
     from daq.client import Client
 
     assert call.server is not None

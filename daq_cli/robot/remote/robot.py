@@ -46,7 +46,7 @@ class RemoteRobot:
             connected_status(robot)
 
     def view(self) -> RobotView:
-        """As the service knows it now; an old sample says how old it is."""
+        """The state that the service knows; an old sample has its age with it."""
         from daq.contracts.status import report_of
 
         with remote_robot(self.call) as robot:
@@ -55,7 +55,7 @@ class RemoteRobot:
         return RobotView(report_of(found, self.server), _headline(found), gains)
 
     def gains(self) -> Mapping[int, Gain]:
-        """As the service has read them."""
+        """The gains that the service has read."""
         with remote_robot(self.call) as robot:
             return robot.gains().gains
 
@@ -70,34 +70,34 @@ class RemoteRobot:
         return limp_line(found)
 
     def process(self) -> ProcessState:
-        """As the service reads it now."""
+        """The signals that the service reads now."""
         with remote_robot(self.call) as robot:
             return robot.process()
 
     def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: Consent) -> ProcessState:
-        """With the control of the robot."""
+        """Takes the control of the robot for a moment."""
         with controlled(self.call, consent) as (_, control):
             return control.set_output(output, on=on, while_stopped=while_stopped)
 
     def set_gripper(self, *, closed: bool, while_stopped: bool, consent: Consent) -> ProcessState:
-        """With the control of the robot."""
+        """Takes the control of the robot for a moment."""
         with controlled(self.call, consent) as (_, control):
             return control.set_gripper(closed=closed, while_stopped=while_stopped)
 
     def stop(self, reached: set[str]) -> list[StopAnswer]:
-        """Of the robots at the service."""
+        """Stops the robots of the service."""
         del reached  # those are processes of this computer
         from daq_cli.robot.remote.stop import stop_at_server
 
         return stop_at_server(self.call)
 
     def reset(self, *, here: bool) -> ResetDone:
-        """By the service."""
+        """Has the service end the stop."""
         with remote_robot(self.call) as robot:
             return ResetDone(robot.reset(here=here).text)
 
     def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent) -> Finished:
-        """Through the service's queue."""
+        """Queues the experiment at the service."""
         del machine  # the service has its own
         from daq_cli.robot.remote.run import acquire_remotely
 
@@ -105,7 +105,7 @@ class RemoteRobot:
             return acquire_remotely(robot, self.server, spec, folder, consent)
 
     def list_traces(self, folder: Path | None) -> tuple[Sequence[TraceSummary], str]:
-        """Of the service's catalogue."""
+        """The traces of the service's catalogue."""
         del folder
         from daq_cli.robot.remote.traces import summary
 
@@ -113,7 +113,7 @@ class RemoteRobot:
             return [summary(entry) for entry in robot.traces.list()][::-1], self.server
 
     def find_trace(self, folder: Path, wanted: str) -> Path:
-        """A file of this computer, else the service's trace, fetched. Raises TraceError."""
+        """A file of this computer, else a trace of the service, which is fetched. Raises TraceError."""
         if Path(wanted).is_file():
             from daq.traces.catalogue import find_trace
 
@@ -123,14 +123,14 @@ class RemoteRobot:
         return fetched_trace(self.call, folder, wanted)
 
     def import_trace(self, file: Path, folder: Path | None) -> ImportedTrace:
-        """Sent to the service, which has a folder of its own."""
+        """Sends the file to the service, which has a folder of its own."""
         del folder
         with remote_robot(self.call) as robot:
             entry = robot.traces.upload(file)
         return ImportedTrace(entry.id, entry.file, f"{entry.id}: {entry.file} at {self.server}")
 
     def program(self, name: Path) -> Program:
-        """Of a file of this computer, else one that the service keeps. Raises SpecError."""
+        """A program in a file of this computer, else one that the service keeps. Raises SpecError."""
         from daq.teaching.program import load_program
 
         if name.exists():
@@ -139,13 +139,13 @@ class RemoteRobot:
             return kept_program(robot, str(name))
 
     def teaching(self, consent: Consent) -> Teaching:
-        """With the control of the service's robot."""
+        """Teaching with the control of the service's robot."""
         from daq_cli.robot.remote.teach import RemoteTeaching
 
         return RemoteTeaching(controlled(self.call, consent))
 
     def service(self, what: str) -> AbstractContextManager[Robot]:
-        """The service's robot, connected to for the block."""
+        """The client of the service's robot."""
         del what
         return remote_robot(self.call)
 

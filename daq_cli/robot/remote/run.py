@@ -30,10 +30,10 @@ EXIT_CODES = {
     "interrupted": exit_codes.NOT_REACHED,
 }
 """Exit code by the state of an experiment that has left no trace."""
-LOOK_EVERY = 2.0
-"""s without news after which the experiment is looked at."""
-LOOKS_IN_VAIN = 5
-"""After so many the service counts as lost."""
+POLL_EVERY = 2.0
+"""s without a message after which the experiment is polled."""
+FAILED_POLLS = 5
+"""Failed polls after which the service counts as lost."""
 
 
 def acquire_remotely(robot: Robot, server: str, spec: ExperimentSpec, folder: Path, consent: Consent) -> Finished:
@@ -68,7 +68,7 @@ def _require_open_queue(server: str, status: RobotStatus) -> None:
 
 
 class _Follower:
-    """Follows one experiment through the stream; through questions alone when the stream is lost."""
+    """Follows one experiment through the live stream, or by polling when the stream is lost."""
 
     def __init__(self, robot: Robot, experiment: str, display: RunDisplay) -> None:
         self._robot = robot
@@ -77,17 +77,17 @@ class _Follower:
         self._record_ended = False
 
     def follow(self, stream: LiveStream) -> Experiment:
-        """To its end. Raises AcquisitionFailedError when the service is lost meanwhile."""
+        """Waits for the end of the experiment. Raises AcquisitionFailedError when the service is lost meanwhile."""
         ended: Experiment | None = None
         try:
             while ended is None:
-                frame = stream.next_frame(LOOK_EVERY)
+                frame = stream.next_frame(POLL_EVERY)
                 news = [self._is_news(message) for message in frame.messages] if frame is not None else [True]
                 if any(news):
                     ended = self._look(0)
             while ended.outcome is not None and not self._record_ended:
                 # The end was asked for, and was quicker than what is still on its way.
-                if (frame := stream.next_frame(LOOK_EVERY)) is None:
+                if (frame := stream.next_frame(POLL_EVERY)) is None:
                     break
                 for message in frame.messages:
                     self._is_news(message)
@@ -96,26 +96,26 @@ class _Follower:
         return ended
 
     def _ask_until_ended(self) -> Experiment:
-        for attempt in range(LOOKS_IN_VAIN):
+        for attempt in range(FAILED_POLLS):
             try:
                 while True:
-                    if (ended := self._look(LOOK_EVERY)) is not None:
+                    if (ended := self._look(POLL_EVERY)) is not None:
                         return ended
             except ServiceNotReachedError as error:
-                if attempt == LOOKS_IN_VAIN - 1:
+                if attempt == FAILED_POLLS - 1:
                     line = f"{error}; experiment {self._experiment} is the service's now, and so is its trace"
                     raise AcquisitionFailedError(line, error.exit_code) from error
         raise AssertionError("the last attempt returns or raises")
 
     def _look(self, wait: float) -> Experiment | None:
-        """The experiment when it has ended."""
+        """The experiment if it has ended, else None."""
         found = self._robot.experiments.get(self._experiment, wait)
         if found.progress is not None:
             self._display.progress(found.progress, found.progress_text)
         return found if found.state in ENDS else None
 
     def _is_news(self, message: LiveMessage) -> bool:
-        """Shows what is to be shown; whether the experiment's state has changed."""
+        """Shows progress and events; returns whether the experiment's state has changed."""
         match message:
             case EventMessage():
                 return message.event.experiment == self._experiment

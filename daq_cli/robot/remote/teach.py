@@ -76,7 +76,7 @@ class Stopped(StopThread):
             self.result = self._robot.stop()
 
     def wait_for_answer(self) -> None:
-        """Where a key has been pressed: until it is known what became of the stop."""
+        """After a key has been pressed, waits until it is known what became of the stop."""
         if self.pressed:
             self._thread.join()
 
@@ -114,7 +114,7 @@ class RemoteTeaching:
             control.finish()
 
     def perform(self, program: Program) -> str:
-        """The program, planned and checked by the service."""
+        """Has the service plan, check and carry out the program."""
         with taught(self.held) as (robot, control, stopped):
             before = _newest(robot.teaching())
             control.perform(program)
@@ -122,7 +122,7 @@ class RemoteTeaching:
         return ended.result
 
     def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
-        """Until `seconds` are over, or Enter is pressed."""
+        """Records until `seconds` are over, or Enter is pressed."""
         from daq.teaching import RecordedPath
 
         with taught(self.held) as (robot, control, stopped):
@@ -173,5 +173,5 @@ def _end_of(robot: Robot, control: HeldControl, stopped: Stopped, shown: int) ->
 
 
 def _newest(status: TeachingStatus) -> int:
-    """Number of the newest line that the service has about the teaching."""
+    """Number of the newest line that the service has shown about the teaching."""
     return max((line.number for line in status.lines), default=0)
