@@ -1,4 +1,4 @@
-"""`daq design`: experiments that make a model's parameters best known, and what a proposed one would add."""
+"""`daq design`: experiments that determine a model's parameters best, and what a given one would add."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def design(
     effect_file: EffectFileOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Propose experiments within the machine's limits that make chosen parameters best known (D-optimal).
+    """Propose experiments within the machine's limits that determine chosen parameters best (D-optimal).
 
     Nothing is run: `daq run spec FILE` runs a proposed experiment.
     """

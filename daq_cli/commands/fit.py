@@ -58,8 +58,10 @@ def fit(
     context: typer.Context,
     traces: TracesArgument,
     out: Annotated[Path, OutOption],
-    model: Annotated[str | None, typer.Option(help=f"Begin from this one. {MODEL_HELP}")] = None,
-    machine: Annotated[str | None, typer.Option(help="Machine file or name (default: the traces').")] = None,
+    model: Annotated[str | None, typer.Option(help=f"The model to start from. {MODEL_HELP}")] = None,
+    machine: Annotated[
+        str | None, typer.Option(help="Machine file or name of a machine (default: that of the traces).")
+    ] = None,
     effects: EffectsOption = None,
     effect_file: EffectFileOption = None,
     parameters: ParametersOption = None,
@@ -73,7 +75,8 @@ def fit(
         bool, typer.Option("--no-priors", help="Fit without the expected deviations of the parameters.")
     ] = False,
     method: Annotated[
-        Literal["least_squares", "nelder_mead"], typer.Option(help="nelder_mead is the source's hill climbing.")
+        Literal["least_squares", "nelder_mead"],
+        typer.Option(help="nelder_mead is the hill climbing of the 1991 source."),
     ] = "least_squares",
     starts: Annotated[int, typer.Option(min=1, max=100, help="Number of fits from different starting values.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the starting values.")] = 0,

@@ -47,36 +47,36 @@ _IN_SHORT = {
     "pick-and-place": "4-3-4: lifted off, over, and set down.",
 }
 _HELP = {
-    "duration": "Seconds.",
-    "period": "Seconds.",
-    "dwell": "Seconds on each step.",
+    "duration": "Duration of the motion in s.",
+    "period": "Period of the sine in s.",
+    "dwell": "Time on each step in s.",
     "steps": "Number of steps one way.",
     "back": "Go down again afterwards.",
-    "reversals": "Changes of direction.",
-    "cycles": "Periods of the sine.",
+    "reversals": "Number of changes of direction.",
+    "cycles": "Number of periods of the sine.",
     "lowest": "Lowest frequency in Hz.",
     "highest": "Highest frequency in Hz.",
     "tones": "Number of sines.",
     "seed": "Seed of the phases.",
-    "lift": "Metres of the lift-off and set-down points above the ends.",
-    "pick": "Seconds up to the lift-off point.",
-    "travel": "Seconds from the lift-off to the set-down point.",
-    "place": "Seconds down from the set-down point.",
+    "lift": "Height of the lift-off and set-down points above the ends in m.",
+    "pick": "Time up to the lift-off point in s.",
+    "travel": "Time from the lift-off to the set-down point in s.",
+    "place": "Time down from the set-down point in s.",
 }
 _ANGLES = {"phase": "degrees", "speed": "degrees/s"}
 
 JointsOption = Annotated[str, typer.Option(help="Joints that move: 1-3, 1,3 or 2.", autocompletion=completion.joints)]
 StartOption = Annotated[str | None, typer.Option(help="Start angles, such as 1=180,2=45 (degrees).")]
 GainsOption = Annotated[str | None, typer.Option(help="Gains P/I/D, such as 1=2/0/0,2=2/0/0 (each 0-20).")]
-SettleOption = Annotated[float, typer.Option(help="Seconds held before the motion, recorded.")]
-HoldOption = Annotated[float, typer.Option(help="Seconds held after the motion, recorded.")]
+SettleOption = Annotated[float, typer.Option(help="Time at rest before the motion in s, recorded.")]
+HoldOption = Annotated[float, typer.Option(help="Time at rest after the motion in s, recorded.")]
 RepeatsOption = Annotated[int, typer.Option(help="Number of times that the motion is made.")]
 RecordOption = Annotated[str | None, typer.Option(help="Joints to record (default: as many as the line has room for).")]
 NameOption = Annotated[str | None, typer.Option(help="A name for the experiment.")]
 OperatorOption = Annotated[str | None, typer.Option(help="Who runs it.")]
-NotesOption = Annotated[str, typer.Option(help="Anything worth knowing later.")]
+NotesOption = Annotated[str, typer.Option(help="Remarks that are kept with the trace.")]
 FolderOption = Annotated[Path | None, typer.Option(help="Folder for the trace (default: the configured one).")]
-DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Check and show the motion; connect to nothing.")]
+DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Only check and show the motion; connect to nothing.")]
 
 COMMON: dict[str, tuple[Any, Any]] = {
     "joints": (JointsOption, "1-3"),
@@ -106,14 +106,14 @@ def _option(name: str, field: FieldInfo) -> tuple[Any, Any]:
             str, typer.Option(help="Amplitude in degrees, or one for each joint: 1=21.6,2=-10.")
         ], f"{_degrees(default)}"
     if name == "points":
-        text = "Degrees from the start, a point after the other: 10;20 or, one a joint, 1=10,2=5;1=20,2=0."
+        text = "Points in degrees from the start, one after the other: 10;20 or, for each joint, 1=10,2=5;1=20,2=0."
         return Annotated[str, typer.Option(help=text)], inspect.Parameter.empty
     if name == "times":
         return Annotated[
-            str, typer.Option(help="Seconds at which the points are passed: 1,2.5.")
+            str, typer.Option(help="Times in s at which the points are passed: 1,2.5.")
         ], inspect.Parameter.empty
     if name in _ANGLES:
-        return Annotated[str, typer.Option(help=f"In {_ANGLES[name]}.")], f"{_degrees(default)}"
+        return Annotated[str, typer.Option(help=f"{name.capitalize()} in {_ANGLES[name]}.")], f"{_degrees(default)}"
     kind = field.annotation
     if NoneType in get_args(kind):
         raise TypeError(f"trajectory field {name}: optional fields have no option")

@@ -22,8 +22,8 @@ def stop(context: typer.Context, json: JsonOption = False) -> None:
 
     With --server this stops the robots of that service; with DAQ_SERVER, those and the ones that are moved from here.
 
-    Ends with 0 when every stop was confirmed by its board, with 3 when one was NOT DELIVERED or NOT CONFIRMED, or there
-    was no robot. A program's stop never replaces the hardware's own.
+    The exit code is 0 when every stop was confirmed by its board, and 3 when one was NOT DELIVERED or NOT CONFIRMED, or
+    there was no robot. A program's stop never replaces the hardware's own.
     """
     from daq_cli.app import early_stop
 

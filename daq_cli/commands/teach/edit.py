@@ -21,9 +21,9 @@ NumberArgument = Annotated[int, typer.Argument(help="Number of the instruction, 
 ToOption = Annotated[str | None, typer.Option(help="Absolute angles, such as 1=180,2=45 (degrees).")]
 ByOption = Annotated[str | None, typer.Option(help="Relative angles, such as 2=-5 (degrees).")]
 SpeedOption = Annotated[str | None, typer.Option(help="Speed of the fastest joint in degrees/s.")]
-WaitOption = Annotated[float | None, typer.Option(help="Seconds without motion.")]
+WaitOption = Annotated[float | None, typer.Option(help="Pause in s.")]
 OutputOption = Annotated[str | None, typer.Option(help="A process output to switch: 3=on or 3=off.")]
-GripperOption = Annotated[str | None, typer.Option(help="open or close.")]
+GripperOption = Annotated[str | None, typer.Option(help="Move the gripper: open or close.")]
 
 
 @app.command("list")
@@ -94,7 +94,7 @@ def change(
     rate: Annotated[
         float | None, typer.Option(help="Speed of a path, as a multiple of that at which it was led.")
     ] = None,
-    longest: Annotated[float | None, typer.Option(help="Seconds after which waiting for an input fails.")] = None,
+    longest: Annotated[float | None, typer.Option(help="Time in s after which waiting for an input fails.")] = None,
 ) -> None:
     """Change speed, posture, pause or rate of an instruction."""
     from daq.teaching import editing

@@ -148,7 +148,9 @@ def play(
     file: Annotated[Path, typer.Argument(help="A path recorded by `daq teach lead`.")],
     rate: Annotated[float, typer.Option(help="Speed of the path, as a multiple of that at which it was led.")] = 1.0,
     folder: Annotated[Path | None, typer.Option(help="Folder for the trace (default: the configured one).")] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Check and show the motion; connect to nothing.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only check and show the motion; connect to nothing.")
+    ] = False,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
