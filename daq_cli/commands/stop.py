@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from daq.contracts import exit_codes
-from daq_cli.app.context import JsonOption, print_json
+from daq_cli.app.context import JsonOption, invocation, print_json
 from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
@@ -27,9 +27,9 @@ def stop(context: typer.Context, json: JsonOption = False) -> None:
     """
     from daq_cli.app import early_stop
 
-    robot = robot_of(context)
-    answers = [_answer(attempt) for attempt in early_stop.attempts()] if robot.call.stops_here else []
-    answers += robot.stop({answer.port for answer in answers})
+    here = invocation(context).stops_here
+    answers = [_answer(attempt) for attempt in early_stop.attempts()] if here else []
+    answers += robot_of(context).stop({answer.port for answer in answers})
     if json:
         print_json([answer.as_data() for answer in answers])
     elif not answers:
