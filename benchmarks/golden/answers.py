@@ -7,11 +7,11 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-TIMES = frozenset({"seconds", "created", "duration_s", "age", "time_s", "software", "elapsed"})
+TIMES = frozenset({"seconds", "created", "duration_s", "age", "time_s", "software", "elapsed", "utc"})
 PROSE = frozenset(
     {"description", "summary", "title", "reason", "note", "notes", "text", "rejected_because", "why", "words"}
 )
-RANDOM = re.compile(r"\b([0-9a-f]{6,64}|\d{4}-\d\d-\d\dT[0-9:.\-]+Z?)\b|/\S+/")
+RANDOM = re.compile(r"\b([0-9a-f]{6,64}|\d{4}-\d\d-\d\dT[0-9:.\-]+Z?)\b|\S+\.mcap|/\S+/")
 
 Leaf = str | int | float | bool | None
 

@@ -233,7 +233,6 @@ def _small(place: Path) -> list[Question]:
     mock = ("--port", "mock://?lock_step=1")
     return [
         Question("small/status", (*mock, "status", "--json")),
-        Question("small/gains", (*mock, "gains", "--json")),
         Question("small/run-dry", (*mock, "run", "ramp", "--joints", "1-3", "--dry-run", "--json")),
         Question(
             "small/run",
