@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from daq.contracts.machine import Machine, load_machine
-from daq_cli.commands.compare import _tell
+from daq_cli.commands.compare import _print_result
 from daq_cli.commands.validate import _print_in_time
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.comparison.compare import Comparison
@@ -76,7 +76,7 @@ def test_a_comparison_is_in_the_squares_of_its_joints_units(
     capsys: pytest.CaptureFixture[str], units: tuple[str, ...], said: str
 ) -> None:
     model = agreement(*units)
-    _tell([model], (), as_json=False)
+    _print_result([model], (), as_json=False)
     assert f"in sample {said}\n" in capsys.readouterr().out
     report = comparison_report(Comparison((model,), ()))
     assert f"mean squared error {said} summed" in report.answer

@@ -200,4 +200,4 @@ def test_the_command_line_keeps_lists_fetches_runs_and_deletes(
     assert daq(*at, "programs", "delete", "waits").code == 0
     daq(*at, "program", "waits").complains(2, "there is no program 'waits'")
     daq(*at, "program", "no such").complains(2, "there is no such file")
-    daq("teach", "programs", "ls").complains(2, "a service keeps them")
+    daq("teach", "programs", "ls").complains(2, "a service has")

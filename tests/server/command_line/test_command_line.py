@@ -197,7 +197,7 @@ def test_wrong_addresses_are_one_line(here: CommandLine) -> None:
         (["--server", "arm.lab", "status"], 2, "write http://host:port"),
         (["--server", "http://127.0.0.1:1", "status"], 3, "not reached"),
         (["--server", "http://x", "--port", "mock://", "status"], 2, "give one of them"),
-        (["queue", "show"], 2, "a service has it"),
+        (["queue", "show"], 2, "a service has"),
     ):
         here(*words).complains(code, told)
 

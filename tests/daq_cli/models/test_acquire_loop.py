@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -13,8 +14,10 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Outcome, Trace
 from daq.traces.reader import read_trace
+from daq_cli.app.consent import Consent
 from daq_cli.app.context import Invocation
-from daq_cli.models.diagnose_acquire import Ended, acquired
+from daq_cli.models.acquire_loop import Diagnose, LoopEnd, diagnose_and_acquire
+from daq_cli.robot.local import LocalRobot
 from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment
 from model.discrepancy.experiment_design.next_experiment import Asker, Planner
 from model.machine_model.model import base_model
@@ -39,11 +42,25 @@ def ramp(made: dict[str, Path], daq: CommandLine, tmp_path_factory: pytest.TempP
     return made["ramp"]
 
 
-def test_what_is_asked_for_is_run_within_the_budget_and_used(daq: CommandLine, ramp: Path, tmp_path: Path) -> None:
+def test_an_experiment_that_is_asked_for_is_run_within_the_budget_and_used(
+    daq: CommandLine, ramp: Path, tmp_path: Path
+) -> None:
     said = daq(
-        "--port", PORT, "diagnose", ramp, "--acquire", "--budget", "12", "--effects", "coulomb", "--joints", "2",
-        "--folder", tmp_path, "--json",
-    )  # fmt: skip
+        "--port",
+        PORT,
+        "diagnose",
+        ramp,
+        "--acquire",
+        "--budget",
+        "12",
+        "--effects",
+        "coulomb",
+        "--joints",
+        "2",
+        "--folder",
+        tmp_path,
+        "--json",
+    )
     assert said.code == 0, said.err
     found = Diagnosis.model_validate(json.loads(said.out))
     assert len(found.acquired) == 1
@@ -63,47 +80,60 @@ class Answers:
         self.given: list[tuple[int, float | None]] = []
         self.plans: list[Planner] = []
 
-    def __call__(self, traces: list[Trace], ask: Asker) -> Diagnosis:
+    def __call__(self, traces: Sequence[Trace], ask: Asker) -> Diagnosis:
         self.given.append((len(traces), ask.budget))
         self.plans.append(ask.plan)
         model = base_model(load_machine("ma2000"))
         asked = NextExperiment(
-            name="ramp", spec=ExperimentSpec(name="ramp"), duration=self.duration, separates=("a", "b"),
-            predicted_separation=4.0, reason="a ramp: a and b would differ",
-        )  # fmt: skip
+            name="ramp",
+            spec=ExperimentSpec(name="ramp"),
+            duration=self.duration,
+            separates=("a", "b"),
+            predicted_separation=4.0,
+            reason="a ramp: a and b would differ",
+        )
         return Diagnosis(
-            verdict="ambiguous", summary="a or b", steps=(), model_before=model, model_after=model, traces=(),
-            next_experiment=asked, seconds=0.0, robot_seconds=0.0,
-        )  # fmt: skip
+            verdict="ambiguous",
+            summary="a or b",
+            steps=(),
+            model_before=model,
+            model_after=model,
+            traces=(),
+            next_experiment=asked,
+            seconds=0.0,
+            robot_seconds=0.0,
+        )
 
 
-@pytest.fixture
-def moved() -> list[Machine]:
-    """The machines that the runs were for."""
-    return []
+class Arm(LocalRobot):
+    """A robot whose every run gives the same trace, and ends as the test says."""
+
+    def __init__(self, trace: Path, *outcomes: Outcome) -> None:
+        super().__init__(Invocation(port_option=PORT))
+        self.outcomes = list(outcomes)
+        self.trace = trace
+        self.moved: list[Machine] = []
+        """The machines that the runs were for."""
+
+    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent) -> Finished:
+        self.moved.append(machine)
+        samples = len(read_trace(self.trace))
+        return Finished(
+            trace=self.trace, outcome=self.outcomes.pop(0), reason="", samples=samples, missing=0, counters={}
+        )
 
 
-@pytest.fixture
-def outcomes(ramp: Path, moved: list[Machine], monkeypatch: pytest.MonkeyPatch) -> list[Outcome]:
-    """How the runs to come end; every one gives the same trace."""
-    ends: list[Outcome] = []
-
-    def run(_call: object, _spec: object, machine: Machine, *_: object) -> Finished:
-        moved.append(machine)
-        samples = len(read_trace(ramp))
-        return Finished(trace=ramp, outcome=ends.pop(0), reason="", samples=samples, missing=0, counters={})
-
-    monkeypatch.setattr("daq_cli.models.diagnose_acquire.acquire", run)
-    return ends
+def loop(arm: LocalRobot, traces: list[Trace], budget: float, diagnose: Diagnose) -> LoopEnd:
+    """The loop on traces of the shipped machine."""
+    machine = load_machine("ma2000")
+    return diagnose_and_acquire(arm, machine, traces, None, budget, Consent(given=False), diagnose)
 
 
-def test_the_robot_time_that_is_left_bounds_what_is_asked(outcomes: list[Outcome], ramp: Path) -> None:
+def test_remaining_robot_time_limits_further_experiments(ramp: Path) -> None:
     trace = read_trace(ramp)
     duration = float(trace.time[-1] - trace.time[0])
-    outcomes += ["complete"] * 9
     answers = Answers(duration)
-    call = Invocation(port_option=PORT)
-    ended = acquired(call, load_machine("ma2000"), [trace], None, 2.5 * duration, False, answers)
+    ended = loop(Arm(ramp, *["complete"] * 9), [trace], 2.5 * duration, answers)
     found, every = ended.found, ended.traces
     assert ended.failure is None
     assert len(found.acquired) == 2
@@ -112,11 +142,9 @@ def test_the_robot_time_that_is_left_bounds_what_is_asked(outcomes: list[Outcome
     assert [left for _, left in answers.given] == pytest.approx([2.5 * duration, 1.5 * duration, 0.5 * duration])
 
 
-def test_a_run_that_is_stopped_ends_it_and_is_not_used(outcomes: list[Outcome], ramp: Path) -> None:
-    outcomes += ["stopped"]
+def test_a_stopped_run_ends_the_loop_and_is_not_used(ramp: Path) -> None:
     answers = Answers(3.0)
-    call = Invocation(port_option=PORT)
-    ended = acquired(call, load_machine("ma2000"), [read_trace(ramp)], None, 60.0, False, answers)
+    ended = loop(Arm(ramp, "stopped"), [read_trace(ramp)], 60.0, answers)
     assert [run.outcome for run in ended.found.acquired] == ["stopped"]
     assert len(ended.traces) == len(answers.given) == 1
 
@@ -124,18 +152,15 @@ def test_a_run_that_is_stopped_ends_it_and_is_not_used(outcomes: list[Outcome], 
 def test_another_machine_than_the_configured_one_is_refused(ramp: Path) -> None:
     machine = load_machine("ma2000").model_copy(update={"name": "bench"})
     with pytest.raises(SpecError, match="bench, the configured robot is ma2000"):
-        acquired(Invocation(port_option=PORT), machine, [read_trace(ramp)], None, 60.0, False, Answers(3.0))
+        diagnose_and_acquire(Arm(ramp), machine, [read_trace(ramp)], None, 60.0, Consent(False), Answers(3.0))
 
 
-def test_what_moves_is_the_configured_machine_within_its_limits(
-    outcomes: list[Outcome], moved: list[Machine], ramp: Path
-) -> None:
+def test_experiments_stay_within_the_limits_of_the_configured_machine(ramp: Path) -> None:
     """The limits were tightened after the trace was recorded: its own no longer hold."""
     Path("daq.toml").write_text("[robot.limits]\nreach = 0.01\n")
-    outcomes += ["complete"]
-    answers = Answers(3.0)
-    acquired(Invocation(port_option=PORT), load_machine("ma2000"), [read_trace(ramp)], None, 5.0, False, answers)
-    assert [machine.limits.reach for machine in moved] == [0.01]
+    answers, arm = Answers(3.0), Arm(ramp, "complete")
+    loop(arm, [read_trace(ramp)], 5.0, answers)
+    assert [machine.limits.reach for machine in arm.moved] == [0.01]
     for plan in answers.plans:
         with pytest.raises(SafetyError):
             plan(ExperimentSpec())
@@ -149,26 +174,26 @@ def test_another_sensor_than_the_traces_is_refused(ramp: Path) -> None:
     joint = shipped.joint(2).model_copy(update={"sensor": sensor.model_copy(update={"at_zero": zero})})
     machine = shipped.model_copy(update={"joints": (shipped.joint(1), joint, *shipped.joints[2:])})
     with pytest.raises(SpecError, match="another sensor than in the traces on joint 2;"):
-        acquired(Invocation(port_option=PORT), machine, [read_trace(ramp)], None, 60.0, False, Answers(3.0))
+        diagnose_and_acquire(Arm(ramp), machine, [read_trace(ramp)], None, 60.0, Consent(False), Answers(3.0))
 
 
 @pytest.mark.parametrize(("outcome", "code"), [("complete", 0), ("stopped", 6), ("fault", 5), ("interrupted", 5)])
-def test_the_answer_is_given_and_the_exit_code_is_the_last_runs(
+def test_the_answer_is_printed_and_the_exit_code_is_that_of_the_last_run(
     daq: CommandLine, ramp: Path, monkeypatch: pytest.MonkeyPatch, outcome: str, code: int
 ) -> None:
     run = Acquired(experiment="ramp", trace="abc", file="abc.mcap", outcome=outcome, duration=3.0, reason="")
 
-    def made(_call: object, _machine: object, traces: list[Trace], *_: object) -> Ended:
+    def made(_robot: object, _machine: object, traces: list[Trace], *_: object) -> LoopEnd:
         found = Answers(3.0)(traces, Asker((), lambda _: pytest.fail("nothing is planned")))
-        return Ended(found.model_copy(update={"acquired": (run,)}), traces)
+        return LoopEnd(found.model_copy(update={"acquired": (run,)}), traces)
 
-    monkeypatch.setattr("daq_cli.models.diagnose_acquire.acquired", made)
+    monkeypatch.setattr("daq_cli.models.acquire_loop.diagnose_and_acquire", made)
     said = daq("diagnose", ramp, "--acquire", "--json")
     assert said.code == code
     assert Diagnosis.model_validate(json.loads(said.out)).acquired == (run,)
 
 
-def test_a_robot_that_is_not_there_is_said_before_anything_is_computed(
+def test_an_absent_robot_is_reported_before_anything_is_computed(
     daq: CommandLine, ramp: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("model.discrepancy.workflow.diagnose", lambda *_, **__: pytest.fail("it was computed"))
@@ -177,7 +202,7 @@ def test_a_robot_that_is_not_there_is_said_before_anything_is_computed(
     daq("--port", "mock://?modify=gremlin", "diagnose", ramp, "--acquire").complains(3, "mock controller did not start")
 
 
-def test_the_answer_is_not_lost_to_a_run_that_cannot_be_begun(
+def test_the_answer_survives_a_run_that_cannot_begin(
     daq: CommandLine, ramp: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def gone(*_: object) -> Finished:
@@ -186,7 +211,7 @@ def test_the_answer_is_not_lost_to_a_run_that_cannot_be_begun(
     def answers(_model: object, traces: list[Trace], *_: object, ask: Asker) -> Diagnosis:
         return Answers(3.0)(traces, ask)
 
-    monkeypatch.setattr("daq_cli.models.diagnose_acquire.acquire", gone)
+    monkeypatch.setattr(LocalRobot, "acquire", gone)
     monkeypatch.setattr("model.discrepancy.workflow.diagnose", answers)
     monkeypatch.setattr("daq_cli.commands.diagnose._written", lambda *given: given[-1])
     said = daq("--port", PORT, "diagnose", ramp, "--acquire", "--json", "-o", "so_far.json", "--report", "page.html")
@@ -197,17 +222,15 @@ def test_the_answer_is_not_lost_to_a_run_that_cannot_be_begun(
     assert Path("so_far.json").exists()
 
 
-def test_the_answer_is_not_lost_to_a_trace_that_cannot_be_used(outcomes: list[Outcome], ramp: Path) -> None:
-    outcomes += ["complete"]
+def test_the_answer_survives_a_trace_that_cannot_be_used(ramp: Path) -> None:
     answers = Answers(3.0)
 
-    def once(traces: list[Trace], ask: Asker) -> Diagnosis:
+    def once(traces: Sequence[Trace], ask: Asker) -> Diagnosis:
         if len(traces) > 1:
             raise TraceError("trace abc: cannot be used")
         return answers(traces, ask)
 
-    call = Invocation(port_option=PORT)
-    ended = acquired(call, load_machine("ma2000"), [read_trace(ramp)], None, 60.0, False, once)
+    ended = loop(Arm(ramp, "complete"), [read_trace(ramp)], 60.0, once)
     assert isinstance(ended.failure, TraceError)
     assert len(ended.traces) == 1
     assert [run.outcome for run in ended.found.acquired] == ["complete"]

@@ -1,4 +1,5 @@
-"""`daq diagnose --acquire`: run what the diagnosis asks for, diagnose again, until nothing is left to ask."""
+"""`daq diagnose --acquire`: runs the experiment that the diagnosis asks for and diagnoses again, until it asks for
+none."""
 
 from __future__ import annotations
 
@@ -8,14 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts.errors import DaqError, SpecError
-from daq_cli.app.context import Invocation, console
-from daq_cli.models.diagnose_asking import as_run, next_to_run, time_left
-from daq_cli.robot.run_result import acquire
+from daq_cli.app.consent import Consent
+from daq_cli.app.context import console
+from daq_cli.models.stopping_rule import as_run, next_to_run, time_left
 from server.jobs.asking import asker
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
     from daq.contracts.trace import Trace
+    from daq_cli.robot.access import RobotAccess
     from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment
     from model.discrepancy.experiment_design.next_experiment import Asker
 
@@ -23,11 +25,11 @@ Diagnose = Callable[["Sequence[Trace]", "Asker"], "Diagnosis"]
 
 
 @dataclass(frozen=True)
-class Ended:
-    """How a diagnosis that ran what it asked for has ended.
+class LoopEnd:
+    """The end of a diagnosis with experiments of its own.
 
-    found: the latest answer. traces: what it rests on. failure: why a run that was asked for could not be begun, or
-    used; None where none failed. Nothing that was found before is lost to it.
+    found: the latest answer. traces: those that it is based on. failure: why an experiment could not be run, or its
+    trace not used; None where none failed. A failure loses nothing that was found before.
     """
 
     found: Diagnosis
@@ -35,19 +37,24 @@ class Ended:
     failure: DaqError | None = None
 
 
-def acquired(
-    call: Invocation, machine: Machine, traces: Sequence[Trace], folder: Path | None, budget: float, consent: bool,
+def diagnose_and_acquire(
+    robot: RobotAccess,
+    machine: Machine,
+    traces: Sequence[Trace],
+    folder: Path | None,
+    budget: float,
+    consent: Consent,
     diagnose: Diagnose,
-) -> Ended:  # fmt: skip
-    """The answer after all that was asked for has been run, as far as that could be.
+) -> LoopEnd:
+    """Diagnoses, runs the experiment asked for, and diagnoses again, as long as `next_to_run` names one.
 
-    `next_to_run` says when it ends; `budget`: s of robot time; `machine`: that of the model in doubt. Planned for, and
-    moved, is the configured one, within the limits that hold for it now. Raises SpecError for another machine, and what
-    connecting raises, before anything is computed; what fails after the first answer is told beside it.
+    `budget` is the robot time in s, `machine` that of the examined model. Experiments are planned for the configured
+    machine, within its present limits. Raises SpecError for another machine, and what connecting raises, before
+    anything is computed; a later failure is returned with the answer.
     """
-    arm = call.machine
+    arm = robot.machine
     _check_same_machine(arm, machine)
-    _check_reached(call)
+    robot.require_reached()  # before minutes are spent on what it is to do
     runs: list[Acquired] = []
     every = list(traces)
     failure: DaqError | None = None
@@ -56,7 +63,7 @@ def acquired(
         left = time_left(runs, budget)
         console().print(f"ask     {asked.name}, {asked.duration:.0f} s of {left:.0f} s: {asked.reason}")
         try:
-            run, trace = _run(call, arm, asked, folder or call.trace_folder, consent)
+            run, trace = _run(robot, arm, asked, folder or robot.call.trace_folder, consent)
             runs.append(run)
             if run.outcome == "complete":
                 found = diagnose([*every, trace], asker(arm, time_left(runs, budget)))
@@ -65,35 +72,21 @@ def acquired(
                 console().print(f"{run.outcome}: no more is asked for; its trace is {run.file}", style="red")
         except DaqError as error:
             failure = error
-    return Ended(found.model_copy(update={"acquired": tuple(runs)}), every, failure)
+    return LoopEnd(found.model_copy(update={"acquired": tuple(runs)}), every, failure)
 
 
-def _check_reached(call: Invocation) -> None:
-    """That there is a robot to run on, before minutes are spent on what it is to do: greeted, and let go again, as
-    `daq status` does; of a mock, that it starts with its options. Raises what connecting raises."""
-    if call.server is not None:
-        from daq_cli.robot.remote.robot import connected_status, remote_robot
-
-        with remote_robot(call) as robot:
-            connected_status(robot)
-        return
-    from daq.config.robot_files import load_memory_map
-    from daq.driver import Controller
-
-    with Controller.connect(call.port, load_memory_map(call.settings.robot.memory_map)):
-        pass
-
-
-def _run(call: Invocation, arm: Machine, asked: NextExperiment, folder: Path, consent: bool) -> tuple[Acquired, Trace]:
+def _run(
+    robot: RobotAccess, arm: Machine, asked: NextExperiment, folder: Path, consent: Consent
+) -> tuple[Acquired, Trace]:
     from daq.traces.reader import read_trace
 
-    finished = acquire(call, asked.spec, arm, folder, consent)
+    finished = robot.acquire(asked.spec, arm, folder, consent)
     trace = read_trace(finished.trace)
     return as_run(asked, trace, finished.trace, finished.outcome), trace
 
 
 def _check_same_machine(arm: Machine, machine: Machine) -> None:
-    """Raises SpecError when the configured arm is another machine than the traces', or reads its joints otherwise."""
+    """Raises SpecError when the configured arm is another machine than that of the traces, or has other sensors."""
     if arm.name != machine.name:
         raise SpecError(
             f"--acquire: the traces were made on {machine.name}, the configured robot is {arm.name}; "
@@ -108,7 +101,7 @@ def _check_same_machine(arm: Machine, machine: Machine) -> None:
 
 
 def _readings(machine: Machine) -> dict[int, tuple[object, ...] | None]:
-    """By joint what makes an angle of its sensor's counts; None for a joint without a sensor."""
+    """The conversion of each joint's sensor from counts to angles; None for a joint without a sensor."""
     return {
         number: None if s is None else (s.bits, s.range.value, s.at_zero.value, s.direction, s.measures)
         for number, s in enumerate((joint.sensor for joint in machine.joints), start=1)

@@ -1,4 +1,4 @@
-"""`daq teach edit`: a taught program changed off line. Nothing moves; the file stays a program, or stays as it was."""
+"""`daq teach edit`: a taught program changed off line. Nothing moves; a refused change leaves the file as it was."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ FileArgument = Annotated[Path, typer.Argument(help="A taught program, a .json fi
 NumberArgument = Annotated[int, typer.Argument(help="Number of the instruction, as `list` shows it.")]
 ToOption = Annotated[str | None, typer.Option(help="Absolute angles, such as 1=180,2=45 (degrees).")]
 ByOption = Annotated[str | None, typer.Option(help="Relative angles, such as 2=-5 (degrees).")]
-SpeedOption = Annotated[str | None, typer.Option(help="Degrees/s of the fastest joint.")]
-WaitOption = Annotated[float | None, typer.Option(help="Seconds without motion.")]
+SpeedOption = Annotated[str | None, typer.Option(help="Speed of the fastest joint in degrees/s.")]
+WaitOption = Annotated[float | None, typer.Option(help="Pause in s.")]
 OutputOption = Annotated[str | None, typer.Option(help="A process output to switch: 3=on or 3=off.")]
-GripperOption = Annotated[str | None, typer.Option(help="open or close.")]
+GripperOption = Annotated[str | None, typer.Option(help="Move the gripper: open or close.")]
 
 
 @app.command("list")
@@ -42,7 +42,7 @@ def list_all(file: FileArgument, json: JsonOption = False) -> None:
 
 @app.command()
 def delete(context: typer.Context, file: FileArgument, number: NumberArgument) -> None:
-    """Take an instruction out."""
+    """Remove an instruction."""
     from daq.teaching import editing
 
     _edit(context, file, lambda program: editing.delete(program, number))
@@ -73,7 +73,7 @@ def move(
     context: typer.Context,
     file: FileArgument,
     number: NumberArgument,
-    place: Annotated[int, typer.Argument(help="The number that it is to have.")],
+    place: Annotated[int, typer.Argument(help="Its new number.")],
 ) -> None:
     """Move an instruction to another place."""
     from daq.teaching import editing
@@ -91,8 +91,10 @@ def change(
     ] = None,
     speed: SpeedOption = None,
     wait: WaitOption = None,
-    rate: Annotated[float | None, typer.Option(help="How many times as fast as it was led, of a path.")] = None,
-    longest: Annotated[float | None, typer.Option(help="Seconds after which waiting for an input fails.")] = None,
+    rate: Annotated[
+        float | None, typer.Option(help="Speed of a path, as a multiple of that at which it was led.")
+    ] = None,
+    longest: Annotated[float | None, typer.Option(help="Time in s after which waiting for an input fails.")] = None,
 ) -> None:
     """Change speed, posture, pause or rate of an instruction."""
     from daq.teaching import editing
@@ -117,7 +119,8 @@ def rename(
 
 
 def _edit(context: typer.Context, file: Path, edited: Any) -> None:
-    """Reads, changes, checks and writes a program. Raises SpecError, SafetyError; the file is as it was then."""
+    """Reads, changes, checks and writes a program. Raises SpecError, SafetyError, and leaves the file as it was
+    then."""
     from daq.config import load_settings
     from daq.teaching.editing import new_violations
     from daq.teaching.program import load_program, save_program

@@ -1,10 +1,11 @@
-"""Whether the motors of a machine could hold a load that is stated with `--load`."""
+"""A load that somebody states for the arm: the model with it, and whether its motors could hold it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from daq.contracts.carried_load import carrying
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import DcMotor, Machine
 
@@ -13,13 +14,25 @@ if TYPE_CHECKING:
     from model.machine_model.model import Model
 
 ROOM = 2.0
-"""Times what the motor of a joint gives at rest, beyond which gravity is too much for it: friction and gear hold some,
-and supply limits are often assumed."""
+"""Largest torque of gravity that a joint is taken to hold, in stall torques of its motor. More than 1, because friction
+and the gear hold some of it, and supply limits are often assumed."""
 
 
-def check_held(model: Model, traces: Sequence[Trace]) -> None:
+def with_load(model: Model, kilograms: float) -> Model:
+    """The model of the same machine with another load at its end. Raises SpecError as `carrying` does."""
+    from model.machine_model.model import Model
+
+    machine = carrying(model.machine, kilograms, "given with --load")
+    values = {name: value for name, value in model.values.items() if name != "load.mass"}
+    fields = {name: getattr(model, name) for name in type(model).model_fields}
+    return Model(**{**fields, "machine": machine, "values": values})
+
+
+def require_load_held(model: Model, traces: Sequence[Trace]) -> None:
     """Raises SpecError where gravity asks more of a joint, somewhere along the traces, than its motor could ever hold.
-    A machine whose file limits no supply, or has another drive than a motor, is taken to hold anything."""
+
+    A machine whose file limits no supply, or has another drive than a motor, is taken to hold anything.
+    """
     import numpy as np
 
     from model.discrepancy.inverse_dynamics.supplied import gravity_along
@@ -34,7 +47,7 @@ def check_held(model: Model, traces: Sequence[Trace]) -> None:
         torques = np.empty_like(position)
         gravity_along(chain, position, torques)
         for joint, needed in zip(model.machine.modelled_joints, np.abs(torques).max(axis=0), strict=True):
-            most = _most(model.machine, joint)
+            most = _stall_torque(model.machine, joint)
             if most is not None and needed > ROOM * most:
                 raise SpecError(
                     f"load {model.machine.load.value if model.machine.load else 0.0:g} kg: joint {joint} would need "
@@ -42,7 +55,7 @@ def check_held(model: Model, traces: Sequence[Trace]) -> None:
                 )
 
 
-def _most(machine: Machine, joint: int) -> float | None:
+def _stall_torque(machine: Machine, joint: int) -> float | None:
     """Torque of a motor at rest under its full supply, N·m at the joint; None where no supply limits it."""
     drive = machine.joint(joint).drive
     if not isinstance(drive, DcMotor) or drive.supply_limit is None:

@@ -10,7 +10,8 @@ from daq_cli.app.context import console
 
 @contextmanager
 def shown_progress(what: str) -> Iterator[Callable[[float, str], None]]:
-    """A bar with one line of what is being done; gone when it is done. Nothing where nobody watches."""
+    """A progress bar with a line on the present step, which vanishes at the end. Without a terminal nothing is
+    shown."""
     from rich.markup import escape
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -21,7 +22,7 @@ def shown_progress(what: str) -> Iterator[Callable[[float, str], None]]:
     with Progress(*columns, console=console(), transient=True) as bar:
         task = bar.add_task(what, total=1.0, text="")
 
-        def tell(fraction: float, text: str) -> None:
+        def progress(fraction: float, text: str) -> None:
             bar.update(task, completed=fraction, text=escape(text))
 
-        yield tell
+        yield progress
