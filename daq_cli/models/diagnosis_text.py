@@ -7,8 +7,8 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from daq_cli.models.diagnosis_candidates import best_of, candidates_lines, effect_on
+from model.discrepancy.diagnosis import clear_shape
 from model.discrepancy.explanation.notes import is_warning
-from model.discrepancy.localisation.clear_shape import clear_shape
 from model.reports.units import shown_unit
 
 if TYPE_CHECKING:

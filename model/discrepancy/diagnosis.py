@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -15,6 +16,13 @@ ANSWER_FORMAT = 1
 Verdict = Literal["nothing-significant", "named", "ambiguous", "unknown-effect"]
 Phase = Literal["ramp_start", "steady_ramp", "reversal", "creep", "hold"]
 AgainstWhat = Literal["time", "position", "speed", "direction", "drive"]
+
+CLEAR_SHAPE = 0.3
+"""Least share of the remaining torque's variance that a dependence must explain to count as a shape that a person could
+write an effect after."""
+FEWEST_BINS = 5
+"""Bins with a torque that such a shape needs: two or three values are no curve. Directions are never more than
+three."""
 
 
 class _Part(BaseModel):
@@ -116,6 +124,11 @@ class RemainingShape(_Part):
     explained: float
     """Share of the remaining torque's variance that this dependence explains."""
 
+    @property
+    def filled_bins(self) -> int:
+        """Bins in which a torque is known."""
+        return sum(torque is not None for torque in self.torque)
+
 
 class Step(_Part):
     """One turn of the workflow: what was found, what adding it did."""
@@ -198,3 +211,20 @@ class Diagnosis(_Part):
     robot_seconds: float
     notes: tuple[str, ...] = ()
     """Assumptions and limits that a reader of this answer should know."""
+
+
+def in_order(candidates: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
+    """The fitted candidates and those that were only probed, each by evidence, the best first.
+
+    The two kinds are not comparable: a fit shows what a candidate takes off the residual, a probe extrapolates it.
+    """
+    best_first = sorted(candidates, key=lambda c: -c.evidence)
+    return [c for c in best_first if c.refitted], [c for c in best_first if not c.refitted]
+
+
+def clear_shape(found: Sequence[RemainingShape]) -> RemainingShape | None:
+    """The dependence that explains most, of those clear enough to be called a shape; None where there is none."""
+    clear = [
+        s for s in found if s.explained >= CLEAR_SHAPE and (s.against == "direction" or s.filled_bins >= FEWEST_BINS)
+    ]
+    return max(clear, key=lambda s: s.explained, default=None)

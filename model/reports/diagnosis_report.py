@@ -5,9 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from model.comparison.compare import Comparison
-from model.discrepancy.candidates.candidate_order import in_order
-from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment, RemainingShape, Step
-from model.discrepancy.localisation.clear_shape import FEWEST_BINS, clear_shape, filled_bins
+from model.discrepancy.diagnosis import (
+    FEWEST_BINS,
+    Acquired,
+    Diagnosis,
+    NextExperiment,
+    RemainingShape,
+    Step,
+    clear_shape,
+    in_order,
+)
 from model.reports.diagnosis_map import map_picture
 from model.reports.diagnosis_pictures import evidence_picture, remaining_picture
 from model.reports.diagnosis_steps import error_blocks, step_sections, where_blocks
@@ -146,7 +153,7 @@ def _shape_in_words(shapes: Sequence[RemainingShape]) -> Text:
             f"No clear shape: the best, a torque at joint {best.joint} that goes with {best.against}, explains "
             f"{100 * best.explained:.0f} % of what is left there"
         )
-        few = f", and is known at {filled_bins(best)} values only" if filled_bins(best) < FEWEST_BINS else ""
+        few = f", and is known at {best.filled_bins} values only" if best.filled_bins < FEWEST_BINS else ""
         return Text(f"{told}{few}.", "warning")
     return Text(
         f"A torque at joint {clear.joint} that goes with {clear.against} would explain "

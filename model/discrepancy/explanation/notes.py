@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
 from daq.contracts.trace import Trace
-from model.discrepancy.output_error.feedback_share import FOLLOWING_FOR_ERRORS
+from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
 
 NOTHING_HELD_OUT = "no held-out trace was given: nothing here has been shown on data it was not fitted to"
 ERRORS_FOLLOW = (
     "errors, their floor and the map are of a simulation whose controller is given "
-    f"{FOLLOWING_FOR_ERRORS:g} of the way to each recorded reading; reasons tell sizes of the closed loop alone"
+    f"{FEEDBACK_SHARE_FOR_ERRORS:g} of the way to each recorded reading; reasons tell sizes of the closed loop alone"
 )
 FAR = 4.0
 """Of its stated deviations, from which what a fit made of a number has to be said aloud."""

@@ -8,12 +8,21 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from model.discrepancy.diagnosis import Candidate, FoundValue, RemainingShape, SignalError, Step, Where
+from model.discrepancy.diagnosis import (
+    CLEAR_SHAPE,
+    FEWEST_BINS,
+    Candidate,
+    FoundValue,
+    RemainingShape,
+    SignalError,
+    Step,
+    Where,
+    clear_shape,
+)
 from model.discrepancy.explanation.numbers import Spoken, from_to, plain
 from model.discrepancy.explanation.observations import Observation
 from model.discrepancy.explanation.samples import Left, Motions, Samples, motions
 from model.discrepancy.explanation.table import telling
-from model.discrepancy.localisation.clear_shape import CLEAR_SHAPE, FEWEST_BINS, clear_shape, filled_bins
 from model.discrepancy.localisation.dependence import drive_units
 from model.discrepancy.localisation.disagreement import spoken_unit
 from model.discrepancy.verdict import LEAST_EXCESS
@@ -170,7 +179,7 @@ def _shape(remaining: Sequence[RemainingShape]) -> str:
         return f"{torque} explains {share}"
     if told.explained < CLEAR_SHAPE:
         return f"no clear shape: the best, {torque}, explains only {share}"
-    few = f"rests on {filled_bins(told)} of the {FEWEST_BINS} bins that a shape needs"
+    few = f"rests on {told.filled_bins} of the {FEWEST_BINS} bins that a shape needs"
     return f"no clear shape: the best, {torque}, explains {share}, but {few}"
 
 

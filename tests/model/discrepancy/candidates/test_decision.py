@@ -38,7 +38,7 @@ def test_one_name_where_it_leads() -> None:
 def test_a_group_where_the_lead_is_small() -> None:
     said = decide(ranking(("backlash", 2, 90.0), ("joint_compliance", 2, 87.0), ("stiction", 2, 2.0)), LINES)
     assert said.kind == "group"
-    assert [f.candidate.name for f in said.group] == ["backlash", "joint_compliance"]
+    assert [f.hypothesis.name for f in said.group] == ["backlash", "joint_compliance"]
 
 
 def test_the_margin_of_a_lone_candidate_is_its_evidence() -> None:
@@ -64,7 +64,7 @@ def test_an_echo_hides_no_effect_of_another_joint() -> None:
         [Added("coulomb_friction", (2,), 2000.0)],
     )  # fmt: skip
     assert said.best is not None
-    assert (said.kind, said.best.candidate.name, said.margin) == ("named", "backlash", pytest.approx(40.0))
+    assert (said.kind, said.best.hypothesis.name, said.margin) == ("named", "backlash", pytest.approx(40.0))
 
 
 def test_what_one_joint_has_another_is_likelier_to_have() -> None:
@@ -75,8 +75,8 @@ def test_what_one_joint_has_another_is_likelier_to_have() -> None:
 
 def test_the_same_effect_on_fewer_joints_is_no_rival() -> None:
     both, one, other = ranking(("gear_loss", 1, 90.0), ("gear_loss", 2, 88.0), ("stiction", 2, 87.0)).fitted
-    both.candidate.joints = (1, 2)  # type: ignore[misc]
+    both.hypothesis.joints = (1, 2)  # type: ignore[misc]
     said = decide(Ranking((both, one, other), ()), LINES)
-    assert [f.candidate.name for f in said.group] == ["gear_loss", "stiction"]
+    assert [f.hypothesis.name for f in said.group] == ["gear_loss", "stiction"]
     said = decide(Ranking((both, one), ()), LINES)
     assert said.kind == "named"

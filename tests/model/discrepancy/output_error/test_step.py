@@ -8,35 +8,35 @@ from typing import Any, cast
 import pytest
 
 from daq.contracts.progress import Never, silent
-from model.discrepancy import last_fit, workflow
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import FoundValue, Step, Where
+from model.discrepancy.output_error import diagnose, last_fit
+from model.discrepancy.output_error.candidate_fit import Fit
 from model.discrepancy.output_error.case import Case
-from model.discrepancy.output_error.last_fit import SUPERFLUOUS, _is_nothing, as_last_fitted
-from model.discrepancy.output_error.refitting import Judged
+from model.discrepancy.output_error.last_fit import SUPERFLUOUS, _is_nothing, update_to_last_fit
 from model.discrepancy.thresholds import Thresholds
 
 
 def fit(name: str, evidence: float) -> Any:
     """A fitted candidate of that name on joint 1."""
-    return SimpleNamespace(candidate=SimpleNamespace(name=name, joints=(1,)), evidence=evidence)
+    return SimpleNamespace(hypothesis=SimpleNamespace(name=name, joints=(1,)), evidence=evidence)
 
 
 def turned(monkeypatch: pytest.MonkeyPatch, fits: list[Any], holding: str | None) -> Any:
     """What is found after one turn with these fits, of which held-out traces refuse all but one."""
-    start, end = cast(Judged, object()), cast(Judged, object())
+    start, end = cast(Fit, object()), cast(Fit, object())
 
-    def step_of(_case: Any, current: Judged, _ranking: Ranking, decision: Any) -> tuple[Any, Judged]:
+    def make_step(_case: Any, current: Fit, _ranking: Ranking, decision: Any) -> tuple[Any, Fit]:
         if decision.kind == "nothing":
             return None, current
-        name = decision.best.candidate.name
+        name = decision.best.hypothesis.name
         step = SimpleNamespace(effect=name, joints=(1,), evidence=1.0, adopted=name == holding, group=())
         return step, end if step.adopted else current
 
-    monkeypatch.setattr(workflow, "_ranked", lambda *_: (Ranking(tuple(fits), ()), start))
-    monkeypatch.setattr(workflow, "step_of", step_of)
+    monkeypatch.setattr(diagnose, "_rank", lambda *_: (Ranking(tuple(fits), ()), start))
+    monkeypatch.setattr(diagnose, "make_step", make_step)
     case = cast(Any, SimpleNamespace(thresholds=Thresholds(significant=12.0)))
-    found = workflow._after_turn(case, workflow._Found(start, start), silent, Never())
+    found = diagnose._add_effect(case, diagnose._Search(start, start), silent, Never())
     assert len(found.before) == len(found.steps)
     assert found.current is (end if found.added else start)
     return found
@@ -54,12 +54,12 @@ def test_what_is_not_significant_has_none(monkeypatch: pytest.MonkeyPatch) -> No
     assert [s.effect for s in found.steps] == ["backlash"]
     assert found.ended
     assert found.tried is not None
-    assert [f.candidate.name for f in found.tried.fitted] == ["backlash", "stiction"], "also what was refused"
+    assert [f.hypothesis.name for f in found.tried.fitted] == ["backlash", "stiction"], "also what was refused"
 
 
 def test_the_chances_come_to_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
     found = turned(monkeypatch, [fit(f"effect_{k}", 90.0 - 10 * k) for k in range(6)], None)
-    assert len(found.steps) == workflow.CHANCES
+    assert len(found.steps) == diagnose.CHANCES
     assert found.ended
 
 
@@ -82,9 +82,9 @@ def test_what_a_later_effect_explains_is_taken_out_again(monkeypatch: pytest.Mon
     without = cast(Any, SimpleNamespace(point=SimpleNamespace(model=SimpleNamespace(by_name=known))))
     gone: list[str] = []
     monkeypatch.setattr(last_fit, "_without", lambda _o, _p, names: gone.extend(names) or without)
-    monkeypatch.setattr(last_fit, "moved_by_noise", lambda *_: 0.0)
-    monkeypatch.setattr(last_fit, "found_values", lambda _o, _c, own, _m: {p.name: value for p in own})
-    now, steps = as_last_fitted(cast(Any, None), current, [step("a"), step("b"), step("c")])
+    monkeypatch.setattr(last_fit, "shift_by_noise", lambda *_: 0.0)
+    monkeypatch.setattr(last_fit, "found_values", lambda _c, own, _m: {p.name: value for p in own})
+    now, steps = update_to_last_fit(current, [step("a"), step("b"), step("c")])
     assert [s.adopted for s in steps] == [False, True, True]
     assert steps[0].rejected_because == SUPERFLUOUS
     assert gone == ["a"]
@@ -106,9 +106,9 @@ def test_a_reason_and_the_parameters_beside_it_say_one_number(monkeypatch: pytes
     refused = step.model_copy(update={"adopted": False})
     known = {name: SimpleNamespace(name=name, null=0.0, low=0.0)}
     current = cast(Any, SimpleNamespace(point=SimpleNamespace(model=SimpleNamespace(by_name=known))))
-    monkeypatch.setattr(last_fit, "moved_by_noise", lambda *_: 0.0)
-    monkeypatch.setattr(last_fit, "found_values", lambda _o, _c, own, _m: {p.name: last for p in own})
-    _, steps = as_last_fitted(cast(Any, None), current, [step, refused])
+    monkeypatch.setattr(last_fit, "shift_by_noise", lambda *_: 0.0)
+    monkeypatch.setattr(last_fit, "found_values", lambda _c, own, _m: {p.name: last for p in own})
+    _, steps = update_to_last_fit(current, [step, refused])
     assert steps[0].parameters == {name: last}
     assert steps[0].reason == told.replace("0.747 V (0.724 to 0.77)", "0.748 V (0.673 to 0.822)")
     assert steps[1] == refused
@@ -153,11 +153,11 @@ def test_held_out_traces_refuse_what_makes_them_worse(
     fields = dict.fromkeys(Case.__dataclass_fields__)
     fields |= {
         "held": Held(rise, deviation),
-        "observation": SimpleNamespace(samples=100),
+        "scoring": SimpleNamespace(samples=100),
         "thresholds": Thresholds(significant=10.0),
     }
     case = Case(**cast(Any, fields))
-    found = SimpleNamespace(evidence=evidence, judged=SimpleNamespace(point=20.0))
+    found = SimpleNamespace(evidence=evidence, fit=SimpleNamespace(point=20.0))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Case, "_square", lambda _self, point: point)  # a fall of 5: half a third of it counts for nothing
         assert (case.refused(cast(Any, found), cast(Any, 25.0), ((), ()), ()) is not None) == refused
