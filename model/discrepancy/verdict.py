@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from model.discrepancy.diagnosis import SignalError, Step, Verdict
+from model.discrepancy.grounds import Refusal
 from model.discrepancy.thresholds import Thresholds
 
 SCATTER = 4.0
@@ -53,6 +54,5 @@ def first_to_withdraw(steps: Sequence[Step], left: Sequence[int]) -> int | None:
 
 def withdrawn(step: Step, left: Sequence[int]) -> Step:
     """The step, not taken into the model after all."""
-    where = f"joint{'s' if len(left) > 1 else ''} {', '.join(map(str, left))}"
-    why = f"it only resembles what is missing: with all that was found, {where} still disagrees beyond noise"
-    return step.model_copy(update={"adopted": False, "rejected_because": why}) if step.adopted else step
+    why = Refusal(kind="only-resembles", joints=tuple(left))
+    return step.model_copy(update={"adopted": False, "refusal": why}) if step.adopted else step

@@ -16,16 +16,11 @@ from model.discrepancy.candidates.decision import Added, decide
 from model.discrepancy.candidates.estimates import listed, only_probed
 from model.discrepancy.candidates.probing import Probed
 from model.discrepancy.candidates.ranking import Ranking, ranked
-from model.discrepancy.diagnosis import Candidate, Diagnosis, RemainingShape, SignalError, Step, Verdict, Where
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, Step, Where
 from model.discrepancy.experiment_design.next_experiment import Asked, Asker, rivals_of
-from model.discrepancy.explanation import reasons
-from model.discrepancy.explanation.notes import (
-    ERRORS_FOLLOW,
-    NOTHING_HELD_OUT,
-    on_tolerances,
-    on_unfinished,
-    on_what_is_stated,
-)
+from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
+from model.discrepancy.explanation.renderer import with_sentences
+from model.discrepancy.grounds import Note
 from model.discrepancy.localisation.statistics import chance_significance
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.output_error.case import Case, with_point
@@ -36,6 +31,7 @@ from model.discrepancy.output_error.controller_evidence import (
     with_findings,
     with_used_set_points,
 )
+from model.discrepancy.output_error.excess import worse_held_out
 from model.discrepancy.output_error.feedback_share import FOLLOWING_FOR_ERRORS
 from model.discrepancy.output_error.holdout import HeldOut, held_out
 from model.discrepancy.output_error.last_fit import as_last_fitted
@@ -138,22 +134,26 @@ def _answer(
     remaining = case.remaining(end) if answered == "unknown-effect" else ()
     asked = Asked(None) if ask is None else ask.after(answered, case.observation, end, found.rivals, case.traces)
     notes = (
-        *on_what_is_stated(_stated(end), {u.name: float(v) for u, v in zip(end.unknowns, end.values, strict=True)}),
-        on_tolerances(len(case.traces)), ERRORS_FOLLOW,
-        *on_unfinished((*case.traces, *holdout)), *(() if holdout else (NOTHING_HELD_OUT,)),
+        *on_stated_numbers(_stated(end), {u.name: float(v) for u, v in zip(end.unknowns, end.values, strict=True)}),
+        Note(kind="tolerances-fitted-first", values={"traces": len(case.traces)}),
+        Note(kind="errors-follow-record", values={"share": FOLLOWING_FOR_ERRORS}),
+        *on_unfinished((*case.traces, *holdout)),
+        *(() if holdout else (Note(kind="nothing-held-out"),)),
         *(() if asked.note is None else (asked.note,)),
-    )  # fmt: skip
+    )
     held = case.held_errors(end.model, *case.held_residuals(given, end))
-    return Diagnosis(
-        verdict=answered, summary=_summary(found, answered, proved, where, remaining, left, held),
+    unknown = answered == "unknown-effect"
+    return with_sentences(Diagnosis(
+        verdict=answered, summary=UNWRITTEN, method="output-error",
+        unexplained_joints=left if unknown else (), worse_held_out=worse_held_out(held) if unknown else (),
         steps=(*proved, *found.steps), where=where, candidates=_candidates(case, found), remaining=remaining,
         model_before=model, model_after=_with_lineage(model, end, case.names),
         traces=case.names, holdout=tuple(t.record.trace_id for t in holdout),
         rmse_fit=case.fitted_errors(given, end), rmse_holdout=held,
         significant=case.thresholds.significant, seconds=0.0,
         robot_seconds=float(sum(t.time[-1] - t.time[0] for t in case.traces)),
-        notes=notes, next_experiment=asked.experiment,
-    )  # fmt: skip
+        notes_data=notes, next_experiment=asked.experiment,
+    ))  # fmt: skip
 
 
 def _case(
@@ -301,17 +301,3 @@ def _with_lineage(model: Model, point: Point, names: tuple[str, ...]) -> Model:
     """The model of the last fit, and what it came from."""
     fit = {"misfit": point.misfit, "fitted": [u.name for u in point.unknowns if u.name in point.model.by_name]}
     return with_point(point).with_lineage(Lineage(parent=model.identity, traces=names, fit=fit, note="diagnosis"))
-
-
-def _summary(
-    found: _Found, answered: Verdict, proved: Sequence[Step], where: Where, remaining: Sequence[RemainingShape],
-    left: Sequence[int], held: Sequence[SignalError],
-) -> str:  # fmt: skip
-    steps = (*proved, *found.steps)
-    if answered == "nothing-significant":
-        return reasons.nothing(next((s for s in steps if not s.adopted), None))
-    if answered == "named":
-        return "; ".join(s.reason for s in steps if s.adopted)
-    if answered == "ambiguous":
-        return reasons.undecided(steps[-1].group, steps[-1].where)
-    return reasons.unexplained(where, remaining, left, held=held)

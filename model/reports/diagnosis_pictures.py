@@ -10,7 +10,7 @@ import numpy as np
 
 from model.discrepancy.candidates.candidate_order import in_order
 from model.discrepancy.diagnosis import Candidate, RemainingShape, SignalError
-from model.reports.effect_names import placed
+from model.effects.names import placed
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels
 from model.reports.numbers import whole
 from model.reports.page import Picture

@@ -28,6 +28,7 @@ from model.discrepancy.output_error.refitting import (
 )
 from model.discrepancy.output_error.side_by_side import AT_ONCE, side_by_side
 from model.discrepancy.thresholds import Thresholds
+from model.effects.names import effect_on
 
 FLAGGED_SHARE = 0.1
 """A joint is flagged where the best probe promises this share of the best of all."""
@@ -112,7 +113,7 @@ def _fitted(
         now = [one for one in chosen[begin : begin + AT_ONCE] if one.gain >= least]
         if not now:
             break
-        names = " and ".join(describe(one.candidate.name, one.candidate.joints) for one in now)
+        names = " and ".join(effect_on(one.candidate.name, one.candidate.joints) for one in now)
         progress(0.4 + 0.5 * begin / len(chosen), f"fitting {names}")
         reach = min((_priced(observation, f) for f in fits if f.misfit < STRANGE), default=None)
 
@@ -183,12 +184,6 @@ def _begun_again(
         return found if hopeless else begun_again(observation, current, found, goal)
 
     return side_by_side(again, head)
-
-
-def describe(name: str, joints: Sequence[int]) -> str:
-    """An effect and its place in words."""
-    where = "" if not joints else f" on joint{'s' if len(joints) > 1 else ''} {', '.join(str(j) for j in joints)}"
-    return name.replace("_", " ") + where
 
 
 def _one_a_name(fits: Sequence[Refitted]) -> tuple[Refitted, ...]:

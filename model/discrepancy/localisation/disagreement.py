@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
-from model.discrepancy.diagnosis import Dependence, PhaseCell, Where
+from model.discrepancy.diagnosis import UNWRITTEN, Dependence, PhaseCell, Where, WorstPlace
 from model.discrepancy.localisation.dependence import AGAINST, dependence, quantities
 from model.discrepancy.localisation.phases import HOLD, PHASES, phases_of
 from model.discrepancy.localisation.statistics import (
@@ -38,10 +38,6 @@ MOST_NOISE = 1.5
 """Times the stated variance that noise may have."""
 LEAST = 0.3
 """Least deviation of a residual, in that of noise, from which its correlation is taken."""
-SPOKEN = {
-    "ramp_start": "as motion starts", "steady_ramp": "while it moves", "reversal": "after reversals",
-    "creep": "in slow motion", "hold": "while it holds still",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -90,12 +86,13 @@ def located(
     dependences = _dependences(model, records, residuals, deviations)
     place = _worst(shares)
     moving = tuple(m for trace in traces[:1] for m in moving_parameters(model, trace))
-    summary = _summary(model, records, residuals, deviations, phases, place, shares)
+    worst = _worst_place(model, records, residuals, deviations, phases, place, shares)
     joint = None if place is None else model.machine.modelled_joints[place[0]]
     phase = None if place is None else PHASES[place[1]]
     return Where(
-        joint=joint, phase=phase, summary=summary, cells=tuple(cells), dependences=tuple(dependences), moving=moving
-    )
+        joint=joint, phase=phase, summary=UNWRITTEN, cells=tuple(cells), dependences=tuple(dependences), moving=moving,
+        worst=worst,
+    )  # fmt: skip
 
 
 def _quietened(weighted: Sequence[Floats], records: Sequence[Record]) -> list[Floats]:
@@ -221,30 +218,27 @@ def optional(values: Floats) -> tuple[float | None, ...]:
     return tuple(None if math.isnan(v) else float(v) for v in values)
 
 
-def _summary(
+def _worst_place(
     model: Model, records: Sequence[Record], residuals: Sequence[Floats], deviations: Floats,
     phases: Sequence[Integers], place: tuple[int, int] | None, shares: Sequence[list[_Share]],
-) -> str:  # fmt: skip
-    """One line in the terms of the field."""
+) -> WorstPlace:  # fmt: skip
+    """The place in numbers; where nothing is significant, the joint and phase that come nearest."""
+    joints = model.machine.modelled_joints
     if place is None:
         joint, own = max(
             ((j, s) for j, ss in enumerate(shares) for s in ss), key=lambda e: e[1].significance, default=(0, None)
         )
-        ratio = 1.0 if own is None else math.sqrt(own.mean_square)
-        return (
-            f"no joint is off by more than noise; the largest is joint {model.machine.modelled_joints[joint]}, "
-            f"{ratio:.2f} times its noise {SPOKEN[PHASES[HOLD if own is None else own.phase]]}"
-        )
+        nearest, ratio = (HOLD, 1.0) if own is None else (own.phase, math.sqrt(own.mean_square))
+        return WorstPlace(joint=joints[joint], phase=PHASES[nearest], ratio=ratio)
     j, phase = place
     own_residual = np.concatenate([
         r[run, j][p[run, j] == phase]
         for r, p, record in zip(residuals, phases, records, strict=True) for run in record.runs
     ])  # fmt: skip
-    scale, unit = spoken_unit(model, model.machine.modelled_joints[j])
-    rms = float(np.sqrt(np.mean(own_residual**2)))
-    return (
-        f"joint {model.machine.modelled_joints[j]}, {SPOKEN[PHASES[phase]]}: {rms * scale:.2g} {unit} rms "
-        f"against a floor of {deviations[j] * scale:.2g}"
+    scale, unit = spoken_unit(model, joints[j])
+    rms, floor = float(np.sqrt(np.mean(own_residual**2))), float(deviations[j])
+    return WorstPlace(
+        joint=joints[j], phase=PHASES[phase], ratio=rms / floor, rms=rms * scale, floor=floor * scale, unit=unit
     )
 
 

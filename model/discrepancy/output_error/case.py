@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import RemainingShape, SignalError, Where
+from model.discrepancy.grounds import Refusal
 from model.discrepancy.localisation.disagreement import located
 from model.discrepancy.localisation.unexplained_torque import shapes
 from model.discrepancy.options import DiagnosisOptions
@@ -76,7 +77,7 @@ class Case:
 
     def refused(
         self, found: Refitted, current: Point, held: tuple[Signals, Signals], own: Sequence[SignalError]
-    ) -> str | None:  # fmt: skip
+    ) -> Refusal | None:  # fmt: skip
         """Why an effect is not taken, if held-out traces speak against it.
 
         Args:
@@ -87,16 +88,13 @@ class Case:
             return None
         removed, lines = excess_removed(own), self.thresholds
         if removed is not None and removed < -lines.grown:
-            return f"the error on the held-out traces grows, by {-removed:.0%} of what is beyond noise there"
+            return Refusal(kind="error-grows", numbers={"share": -removed})
         rise, deviation = self.held.rise(*held)
         share = self.held.observation.samples / self.observation.samples
         fall = self._square(current) - self._square(found.judged.point)
         by_chance = max(lines.worse * deviation, lines.lost * fall * share, lines.significant)
         if rise > min(by_chance, max(deviation, found.evidence - lines.significant)):
-            return (
-                f"the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} variances "
-                "of a reading"
-            )
+            return Refusal(kind="error-rises", numbers={"rise": rise, "deviation": deviation})
         return None
 
     def where(self, point: Point, *, moving: bool = True) -> Where:

@@ -8,6 +8,8 @@ from model.discrepancy.diagnosis import SignalError
 
 LEAST_EXCESS = 0.25
 """Variance of a joint above its floor, in floors, of which a share means anything: 17 s tell it to 0.06."""
+GROWN = 1.1
+"""Ratio of a joint's mean square errors on held-out traces, above which a fit has made them worse beyond noise."""
 
 
 def excess_removed(found: Sequence[SignalError]) -> float | None:
@@ -18,3 +20,8 @@ def excess_removed(found: Sequence[SignalError]) -> float | None:
     ratios = [((e.before / e.floor) ** 2 - 1.0, (e.after / e.floor) ** 2 - 1.0) for e in found]
     shown = [(before, after) for before, after in ratios if before >= LEAST_EXCESS]
     return 1.0 - sum(after for _, after in shown) / sum(before for before, _ in shown) if shown else None
+
+
+def worse_held_out(held: Sequence[SignalError]) -> tuple[int, ...]:
+    """Joints whose error on held-out traces has grown beyond what noise may do."""
+    return tuple(e.joint for e in held if (e.after / e.floor) ** 2 > GROWN * (e.before / e.floor) ** 2 + LEAST_EXCESS)

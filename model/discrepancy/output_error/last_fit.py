@@ -1,7 +1,7 @@
 """Steps as the last fit has them: what was still missing at their turn has bent their parameters.
 
-A reason tells the size of the last fit too, so that an answer has one number and one interval for it. Its pattern, and
-the errors that it tells, stay those of the turn.
+The sentences of an answer are made afterwards, so that they give the size of the last fit too. The pattern of a reason,
+and its errors, stay those of the step.
 """
 
 from __future__ import annotations
@@ -10,15 +10,13 @@ from collections.abc import Sequence
 
 from model.discrepancy.candidates.estimates import found_values, moved_by_noise
 from model.discrepancy.diagnosis import FoundValue, Step
-from model.discrepancy.explanation.reasons import with_size
+from model.discrepancy.grounds import Refusal
 from model.discrepancy.output_error.case import with_point
 from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.refitting import Judged, judge
 from model.discrepancy.output_error.search import Point, point_at, settled
 from model.discrepancy.output_error.step import LAST_STEPS
 from model.machine_model.parameter import Parameter
-
-SUPERFLUOUS = "superfluous once a later effect was in"
 
 
 def as_last_fitted(
@@ -41,10 +39,8 @@ def as_last_fitted(
         if not step.adopted:
             return step
         if step in empty:
-            return step.model_copy(update={"adopted": False, "rejected_because": SUPERFLUOUS})
-        last = {n: values[n] for n in step.parameters}
-        reason = with_size(step.reason, step.effect or "", step.joints, step.parameters, last)
-        return step.model_copy(update={"parameters": last, "reason": reason})
+            return step.model_copy(update={"adopted": False, "refusal": Refusal(kind="superfluous")})
+        return step.model_copy(update={"parameters": {n: values[n] for n in step.parameters}})
 
     return current, tuple(told(s) for s in steps)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.discrepancy.diagnosis import Candidate, FoundValue, Step, Where
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
+from model.discrepancy.grounds import ControllerProof
 from model.discrepancy.output_error.controller_evidence import ControllerFinding
 from model.discrepancy.output_error.holdout import errors
 from model.discrepancy.output_error.observation import Observation, Signals
@@ -20,15 +21,10 @@ def proved_step(model: Model, observation: Observation, finding: ControllerFindi
     proof = Candidate(
         effect=finding.effect, joints=(finding.joint,), evidence=evidence, parameters={name: value}, refitted=False
     )
-    share = f"{finding.samples} of {finding.of} samples"
-    if finding.effect == "wrong_gain":
-        said = f"the recorded power is {1 + finding.value:.3f} times the gain times the recorded error ({share})"
-    else:
-        said = f"the recorded error is not set point − position in {finding.samples} samples: set points were lost"
     quiet: Signals = tuple(np.zeros_like(r.measured) for r in observation.records)
-    where = Where(joint=finding.joint, phase=None, summary=f"joint {finding.joint}: {said}", cells=(), dependences=())
+    where = Where(joint=finding.joint, phase=None, summary=UNWRITTEN, cells=(), dependences=())
     return Step(
         effect=finding.effect, joints=(finding.joint,), parameters={name: value}, evidence=evidence, margin=evidence,
         candidates=(proof,), rmse_fit=errors(observation, model, quiet, quiet, observation.deviations), where=where,
-        reason=f"joint {finding.joint}: {said}; this needs no model of the arm", adopted=True,
+        reason=UNWRITTEN, proof=ControllerProof(samples=finding.samples, of=finding.of), adopted=True,
     )  # fmt: skip

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from model.discrepancy.candidates.decision import Decision
 from model.discrepancy.candidates.estimates import found_values, listed, only_probed, runner_up
 from model.discrepancy.candidates.ranking import Ranking
-from model.discrepancy.diagnosis import Candidate, SignalError, Step
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, SignalError, Step
 from model.discrepancy.explanation import reasons
 from model.discrepancy.explanation.samples import Left
 from model.discrepancy.output_error.case import Case, with_point
@@ -41,9 +41,8 @@ def step_of(case: Case, current: Judged, ranking: Ranking, decision: Decision) -
     candidates += only_probed(ranking, observation)
     where = case.where(before)
     reason = reasons.reason(
-        best.candidate.name, best.candidate.joints, values, best.evidence, margin, model=with_point(after),
-        before=with_point(before), records=observation.records, runner_up=runner_up(listed(best), candidates),
-        left=_left(observation, after), where=where,
+        best.candidate.name, best.candidate.joints, values, model=with_point(after), before=with_point(before),
+        records=observation.records, rival=runner_up(listed(best), candidates), left=_left(observation, after),
     )  # fmt: skip
     step = Step(
         effect=best.candidate.name, joints=best.candidate.joints, parameters=values, evidence=best.evidence,
@@ -51,7 +50,7 @@ def step_of(case: Case, current: Judged, ranking: Ranking, decision: Decision) -
         rmse_fit=case.fitted_errors(before, after), rmse_holdout=held_errors,
         excess_removed_holdout=excess_removed(held_errors),
         sum_lambda2_before=_sum_lambda2(before, before), sum_lambda2_after=_sum_lambda2(after, before),
-        where=where, reason=reason, adopted=refused is None, rejected_because=refused,
+        where=where, reason=UNWRITTEN, reason_data=reason, adopted=refused is None, refusal=refused,
     )  # fmt: skip
     return step, current if refused is not None else best.judged
 

@@ -25,6 +25,7 @@ from model.discrepancy.experiment_design.next_experiment import (
     rivals_of,
     settled,
 )
+from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error import search
 from model.discrepancy.output_error.observation import observed
@@ -85,8 +86,10 @@ def test_a_record_of_what_is_asked_for_separates_as_predicted(ramp_step: Trace, 
     asked = best_experiment(friction, offered, plan, budget=60.0)
     assert asked.experiment is not None
     found = asked.experiment
-    assert set(found.separates) == {"coulomb friction on joint 2", "stribeck friction on joint 2"}
-    assert found.reason.startswith(next(e.description for e in offered if e.name == found.name))
+    assert set(found.separates) == {"Coulomb friction on joint 2", "Stribeck friction on joint 2"}
+    assert found.description == next(e.description for e in offered if e.name == found.name)
+    assert set(found.hardest) == set(found.separates)
+    assert found.differs_at is not None
     squares = []
     for true, wrong in (friction, friction[::-1]):
         records = [record(with_values(true.judged.point), found.spec, seed) for seed in (8, 9)]
@@ -141,9 +144,10 @@ def test_what_no_experiment_tells_is_said() -> None:
     asked = best_experiment(rivals, [EXPERIMENTS["diagnostic-b"]], plan)
     assert asked.experiment is None
     assert asked.note is not None
-    assert "no experiment" in asked.note
-    assert "viscous friction on joint 2" in asked.note
-    assert "back emf error on joint 2" in asked.note
+    words = note_words(asked.note)
+    assert "no experiment" in words
+    assert "viscous friction on joint 2" in words
+    assert "back-EMF error on joint 2" in words
 
 
 def test_without_rivals_what_tells_most_is_asked_for_once(ramp_step: Trace) -> None:
@@ -154,6 +158,8 @@ def test_without_rivals_what_tells_most_is_asked_for_once(ramp_step: Trace) -> N
     asked = most_information(point, [slight, rich], plan, []).experiment
     assert asked is not None
     assert (asked.name, asked.separates) == ("diagnostic-d", ())
+    assert asked.information is not None
+    assert asked.information > 0
     assert most_information(point, [slight, rich], plan, [rich.spec]).experiment is None
     within = most_information(point, [slight, rich], plan, [], budget=5.0).experiment
     assert within is not None
