@@ -13,7 +13,7 @@ Values = Mapping[str, Any]
 
 def note_words(note: Note) -> str:
     """The note as a clause."""
-    return _WORDS[note.kind](note.values)
+    return WORDS[note.kind](note.values)
 
 
 def _cutoff(v: Values) -> str:
@@ -117,7 +117,7 @@ def _within(v: Values) -> str:
     return "" if v["budget"] is None else f" and {v['budget']:.0f} s"
 
 
-_WORDS: dict[NoteKind, Callable[[Values], str]] = {
+WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "cutoff": _cutoff,
     "drive-timing": _drive_timing,
     "errors-follow-record": _errors_follow_record,

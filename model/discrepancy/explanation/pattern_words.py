@@ -12,7 +12,7 @@ Numbers = Mapping[str, float]
 
 def pattern_words(pattern: Pattern, units: ReadingUnits) -> str:
     """What the joint does: “lags by 0.13° in slow motion and by 0.15° in fast, always against the motion”."""
-    return _WORDS[pattern.kind](pattern.numbers, units)
+    return WORDS[pattern.kind](pattern.numbers, units)
 
 
 def _bends_with_position(n: Numbers, u: ReadingUnits) -> str:
@@ -149,7 +149,7 @@ def _always(slow: float, fast: float, units: ReadingUnits) -> str:
     return f", always {'against' if slow >= 0 else 'with'} the motion"
 
 
-_WORDS: dict[PatternKind, Callable[[Numbers, ReadingUnits], str]] = {
+WORDS: dict[PatternKind, Callable[[Numbers, ReadingUnits], str]] = {
     "bends_with_position": _bends_with_position,
     "drives_otherwise": _drives_otherwise,
     "fails_at_high_drive": _fails_at_high_drive,

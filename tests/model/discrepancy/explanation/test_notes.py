@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import get_args
 
+from model.discrepancy.explanation.note_words import WORDS as NOTE_WORDS
 from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
-from model.discrepancy.grounds import Note
+from model.discrepancy.explanation.pattern_words import WORDS as PATTERN_WORDS
+from model.discrepancy.grounds import Note, NoteKind, PatternKind
 from model.fitting.unknowns import Unknown
 from tests.model.fitting import imagined
+
+
+def test_every_kind_of_note_and_pattern_has_its_words() -> None:
+    assert set(NOTE_WORDS) == set(get_args(NoteKind))
+    assert set(PATTERN_WORDS) == set(get_args(PatternKind))
 
 
 def test_a_record_that_ended_early_is_named() -> None:
