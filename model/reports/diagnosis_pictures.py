@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.discrepancy.diagnosis import Candidate, RemainingShape, SignalError, in_order
-from model.reports.effect_names import placed
+from model.effects.names import placed
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels
 from model.reports.numbers import whole
 from model.reports.page import Picture

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.comparison.difference import differences
+from model.discrepancy.explanation.renderer import where_with_summary
 from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.statistics import chance_significance
@@ -51,7 +52,7 @@ def where_given(model: Model, traces: Sequence[Trace]) -> GivenWhere | None:
         return None
     driven = traces if all(trace.drive is not None for trace in traces) else ()
     floor = noise_floor(records, model.machine, "position")
-    where = locate(Residuals(model, records, left, floor), driven)
+    where = where_with_summary(locate(Residuals(model, records, left, floor), driven))
     return GivenWhere(where=where, chance=chance_significance(len(where.cells)))
 
 

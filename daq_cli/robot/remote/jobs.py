@@ -29,18 +29,16 @@ KINDS: dict[JobKind, str] = {
     "compare": "comparison",
     "diagnose": "diagnosis",
 }
-EXIT_PROGRAM_FAULT, PROGRAM_FAULT = 1, "program fault"
-"""As the reason of such a job begins."""
+EXIT_PROGRAM_FAULT = 1
 EXIT_CODES = {"failed": 2, "cancelled": 130, "interrupted": 3}
 
 
 class JobEndedError(DaqError):
-    """A job that has found nothing: refused, cancelled, or lost with its process."""
+    """A job that ended without a result: refused, cancelled, or lost with its process."""
 
     def __init__(self, job: Job) -> None:
         super().__init__(f"job {job.id} {job.state}: {job.reason or 'no reason is known'}")
-        fault = job.reason.startswith(PROGRAM_FAULT)
-        self.exit_code = EXIT_PROGRAM_FAULT if fault else EXIT_CODES[job.state]  # type: ignore[misc]
+        self.exit_code = EXIT_PROGRAM_FAULT if job.failure == "program-fault" else EXIT_CODES[job.state]  # type: ignore[misc]
 
 
 def require_no_programs(effect_files: Sequence[Path] | None, call: Invocation) -> None:

@@ -27,6 +27,7 @@ from model.discrepancy.output_error.case import Case
 from model.discrepancy.output_error.multi_joint_fit import fit_several_joints
 from model.discrepancy.output_error.observation import AT_ONCE, side_by_side
 from model.discrepancy.thresholds import Thresholds
+from model.effects.names import effect_on
 
 FLAGGED_SHARE = 0.1
 """A joint is flagged where its best probe promises this share of the best of all."""
@@ -70,12 +71,6 @@ def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: 
     head = _finish_close(current, head, case.thresholds)
     rest = [r for r in fits if not any(r is a for a in answers)]
     return Ranking(_one_law_per_name(sorted([*head, *rest], key=lambda r: -r.evidence)), tuple(probes))
-
-
-def describe(name: str, joints: Sequence[int]) -> str:
-    """An effect and its place in words."""
-    where = "" if not joints else f" on joint{'s' if len(joints) > 1 else ''} {', '.join(str(j) for j in joints)}"
-    return name.replace("_", " ") + where
 
 
 def _probe_all(case: Case, current: Fit, cancel: Cancel, earlier: Sequence[Probe]) -> list[Probe]:
@@ -125,7 +120,7 @@ def _fit_all(
         now = [one for one in chosen[begin : begin + AT_ONCE] if one.gain >= least]
         if not now:
             break
-        names = " and ".join(describe(one.hypothesis.name, one.hypothesis.joints) for one in now)
+        names = " and ".join(effect_on(one.hypothesis.name, one.hypothesis.joints) for one in now)
         progress(0.4 + 0.5 * begin / len(chosen), f"fitting {names}")
         explaining = (f for f in fits if f.misfit < STRANGE)
         reach = min((f.fit.point.cost + price_of(observation, f.hypothesis) for f in explaining), default=None)

@@ -20,12 +20,15 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, OfferedExperiment
 from daq.contracts.trace import Trace
 from model.discrepancy.candidates.decision import Decision
-from model.discrepancy.candidates.ranking import Ranking, describe
-from model.discrepancy.diagnosis import NextExperiment, Verdict
-from model.discrepancy.experiment_design.reason import most_informative, separating
+from model.discrepancy.candidates.ranking import Ranking
+from model.discrepancy.diagnosis import UNWRITTEN, DifferencePlace, NextExperiment, Verdict
 from model.discrepancy.experiment_design.signals import Imagined, Planner, Prediction, imagine
+from model.discrepancy.grounds import Note
+from model.discrepancy.localisation.phases import PHASES, phases_of
 from model.discrepancy.output_error.candidate_fit import CandidateFit, judge, same_answer
+from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.search import Point, converge
+from model.effects.names import effect_on
 
 Floats = NDArray[np.float64]
 Pair = tuple[int, int]
@@ -48,7 +51,7 @@ class Asked:
     """The experiment to make next, or None. note: why there is none, or which candidates it will not tell apart."""
 
     experiment: NextExperiment | None
-    note: str | None = None
+    note: Note | None = None
 
 
 @dataclass(frozen=True)
@@ -110,11 +113,10 @@ def converge_rivals(rivals: Sequence[CandidateFit]) -> list[CandidateFit]:
 def best_experiment(rivals: Sequence[CandidateFit], asker: Asker) -> Asked:
     """The experiment on which the rivals that are hardest to tell apart differ most for its robot time; pairs that no
     experiment tells apart are named in the note."""
-    names = [describe(r.hypothesis.name, r.hypothesis.joints) for r in rivals]
+    names = [effect_on(r.hypothesis.name, r.hypothesis.joints) for r in rivals]
     judged = [j for e in asker.experiments if (j := _separations(rivals, e, asker)) is not None]
     if not judged:
-        limits = f"the limits{_within(asker.budget)}"
-        return Asked(None, f"no experiment within {limits} is left that could tell {' from '.join(names)}")
+        return Asked(None, Note(kind="no-experiment-left", values={"candidates": names, "budget": asker.budget}))
     pairs = list(combinations(range(len(rivals)), 2))
     best = {pair: max(j.sizes[pair] for j in judged) for pair in pairs}
     hopeless = [pair for pair in pairs if best[pair] < LEAST]
@@ -126,12 +128,10 @@ def best_experiment(rivals: Sequence[CandidateFit], asker: Asker) -> Asked:
     hardest = min(told, key=lambda p: chosen.sizes[p])
     separation = chosen.sizes[hardest]
     members = sorted({k for pair in told for k in pair})
-    reason = separating(
-        chosen.experiment.description, names[hardest[0]], names[hardest[1]], separation,
-        rivals[hardest[0]].fit.point.model, chosen.there.observation, chosen.left[hardest],
-        rivals[hardest[0]].hypothesis.joints,
-    )  # fmt: skip
-    return Asked(_next(chosen.experiment, chosen.there, tuple(names[k] for k in members), separation, reason), note)
+    place = _differs_at(rivals[hardest[0]], chosen.there.observation, chosen.left[hardest])
+    asked = _next(chosen.experiment, chosen.there, tuple(names[k] for k in members), separation)
+    hardest_names = (names[hardest[0]], names[hardest[1]])
+    return Asked(asked.model_copy(update={"hardest": hardest_names, "differs_at": place}), note)
 
 
 def most_information(point: Point, asker: Asker, done: Sequence[ExperimentSpec]) -> Asked:
@@ -144,7 +144,7 @@ def most_information(point: Point, asker: Asker, done: Sequence[ExperimentSpec])
         found = [j for e in new if e.general is general and (j := _information(point, e, asker)) is not None]
         if found:
             experiment, there, nats = max(found, key=lambda f: f[2])
-            return Asked(_next(experiment, there, (), 0.0, most_informative(experiment.description, nats)))
+            return Asked(_next(experiment, there, (), 0.0).model_copy(update={"information": nats}))
     return Asked(None)
 
 
@@ -222,7 +222,7 @@ def _same_motion(one: ExperimentSpec, other: ExperimentSpec) -> bool:
 
 
 def _next(
-    experiment: OfferedExperiment, there: Imagined, separates: tuple[str, ...], separation: float, reason: str
+    experiment: OfferedExperiment, there: Imagined, separates: tuple[str, ...], separation: float
 ) -> NextExperiment:
     return NextExperiment(
         name=experiment.name,
@@ -230,16 +230,32 @@ def _next(
         duration=there.duration,
         separates=separates,
         predicted_separation=separation,
-        reason=reason,
+        reason=UNWRITTEN,
+        description=experiment.description,
     )
 
 
-def _hopeless(pairs: Sequence[Pair], best: dict[Pair, float], names: Sequence[str], budget: float | None) -> str | None:
+def _hopeless(
+    pairs: Sequence[Pair], best: dict[Pair, float], names: Sequence[str], budget: float | None
+) -> Note | None:
+    """The note on pairs that no experiment tells apart."""
     if not pairs:
         return None
-    told = "; ".join(f"{names[a]} and {names[b]} ({best[a, b]:.1f} at most)" for a, b in pairs)
-    return f"no experiment within the limits{_within(budget)} separates by {LEAST:g} standard deviations: {told}"
+    told = [[names[a], names[b], best[a, b]] for a, b in pairs]
+    return Note(kind="not-separable", values={"pairs": told, "least": LEAST, "budget": budget})
 
 
-def _within(budget: float | None) -> str:
-    return "" if budget is None else f" and {budget:.0f} s"
+def _differs_at(rival: CandidateFit, observation: Observation, left: Floats) -> DifferencePlace:
+    """Joint and phase that hold most of the squared difference (N,) that a rival's parameters could not hide."""
+    model, joints = rival.fit.point.model, rival.hypothesis.joints
+    record = observation.records[0]
+    phases = np.concatenate([phases_of(model, record)[run] for run in record.runs])
+    energy = left.reshape(phases.shape) ** 2
+    total = max(float(energy.sum()), 1e-300)
+    sums = {
+        (joint, phase): float(energy[phases[:, column] == number, column].sum())
+        for column, joint in enumerate(model.machine.modelled_joints)
+        for number, phase in enumerate(PHASES)
+    }
+    (joint, phase), most = max(sums.items(), key=lambda item: item[1])
+    return DifferencePlace(joint=joint, phase=phase, share=most / total, other_joint=tuple(joints) != (joint,))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.trace import Trace
-from model.discrepancy.diagnosis import Dependence, PhaseCell, Where
+from model.discrepancy.diagnosis import UNWRITTEN, Dependence, PhaseCell, Where, WorstPlace
 from model.discrepancy.localisation.dependence import AGAINST, dependence, quantities
 from model.discrepancy.localisation.phases import HOLD, PHASES, phases_of
 from model.discrepancy.localisation.residuals import Residuals
@@ -39,13 +39,6 @@ MOST_NOISE = 1.5
 """Largest variance that counts as noise, relative to the stated one."""
 LEAST = 0.3
 """Lower bound of a residual's deviation, relative to that of noise, when its correlation is estimated."""
-SPOKEN = {
-    "ramp_start": "as motion starts",
-    "steady_ramp": "while it moves",
-    "reversal": "after reversals",
-    "creep": "in slow motion",
-    "hold": "while it holds still",
-}
 
 
 @dataclass(frozen=True)
@@ -154,19 +147,16 @@ class _Map:
         weighty = [s for s in own if s.excess > 0.1 * best[0]]
         return best[1], max(weighty, key=lambda s: s.mean_square).phase
 
-    def summary(self, place: tuple[int, int] | None) -> str:
-        """One line in the terms of the field."""
+    def worst_place(self, place: tuple[int, int] | None) -> WorstPlace:
+        """The place in numbers; where nothing is significant, the joint and phase that come nearest."""
         if place is None:
             joint, own = max(
                 ((j, s) for j, ss in enumerate(self.shares) for s in ss),
                 key=lambda e: e[1].significance,
                 default=(0, None),
             )
-            ratio = 1.0 if own is None else math.sqrt(own.mean_square)
-            return (
-                f"no joint is off by more than noise; the largest is joint {self.joints[joint]}, "
-                f"{ratio:.2f} times its noise {SPOKEN[PHASES[HOLD if own is None else own.phase]]}"
-            )
+            nearest, ratio = (HOLD, 1.0) if own is None else (own.phase, math.sqrt(own.mean_square))
+            return WorstPlace(joint=self.joints[joint], phase=PHASES[nearest], ratio=ratio)
         j, phase = place
         residuals = self.residuals
         own_residual = np.concatenate(
@@ -177,10 +167,14 @@ class _Map:
             ]
         )
         scale, unit = spoken_unit(residuals.model, self.joints[j])
-        rms = float(np.sqrt(np.mean(own_residual**2)))
-        return (
-            f"joint {self.joints[j]}, {SPOKEN[PHASES[phase]]}: {rms * scale:.2g} {unit} rms "
-            f"against a floor of {residuals.deviations[j] * scale:.2g}"
+        rms, floor = float(np.sqrt(np.mean(own_residual**2))), float(residuals.deviations[j])
+        return WorstPlace(
+            joint=self.joints[j],
+            phase=PHASES[phase],
+            ratio=rms / floor,
+            rms=rms * scale,
+            floor=floor * scale,
+            unit=unit,
         )
 
     def _shares(self, j: int) -> list[_Share]:
@@ -216,9 +210,10 @@ def locate(residuals: Residuals, traces: Sequence[Trace] = ()) -> Where:
     return Where(
         joint=None if place is None else found.joints[place[0]],
         phase=None if place is None else PHASES[place[1]],
-        summary=found.summary(place),
+        summary=UNWRITTEN,
         cells=tuple(found.cells()),
         dependences=tuple(_dependences(residuals)),
+        worst=found.worst_place(place),
         moving=tuple(m for trace in traces[:1] for m in moving_parameters(residuals.model, trace)),
     )
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import RemainingShape, SignalError, Where
+from model.discrepancy.grounds import Refusal
 from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.unexplained_torque import remaining_shapes
@@ -72,7 +73,7 @@ class Case:
 
     def refused(
         self, found: CandidateFit, current: Point, held: tuple[Signals, Signals], own: Sequence[SignalError]
-    ) -> str | None:
+    ) -> Refusal | None:
         """Why an effect is not taken, if held-out traces speak against it.
 
         Args:
@@ -83,16 +84,13 @@ class Case:
             return None
         removed, lines = excess_removed(own), self.thresholds
         if removed is not None and removed < -lines.grown:
-            return f"the error on the held-out traces grows, by {-removed:.0%} of what is beyond noise there"
+            return Refusal(kind="error-grows", numbers={"share": -removed})
         rise, deviation = self.held.rise(*held)
         share = self.held.observation.samples / self.scoring.samples
         fall = self._square(current) - self._square(found.fit.point)
         by_chance = max(lines.worse * deviation, lines.lost * fall * share, lines.significant)
         if rise > min(by_chance, max(deviation, found.evidence - lines.significant)):
-            return (
-                f"the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} variances "
-                "of a reading"
-            )
+            return Refusal(kind="error-rises", numbers={"rise": rise, "deviation": deviation})
         return None
 
     def where(self, point: Point, *, moving: bool = True) -> Where:

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from daq.contracts.machine import BoardPid, Machine
 from daq.contracts.trace import Trace
-from model.discrepancy.diagnosis import Candidate, FoundValue, Step, Where
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
+from model.discrepancy.grounds import ControllerProof
 from model.discrepancy.output_error.holdout import signal_errors
 from model.discrepancy.output_error.observation import Observation, Signals
 from model.drives.controller import POWER_MAX
@@ -133,11 +134,6 @@ def proved_step(observation: Observation, finding: ControllerFinding) -> Step:
     proof = Candidate(
         effect=finding.effect, joints=(finding.joint,), evidence=evidence, parameters={name: value}, refitted=False
     )
-    share = f"{finding.samples} of {finding.of} samples"
-    if finding.effect == "wrong_gain":
-        said = f"the recorded power is {1 + finding.value:.3f} times the gain times the recorded error ({share})"
-    else:
-        said = f"the recorded error is not set point − position in {finding.samples} samples: set points were lost"
     quiet: Signals = tuple(np.zeros_like(r.measured) for r in observation.records)
     return Step(
         effect=finding.effect,
@@ -147,10 +143,9 @@ def proved_step(observation: Observation, finding: ControllerFinding) -> Step:
         margin=evidence,
         candidates=(proof,),
         rmse_fit=signal_errors(observation, quiet, quiet, observation.deviations),
-        where=Where(
-            joint=finding.joint, phase=None, summary=f"joint {finding.joint}: {said}", cells=(), dependences=()
-        ),
-        reason=f"joint {finding.joint}: {said}; this needs no model of the arm",
+        where=Where(joint=finding.joint, phase=None, summary=UNWRITTEN, cells=(), dependences=()),
+        reason=UNWRITTEN,
+        proof=ControllerProof(samples=finding.samples, of=finding.of),
         adopted=True,
     )
 

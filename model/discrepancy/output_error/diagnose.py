@@ -15,16 +15,11 @@ from model.discrepancy.candidates.decision import Added, decide
 from model.discrepancy.candidates.estimates import listed, only_probed
 from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.ranking import Ranking, rank
-from model.discrepancy.diagnosis import Candidate, Diagnosis, RemainingShape, SignalError, Step, Verdict, Where
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, Step, Where
 from model.discrepancy.experiment_design.next_experiment import Asked, Asker, rivals_of
-from model.discrepancy.explanation import reasons
-from model.discrepancy.explanation.notes import (
-    ERRORS_FOLLOW,
-    NOTHING_HELD_OUT,
-    on_tolerances,
-    on_unfinished,
-    on_what_is_stated,
-)
+from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
+from model.discrepancy.explanation.renderer import with_sentences
+from model.discrepancy.grounds import Note
 from model.discrepancy.localisation.statistics import chance_significance
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, improved_baseline, judge
@@ -41,7 +36,8 @@ from model.discrepancy.output_error.last_fit import update_to_last_fit
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.search import Point, converge, descend, point_at
 from model.discrepancy.output_error.step import LAST_STEPS, make_step
-from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn
+from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
+from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn, worse_held_out
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
 
@@ -202,17 +198,21 @@ def _answer(
     remaining = case.remaining(end) if answered == "unknown-effect" else ()
     asked = Asked(None) if ask is None else ask.after(answered, end, found.rivals, case.traces)
     notes = (
-        *on_what_is_stated(_stated(end), end.by_name),
-        on_tolerances(len(case.traces)),
-        ERRORS_FOLLOW,
+        *on_stated_numbers(_stated(end), end.by_name),
+        Note(kind="tolerances-fitted-first", values={"traces": len(case.traces)}),
+        Note(kind="errors-follow-record", values={"share": FEEDBACK_SHARE_FOR_ERRORS}),
         *on_unfinished((*case.traces, *holdout)),
-        *(() if holdout else (NOTHING_HELD_OUT,)),
+        *(() if holdout else (Note(kind="nothing-held-out"),)),
         *(() if asked.note is None else (asked.note,)),
     )
     held = case.held_errors(*case.held_residuals(given, end))
-    return Diagnosis(
+    unknown = answered == "unknown-effect"
+    answer = Diagnosis(
         verdict=answered,
-        summary=_summary(found, answered, proved, where, remaining, left, held),
+        summary=UNWRITTEN,
+        method="output-error",
+        unexplained_joints=left if unknown else (),
+        worse_held_out=worse_held_out(held) if unknown else (),
         steps=(*proved, *found.steps),
         where=where,
         candidates=_candidates(found),
@@ -226,9 +226,10 @@ def _answer(
         significant=case.thresholds.significant,
         seconds=0.0,
         robot_seconds=float(sum(t.time[-1] - t.time[0] for t in case.traces)),
-        notes=notes,
+        notes_data=notes,
         next_experiment=asked.experiment,
     )
+    return with_sentences(answer)
 
 
 def _unexplained_joints(case: Case, found: _Search, where: Where | None) -> tuple[int, ...]:
@@ -276,17 +277,3 @@ def _with_lineage(model: Model, point: Point, names: tuple[str, ...]) -> Model:
     fit = {"misfit": point.misfit, "fitted": [u.name for u in point.unknowns if u.name in point.model.by_name]}
     lineage = Lineage(parent=model.identity, traces=names, fit=fit, note="diagnosis")
     return point.fitted_model.with_lineage(lineage)
-
-
-def _summary(
-    found: _Search, answered: Verdict, proved: Sequence[Step], where: Where, remaining: Sequence[RemainingShape],
-    left: Sequence[int], held: Sequence[SignalError],
-) -> str:  # fmt: skip
-    steps = (*proved, *found.steps)
-    if answered == "nothing-significant":
-        return reasons.nothing(next((s for s in steps if not s.adopted), None))
-    if answered == "named":
-        return "; ".join(s.reason for s in steps if s.adopted)
-    if answered == "ambiguous":
-        return reasons.undecided(steps[-1].group, steps[-1].where)
-    return reasons.unexplained(where, remaining, left, held=held)

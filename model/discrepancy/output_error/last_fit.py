@@ -1,7 +1,7 @@
 """Steps with the values of the last fit: effects that were still missing at their time had biased them.
 
-A reason reports the size of the last fit too, so that an answer has one number and one interval for it. Its pattern,
-and the errors that it reports, stay those of its step.
+The sentences of an answer are made afterwards, so that they give the size of the last fit too. The pattern of a reason,
+and its errors, stay those of the step.
 """
 
 from __future__ import annotations
@@ -10,13 +10,11 @@ from collections.abc import Sequence
 
 from model.discrepancy.candidates.estimates import found_values, shift_by_noise
 from model.discrepancy.diagnosis import FoundValue, Step
-from model.discrepancy.explanation.reasons import with_size
+from model.discrepancy.grounds import Refusal
 from model.discrepancy.output_error.candidate_fit import Fit, judge
 from model.discrepancy.output_error.search import Point, converge, point_at
 from model.discrepancy.output_error.step import LAST_STEPS
 from model.machine_model.parameter import Parameter
-
-SUPERFLUOUS = "superfluous once a later effect was in"
 
 
 def update_to_last_fit(current: Fit, steps: Sequence[Step]) -> tuple[Fit, tuple[Step, ...]]:
@@ -39,10 +37,8 @@ def update_to_last_fit(current: Fit, steps: Sequence[Step]) -> tuple[Fit, tuple[
         if not step.adopted:
             return step
         if step in empty:
-            return step.model_copy(update={"adopted": False, "rejected_because": SUPERFLUOUS})
-        last = {n: values[n] for n in step.parameters}
-        reason = with_size(step.reason, step.effect or "", step.joints, step.parameters, last)
-        return step.model_copy(update={"parameters": last, "reason": reason})
+            return step.model_copy(update={"adopted": False, "refusal": Refusal(kind="superfluous")})
+        return step.model_copy(update={"parameters": {n: values[n] for n in step.parameters}})
 
     return current, tuple(updated(s) for s in steps)
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from model.discrepancy.candidates.decision import Decision
 from model.discrepancy.candidates.estimates import found_values, listed, only_probed, runner_up
 from model.discrepancy.candidates.ranking import Ranking
-from model.discrepancy.diagnosis import Candidate, SignalError, Step
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, SignalError, Step
 from model.discrepancy.explanation import reasons
 from model.discrepancy.explanation.samples import Left
 from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, same_answer, with_evidence
@@ -37,10 +37,15 @@ def make_step(case: Case, current: Fit, ranking: Ranking, decision: Decision) ->
     candidates += only_probed(ranking, after.observation)
     where = case.where(before)
     reason = reasons.reason(
-        effect, joints, values, best.evidence, margin, model=after.fitted_model,
-        before=before.fitted_model, records=after.observation.records, runner_up=runner_up(listed(best), candidates),
-        left=_left(after), where=where,
-    )  # fmt: skip
+        effect,
+        joints,
+        values,
+        model=after.fitted_model,
+        before=before.fitted_model,
+        records=after.observation.records,
+        rival=runner_up(listed(best), candidates),
+        left=_left(after),
+    )
     step = Step(
         effect=effect,
         joints=joints,
@@ -55,9 +60,10 @@ def make_step(case: Case, current: Fit, ranking: Ranking, decision: Decision) ->
         sum_lambda2_before=_sum_lambda2(before, before),
         sum_lambda2_after=_sum_lambda2(after, before),
         where=where,
-        reason=reason,
+        reason=UNWRITTEN,
+        reason_data=reason,
         adopted=refused is None,
-        rejected_because=refused,
+        refusal=refused,
     )
     return step, current if refused is not None else best.fit
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from model.discrepancy.diagnosis import Candidate, SignalError, Step, Where
+from model.discrepancy.grounds import Refusal
 from model.discrepancy.thresholds import Thresholds
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn
 
@@ -52,7 +53,7 @@ def test_verdicts() -> None:
 def test_a_group_that_held_out_traces_refuse_is_no_answer() -> None:
     group = (Candidate(effect="backlash", joints=(2,), evidence=50.0),)
     close = step("backlash", (2,)).model_copy(update={"group": group})
-    refused = close.model_copy(update={"adopted": False, "rejected_because": "the held-out error rises"})
+    refused = close.model_copy(update={"adopted": False, "refusal": Refusal(kind="error-rises")})
     assert verdict([close], unexplained=False) == "ambiguous"
     assert verdict([refused], unexplained=False) == "nothing-significant"
     assert verdict([step("stiction", (3,)), refused], unexplained=False) == "named"
@@ -64,4 +65,4 @@ def test_steps_on_a_joint_that_stays_unexplained_are_taken_back() -> None:
     assert first_to_withdraw(steps, (1,)) is None
     taken_back = withdrawn(steps[1], (3,))
     assert not taken_back.adopted
-    assert "joint 3 still disagrees" in str(taken_back.rejected_because)
+    assert taken_back.refusal == Refusal(kind="only-resembles", joints=(3,))

@@ -26,6 +26,7 @@ from model.discrepancy.experiment_design.next_experiment import (
     most_information,
     rivals_of,
 )
+from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.candidate_fit import CandidateFit, judge
 from model.discrepancy.output_error.case import build_case
@@ -86,8 +87,10 @@ def test_a_record_of_what_is_asked_for_separates_as_predicted(
     asked = best_experiment(friction, Asker(tuple(offered), plan, budget=60.0))
     assert asked.experiment is not None
     found = asked.experiment
-    assert set(found.separates) == {"coulomb friction on joint 2", "stribeck friction on joint 2"}
-    assert found.reason.startswith(next(e.description for e in offered if e.name == found.name))
+    assert set(found.separates) == {"Coulomb friction on joint 2", "Stribeck friction on joint 2"}
+    assert found.description == next(e.description for e in offered if e.name == found.name)
+    assert set(found.hardest) == set(found.separates)
+    assert found.differs_at is not None
     squares = []
     for true, wrong in (friction, friction[::-1]):
         records = [record(true.fit.point.fitted_model, found.spec, seed) for seed in (8, 9)]
@@ -133,9 +136,10 @@ def test_what_no_experiment_tells_is_said() -> None:
     asked = best_experiment(rivals, Asker((EXPERIMENTS["diagnostic-b"],), plan))
     assert asked.experiment is None
     assert asked.note is not None
-    assert "no experiment" in asked.note
-    assert "viscous friction on joint 2" in asked.note
-    assert "back emf error on joint 2" in asked.note
+    words = note_words(asked.note)
+    assert "no experiment" in words
+    assert "viscous friction on joint 2" in words
+    assert "back-EMF error on joint 2" in words
 
 
 def test_without_rivals_what_tells_most_is_asked_for_once(ramp_step: Trace) -> None:
@@ -147,6 +151,8 @@ def test_without_rivals_what_tells_most_is_asked_for_once(ramp_step: Trace) -> N
     asked = most_information(point, offered, []).experiment
     assert asked is not None
     assert (asked.name, asked.separates) == ("diagnostic-d", ())
+    assert asked.information is not None
+    assert asked.information > 0
     assert most_information(point, offered, [rich.spec]).experiment is None
     within = most_information(point, replace(offered, budget=5.0), []).experiment
     assert within is not None

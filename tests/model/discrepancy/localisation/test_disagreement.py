@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
+from model.discrepancy.explanation.renderer import where_with_summary
 from model.discrepancy.localisation.disagreement import _beyond, locate
 from model.discrepancy.localisation.phases import CREEP, HOLD, RAMP_START, REVERSAL, STEADY_RAMP, directions, phases_of
 from model.discrepancy.localisation.residuals import Residuals
@@ -108,8 +109,11 @@ def test_a_lag_after_reversals_is_found_there(arm: Model, records: tuple[Record,
     residual[:, 1] -= np.where(reversal, 5 * deviations[1] * directions(arm, records[0])[:, 1], 0.0)
     found = locate(Residuals(arm, records, [residual], deviations))
     assert (found.joint, found.phase) == (2, "reversal")
-    assert found.summary.startswith("joint 2, after reversals: ")
-    assert "ADC counts rms against a floor of" in found.summary
+    assert found.worst is not None
+    assert found.worst.ratio > 3.0
+    summary = where_with_summary(found).summary
+    assert summary.startswith("Joint 2, after reversals: ")
+    assert "ADC counts rms against a floor of" in summary
     worst = max(found.cells, key=lambda c: c.significance)
     assert (worst.joint, worst.phase) == (2, "reversal")
     quiet = [c for c in found.cells if c.joint != 2]
