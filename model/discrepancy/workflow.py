@@ -31,7 +31,6 @@ from model.discrepancy.output_error.controller_evidence import (
     with_findings,
     with_used_set_points,
 )
-from model.discrepancy.output_error.excess import worse_held_out
 from model.discrepancy.output_error.feedback_share import FOLLOWING_FOR_ERRORS
 from model.discrepancy.output_error.holdout import HeldOut, held_out
 from model.discrepancy.output_error.last_fit import as_last_fitted
@@ -42,7 +41,7 @@ from model.discrepancy.output_error.refitting import Judged, Refitted, deeper, j
 from model.discrepancy.output_error.search import Point, point_at, searched, settled
 from model.discrepancy.output_error.step import LAST_STEPS, step_of
 from model.discrepancy.thresholds import THRESHOLDS
-from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn
+from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn, worse_held_out
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
 
@@ -125,7 +124,7 @@ def _answer(
     """What the turns have come to, and what is taken back of it. The time that it took is not known here."""
     looked = None if found.added else case.where(found.current.point)
     left = _unexplained(case, found, looked)
-    answered = verdict((*proved, *found.steps), left)
+    answered = verdict((*proved, *found.steps), unexplained=bool(left))
     if answered == "unknown-effect":
         found = _taken_back(found, left)
     current, steps = as_last_fitted(case.observation, found.current, found.steps)

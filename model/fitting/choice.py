@@ -10,13 +10,12 @@ import numpy as np
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
-from model.fitting.options import HELD_BY_DEFAULT, FitOptions, Prior
+from model.fitting.options import FitOptions, Prior
 from model.fitting.records import Record, Signal, resolution, sensor_deviation
-from model.fitting.simulated import initial_name, presliding_name, presliding_shape_name
-from model.fitting.unknowns import Unknown, torque_power
+from model.fitting.unknowns import Unknown
 from model.machine_model import layout as at
 from model.machine_model.model import Model
-from model.machine_model.parameter import Parameter
+from model.machine_model.parameter import Parameter, initial_position, presliding, presliding_shape
 
 BEND = "potentiometer_nonlinearity"
 BEND_SHARE = 0.5
@@ -64,14 +63,14 @@ def with_bends(model: Model, options: FitOptions, signal: Signal) -> tuple[Model
     unknowns = []
     for p in wider.parameters:
         if p.effect == BEND and p.joints[0] in joints:
-            number = int(p.name.rpartition("_")[2])
+            number = at.BENDS.index(at.column(p.slots[0])) + 1
             if number > options.bend_terms:
                 continue
             size = _linearity(model.machine, p.joints[0]) or 0.0025
             sensor = model.machine.joint(p.joints[0]).sensor
             range_ = 2 * math.pi if sensor is None else sensor.range.value
             deviation = BEND_SHARE * size * range_ / number
-            unknowns.append(Unknown(p.name, p.unit, 0.0, p.low, p.high, 0.0, deviation, nuisance=True))
+            unknowns.append(Unknown(p, 0.0, p.low, p.high, 0.0, deviation, nuisance=True))
     return wider, tuple(unknowns)
 
 
@@ -86,8 +85,8 @@ def start_postures(machine: Machine, records: Sequence[Record], bends: bool) -> 
             bend = (_linearity(machine, joint) or 0.0) * sensor.range.value if bends else 0.0
             deviation = float(np.hypot(max(sensor_deviation(sensor), resolution(sensor)), bend))
             limit = 20 * deviation
-            name = initial_name(t + 1, joint)
-            found.append(Unknown(name, "rad", 0.0, -limit, limit, 0.0, deviation, nuisance=True, trace=t))
+            start = initial_position(joint, t + 1)
+            found.append(Unknown(start, 0.0, -limit, limit, 0.0, deviation, nuisance=True, trace=t))
     return tuple(found)
 
 
@@ -107,9 +106,9 @@ def friction_forms(model: Model) -> tuple[Unknown, ...]:
     for joint in joints:
         start = float(model.vector[at.slot(joint, at.PRESLIDING)])
         deviation = PRESLIDING_SHARE * start
-        name, shape = presliding_name(joint), presliding_shape_name(joint)
-        found.append(Unknown(name, "rad", start, 0.05 * start, 10 * start, start, deviation, nuisance=True))
-        found.append(Unknown(shape, "1", SHAPE, 0.0, 1.0, SHAPE, SHAPE_DEVIATION, nuisance=True))
+        distance, shape = presliding(joint, start), presliding_shape(joint, SHAPE)
+        found.append(Unknown(distance, start, 0.05 * start, 10 * start, start, deviation, nuisance=True))
+        found.append(Unknown(shape, SHAPE, 0.0, 1.0, SHAPE, SHAPE_DEVIATION, nuisance=True))
     return tuple(found)
 
 
@@ -123,7 +122,7 @@ def _chosen(p: Parameter, options: FitOptions) -> bool:
         return False
     if options.parameters is not None:
         return any(fnmatchcase(p.name, pattern) for pattern in options.parameters)
-    return p.deviation is not None and p.deviation > 0 and not any(fnmatchcase(p.name, h) for h in HELD_BY_DEFAULT)
+    return p.deviation is not None and p.deviation > 0 and not p.sets_torque_scale
 
 
 def _unknown(p: Parameter, expected: float, options: FitOptions) -> Unknown:
@@ -137,7 +136,6 @@ def _unknown(p: Parameter, expected: float, options: FitOptions) -> Unknown:
         )
     prior = Prior(expected=expected, deviation=p.deviation) if p.deviation else None
     prior = options.priors.get(p.name, prior if options.use_priors else None)
-    return Unknown(
-        p.name, p.unit, p.value, low, high, p.value if prior is None else prior.expected,
-        None if prior is None else prior.deviation, torque=torque_power(p.unit),
-    )  # fmt: skip
+    if prior is None:
+        return Unknown(p, p.value, low, high, p.value)
+    return Unknown(p, p.value, low, high, prior.expected, prior.deviation)

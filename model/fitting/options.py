@@ -6,9 +6,6 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-HELD_BY_DEFAULT = ("*.motor.torque_constant", "*.motor.resistance", "*.drive.gain")
-"""Data-sheet numbers that stay as they are unless named: they fix the scale of torque, which motion alone cannot."""
-
 Bound = FiniteFloat | None
 
 

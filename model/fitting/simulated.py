@@ -15,15 +15,12 @@ from model.dynamics.dual import DUAL_STEP
 from model.fitting.problem import Evaluation
 from model.fitting.records import Record, Signal
 from model.fitting.unknowns import Unknown
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.simulation.engines import engine_for
 from model.simulation.period import OUT_READING, OUT_SPEED, OUTPUTS
 from model.simulation.simulate import LONGEST_STEP, Options, Prepared, at_rows, prepare
 
 Floats = NDArray[np.float64]
-INITIAL = "initial"
-PRESLIDING, PRESLIDING_SHAPE = "presliding", "presliding_shape"
 
 
 @dataclass(frozen=True)
@@ -98,11 +95,6 @@ class SimulatedProblem:
         options = Options(loop=self.loop, quantise=False, step=self.step)
         return [prepare(self.model, record.inputs, options) for record in self.records]
 
-    @cached_property
-    def _places(self) -> list[tuple[NDArray[np.int64], tuple[int, int] | None]]:
-        """Per unknown, its slots in the flat vector, or its place (joint index, 0 or 1) in the initial state."""
-        return [unknown_place(self.model, u.name) for u in self.unknowns]
-
     def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
         """Residuals of every record. Raises SpecError when a simulation does not stay finite."""
         found = []
@@ -126,14 +118,14 @@ class SimulatedProblem:
         vector, initials = self._state(values)
         which, seeds = self._rows(derivatives)
         dtype = np.complex128 if derivatives else np.float64
-        vectors = np.tile(vector.astype(dtype), (len(which), 1))
+        vectors: NDArray[Any] = np.tile(vector.astype(dtype), (len(which), 1))
         starts = np.array([initials[t] for t in which], dtype=dtype)
         for row, unknown in enumerate(seeds):
             if unknown >= 0:
-                slots, place = self._places[unknown]
-                vectors[row, slots] += 1j * DUAL_STEP
-                if place is not None:
-                    starts[row][place] += 1j * DUAL_STEP
+                parameter = self.unknowns[unknown].parameter
+                vectors[row, list(parameter.slots)] += 1j * DUAL_STEP
+                if parameter.initial is not None:
+                    starts[row][parameter.initial] += 1j * DUAL_STEP
         longest = max(len(r.inputs) for r in self.records)
         out: NDArray[Any] = np.zeros((len(which), OUTPUTS, longest, self.model.joint_count), dtype=dtype)
         engine = engine_for(self.model)
@@ -175,38 +167,10 @@ class SimulatedProblem:
         """Flat vector and initial states for values of the unknowns."""
         vector = self.model.vector.copy()
         initials = [record.inputs.initial.copy() for record in self.records]
-        for value, unknown, (slots, place) in zip(values, self.unknowns, self._places, strict=True):
-            if place is None:
-                vector[slots] = value
-            else:
+        for value, unknown in zip(values, self.unknowns, strict=True):
+            place = unknown.parameter.initial
+            vector[list(unknown.parameter.slots)] = value
+            if place is not None:
                 for t in range(len(initials)) if unknown.trace is None else (unknown.trace,):
                     initials[t][place] += value
         return vector, initials
-
-
-def initial_name(trace: int, joint: int) -> str:
-    """Name of the unknown by which joint `joint` starts trace number `trace` (from 1) off the posture it was
-    read at."""
-    return f"{INITIAL}.trace{trace}.joint{joint}.position"
-
-
-def presliding_name(joint: int) -> str:
-    """Name of the unknown that is a joint's presliding distance, rad."""
-    return f"{PRESLIDING}.joint{joint}"
-
-
-def presliding_shape_name(joint: int) -> str:
-    """Name of the unknown that is the shape of a joint's presliding, 0 (Prandtl) to 1 (Dahl)."""
-    return f"{PRESLIDING_SHAPE}.joint{joint}"
-
-
-def unknown_place(model: Model, name: str) -> tuple[NDArray[np.int64], tuple[int, int] | None]:
-    """Where an unknown acts: its slots in the flat vector, or its place (joint index, column) in the initial state."""
-    for kind, column in ((PRESLIDING, at.PRESLIDING), (PRESLIDING_SHAPE, at.PRESLIDING_SHAPE)):
-        if name.startswith(kind + "."):
-            joint = int(name.rpartition("joint")[2])
-            return np.array([at.slot(joint, column)]), None
-    if name.startswith(INITIAL + "."):
-        joint = int(name.split(".")[2].removeprefix("joint"))
-        return np.zeros(0, dtype=np.int64), (joint - 1, 0)
-    return np.array(model.parameter(name).slots, dtype=np.int64), None

@@ -1,4 +1,4 @@
-"""What a fit may change: names, starting values, bounds, and how far from its expected value each is likely to be."""
+"""What a fit may change: parameters, where their search begins, bounds, and how far off each is likely to be."""
 
 from __future__ import annotations
 
@@ -9,25 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from model.machine_model.parameter import Kind, Parameter
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """One number to be found.
+    """A parameter that is to be found, and how it is searched.
 
     Args:
-        name: full name. unit: as in reports.
+        parameter: what is to be found: kind, joints, effect and part; its own value, bounds and deviation take no part.
         start: where the search begins. low, high: physical bounds, ±inf for none.
         expected, deviation: Gaussian prior; deviation None where nothing is claimed.
         nuisance: found only so that the others are not biased by it (start posture, bend of a potentiometer).
         trace: index of the only trace it belongs to; None for all.
-        torque: power of torque in its unit: 1 for a mass, −1 for a compliance, 0 for a length.
     """
 
-    name: str
-    unit: str
+    parameter: Parameter
     start: float
     low: float = -math.inf
     high: float = math.inf
@@ -35,7 +34,6 @@ class Unknown:
     deviation: float | None = None
     nuisance: bool = False
     trace: int | None = None
-    torque: int = 0
 
     def __post_init__(self) -> None:
         if not self.low < self.high:
@@ -46,6 +44,31 @@ class Unknown:
             )
         if self.deviation is not None and not (self.deviation > 0 and math.isfinite(self.deviation)):
             raise SpecError(f"{self.name}: expected deviation {self.deviation:g} {self.unit} must be above 0")
+
+    @property
+    def name(self) -> str:
+        """Full name of the parameter, for people and files; what it is stands in `parameter`."""
+        return self.parameter.name
+
+    @property
+    def unit(self) -> str:
+        """Unit of the parameter, as in reports."""
+        return self.parameter.unit
+
+    @property
+    def kind(self) -> Kind:
+        """What sort of number it is."""
+        return self.parameter.kind
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """The joints it belongs to, from 1; empty for the whole machine."""
+        return self.parameter.joints
+
+    @property
+    def torque(self) -> int:
+        """Power of torque in its unit: 1 for a mass, −1 for a compliance, 0 for a length."""
+        return torque_power(self.unit)
 
     @property
     def scale(self) -> float:

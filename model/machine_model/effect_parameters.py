@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from daq.contracts.machine import Friction, Machine
 from daq.contracts.quantity import Quantity
 from model.effects.effect import Effect, EffectParameter, JointScale, sized
 from model.effects.library import effect
 from model.machine_model import layout as at
 from model.machine_model.nominal import joint_scale
-from model.machine_model.parameter import Parameter
+from model.machine_model.parameter import Kind, Parameter
 
 
 def effect_parameters(
@@ -21,41 +23,50 @@ def effect_parameters(
     kind = effect(name)
     if kind.whole_machine:
         scale = joint_scale(machine, machine.modelled_joints[-1])
-        return tuple(
-            _parameter(kind, p, f"{kind.group}.{name}", scale, (), (p.column,), None, "") for p in kind.parameters
-        )
-    groups = [joints] if shared else [(j,) for j in joints]
+        return tuple(replace(_parameter(kind, p, scale, kind.group), slots=(p.column,)) for p in kind.parameters)
     found = []
-    for group in groups:
-        label = f"joint{group[0]}" if len(group) == 1 else "joints" + "+".join(str(j) for j in group)
+    for group in [joints] if shared else [(j,) for j in joints]:
+        place = f"joint{group[0]}" if len(group) == 1 else "joints" + "+".join(str(j) for j in group)
+        first = machine.joint(group[0])
         scale = joint_scale(machine, group[0])
+        known = _known(first.friction, name, scale)
         for p in kind.parameters:
+            own = _parameter(kind, p, scale, place)
+            if known is not None:
+                own = _with_known(own, known)
+            unit = own.unit.replace("N·m", "N").replace("rad", "m") if first.kind == "prismatic" else own.unit
             slots = tuple(at.slot(j, p.column + beyond) for j in group)
-            known = _known(machine.joint(group[0]).friction, name, scale)
-            found.append(
-                _parameter(kind, p, f"{label}.{name}", scale, group, slots, known, machine.joint(group[0]).kind)
-            )
+            found.append(replace(own, unit=unit, slots=slots, joints=group))
     return tuple(found)
 
 
-def _parameter(
-    kind: Effect, p: EffectParameter, prefix: str, scale: JointScale, joints: tuple[int, ...], slots: tuple[int, ...],
-    known: Quantity | None, joint_kind: str,
-) -> Parameter:  # fmt: skip
-    unit = p.unit.replace("N·m", "N").replace("rad", "m") if joint_kind == "prismatic" else p.unit
-    null = None if p.null is None else sized(p.null, scale)
-    if known is not None:
-        low = sized(p.low, scale) if known.low is None else known.low
-        high = sized(p.high, scale) if known.high is None else known.high
-        deviation = sized(p.deviation, scale) if known.deviation is None else known.deviation
-        return Parameter(
-            f"{prefix}.{p.name}", unit, known.value, known.source, slots, low, high, null, deviation,
-            kind.name, joints,
-        )  # fmt: skip
+def _parameter(kind: Effect, p: EffectParameter, scale: JointScale, place: str) -> Parameter:
+    """The parameter at its starting value, on no joint yet."""
     return Parameter(
-        f"{prefix}.{p.name}", unit, p.starting_value(scale), p.source or kind.source, slots, sized(p.low, scale),
-        sized(p.high, scale), null, sized(p.deviation, scale), kind.name, joints,
-    )  # fmt: skip
+        name=f"{place}.{kind.name}.{p.name}",
+        kind=Kind.EFFECT,
+        part=p.name,
+        unit=p.unit,
+        value=p.starting_value(scale),
+        source=p.source or kind.source,
+        low=sized(p.low, scale),
+        high=sized(p.high, scale),
+        null=None if p.null is None else sized(p.null, scale),
+        deviation=sized(p.deviation, scale),
+        effect=kind.name,
+    )
+
+
+def _with_known(p: Parameter, known: Quantity) -> Parameter:
+    """The parameter with the number that the machine file states, and what the file says of bounds and deviation."""
+    return replace(
+        p,
+        value=known.value,
+        source=known.source,
+        low=p.low if known.low is None else known.low,
+        high=p.high if known.high is None else known.high,
+        deviation=p.deviation if known.deviation is None else known.deviation,
+    )
 
 
 def _known(friction: Friction, name: str, scale: JointScale) -> Quantity | None:

@@ -116,3 +116,8 @@ def size(joints: int) -> int:
 def slot(joint: int, column: int) -> int:
     """Index of a joint's (from 1) column in the vector."""
     return SHARED + (joint - 1) * PER_JOINT + column
+
+
+def column(slot: int) -> int:
+    """The column of a joint that an index in the vector beyond `SHARED` is."""
+    return (slot - SHARED) % PER_JOINT

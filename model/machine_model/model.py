@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Annotated, Any, Self
 
@@ -111,9 +112,7 @@ class Model(_Part):
             found.extend(_not_taken(effect_parameters(self.machine, use.name, use.joints, use.shared, beyond), found))
         for name, members in self.ties.items():
             found = _tied(found, name, members)
-        return tuple(
-            p if p.name not in self.values else Parameter(**{**vars(p), "value": self.values[p.name]}) for p in found
-        )
+        return tuple(p if p.name not in self.values else replace(p, value=self.values[p.name]) for p in found)
 
     @cached_property
     def own_columns(self) -> dict[str, int]:
@@ -137,6 +136,10 @@ class Model(_Part):
             near = [n for n in self.by_name if n.partition(".")[0] == name.partition(".")[0] or n.endswith(last)]
             raise SpecError(f"parameter {name!r}: not in this model; it has {', '.join(near or self.by_name)}")
         return self.by_name[name]
+
+    def of_effect(self, effect: str, joint: int | None = None) -> dict[str, Parameter]:
+        """Parameters of an effect on one joint, or (None) of the whole machine, by their part of it."""
+        return {p.part: p for p in self.parameters if p.effect == effect and (joint is None or joint in p.joints)}
 
     @cached_property
     def joint_count(self) -> int:
@@ -189,10 +192,10 @@ class Model(_Part):
         wider = self._changed(effects=(*self.effects, use))
         chosen: dict[str, float] = {}
         for key, value in (values or {}).items():
-            own = [p.name for p in effect_parameters(self.machine, name, joints, shared)]
-            matching = [n for n in own if n == key or n.rpartition(".")[2] == key]
+            own = effect_parameters(self.machine, name, joints, shared)
+            matching = [p.name for p in own if key in (p.name, p.part)]
             if not matching:
-                raise SpecError(f"effect {name} has no parameter {key!r}; it has {', '.join(own)}")
+                raise SpecError(f"effect {name} has no parameter {key!r}; it has {', '.join(p.name for p in own)}")
             chosen.update(dict.fromkeys(matching, value))
         return wider.with_values(chosen) if chosen else wider
 
@@ -280,7 +283,7 @@ def _overlap(one: EffectUse, other: EffectUse) -> bool:
 def _not_taken(own: tuple[Parameter, ...], before: list[Parameter]) -> list[Parameter]:
     """Without places that a parameter of an effect before it fills: play and give of one joint have one damping."""
     taken = {slot for p in before if p.effect is not None for slot in p.slots}
-    left = [Parameter(**{**vars(p), "slots": tuple(s for s in p.slots if s not in taken)}) for p in own]
+    left = [replace(p, slots=tuple(s for s in p.slots if s not in taken)) for p in own]
     return [p for p in left if p.slots]
 
 
@@ -291,9 +294,12 @@ def _tied(found: list[Parameter], name: str, members: tuple[str, ...]) -> list[P
             f"tie {name!r}: {sorted(set(members) - {p.name for p in tied})} are not parameters of the model"
         )
     first = tied[0]
-    one = Parameter(
-        name, first.unit, first.value, first.source, tuple(s for p in tied for s in p.slots),
-        low=max(p.low for p in tied), high=min(p.high for p in tied), null=first.null, deviation=first.deviation,
-        effect=first.effect, joints=tuple(sorted({j for p in tied for j in p.joints})),
-    )  # fmt: skip
+    one = replace(
+        first,
+        name=name,
+        slots=tuple(s for p in tied for s in p.slots),
+        low=max(p.low for p in tied),
+        high=min(p.high for p in tied),
+        joints=tuple(sorted({j for p in tied for j in p.joints})),
+    )
     return [one if p is first else p for p in found if p is first or p not in tied]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from daq.contracts.quantity import Quantity
 from model.effects.effect import JointScale
 from model.effects.transmission import contact_compliance
 from model.machine_model import layout as at
-from model.machine_model.parameter import Parameter
+from model.machine_model.parameter import Kind, Parameter
 
 NO_LIMIT = 1e9
 """Stands in the vector for a limit that is not set."""
@@ -24,58 +25,68 @@ PRESLIDING_COUNTS = 0.5
 """Counts of the sensor over which friction builds up: an assumption, below what the sensor sees."""
 
 
-def parameter(
-    name: str, quantity: Quantity, slot: int, joints: tuple[int, ...] = (), low: float = -math.inf
-) -> Parameter:
-    """A parameter from a number of the machine file; `low` bounds it where the file does not."""
-    source = quantity.source + (" (assumed)" if quantity.assumed else "")
+def parameter(place: str, kind: Kind, part: str, quantity: Quantity, slot: int, low: float = -math.inf) -> Parameter:
+    """A parameter of the whole machine from a number of its file; `low` bounds it where the file does not."""
     return Parameter(
-        name, quantity.unit, quantity.value, source, (slot,),
+        name=f"{place}.{part}",
+        kind=kind,
+        part=part,
+        unit=quantity.unit,
+        value=quantity.value,
+        source=quantity.source + (" (assumed)" if quantity.assumed else ""),
+        slots=(slot,),
         low=low if quantity.low is None else quantity.low,
         high=math.inf if quantity.high is None else quantity.high,
-        deviation=quantity.deviation, joints=joints,
-    )  # fmt: skip
+        deviation=quantity.deviation,
+    )
 
 
 def base_parameters(machine: Machine) -> tuple[Parameter, ...]:
     """Parameters that every model of the machine has: geometry, inertia, motors, controller delay."""
     found = [p for number in machine.modelled_joints for p in _of_joint(number, machine.joint(number))]
     if machine.load is not None:
-        found.append(parameter("load.mass", machine.load, at.LOAD, low=0.0))
+        found.append(parameter("load", Kind.INERTIA, "mass", machine.load, at.LOAD, 0.0))
     if not isinstance(machine.controller, NoController):
-        found.append(parameter("controller.delay", machine.controller.delay, at.DELAY, low=0.0))
+        found.append(parameter("controller", Kind.CONTROLLER, "delay", machine.controller.delay, at.DELAY, 0.0))
     return tuple(found)
 
 
 def _of_joint(number: int, joint: Joint) -> Iterator[Parameter]:
-    def named(name: str, quantity: Quantity, column: int, low: float = -math.inf) -> Parameter:
-        return parameter(name.format(number), quantity, at.slot(number, column), (number,), low)
+    found = (*_of_link(f"link{number}", joint), *_of_drive(f"joint{number}", joint.drive))
+    for place, kind, part, quantity, column, low in found:
+        yield replace(parameter(place, kind, part, quantity, at.slot(number, column), low), joints=(number,))
 
-    geometry = joint.geometry
+
+def _of_link(place: str, joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
+    """Arguments of `parameter`, with the joint's column in place of the slot."""
+    geometry, link = joint.geometry, joint.link
     if geometry.a.value != 0.0:
-        yield named("link{}.length", geometry.a, at.A, 0.0)
+        yield place, Kind.GEOMETRY, "length", geometry.a, at.A, 0.0
     if geometry.d.value != 0.0:
-        yield named("link{}.offset", geometry.d, at.D)
-    yield named("link{}.mass", joint.link.mass, at.MASS, 0.0)
-    if isinstance(joint.link, Cylinder):
-        yield named("link{}.radius", joint.link.radius, at.RADIUS, 0.0)
-    elif isinstance(joint.link, Body):
-        for axis, quantity in enumerate(joint.link.centre):
-            yield named(f"link{{}}.centre_{'xyz'[axis]}", quantity, at.CENTRE_X + axis)
+        yield place, Kind.GEOMETRY, "offset", geometry.d, at.D, -math.inf
+    yield place, Kind.INERTIA, "mass", link.mass, at.MASS, 0.0
+    if isinstance(link, Cylinder):
+        yield place, Kind.GEOMETRY, "radius", link.radius, at.RADIUS, 0.0
+    elif isinstance(link, Body):
+        for axis, quantity in enumerate(link.centre):
+            yield place, Kind.INERTIA, f"centre_{'xyz'[axis]}", quantity, at.CENTRE_X + axis, -math.inf
         for k, entry in enumerate(("xx", "yy", "zz", "xy", "xz", "yz")):
-            yield named(
-                f"link{{}}.inertia_{entry}", joint.link.inertia[k], at.INERTIA_XX + k, 0.0 if k < 3 else -math.inf
-            )
-    drive = joint.drive
+            low = 0.0 if k < 3 else -math.inf
+            yield place, Kind.INERTIA, f"inertia_{entry}", link.inertia[k], at.INERTIA_XX + k, low
+
+
+def _of_drive(place: str, drive: DcMotor | PlainGain) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
+    """Arguments of `parameter`, with the joint's column in place of the slot."""
     if isinstance(drive, DcMotor):
-        yield named("joint{}.motor.resistance", drive.resistance, at.RESISTANCE, 1e-6)
-        yield named("joint{}.motor.torque_constant", drive.torque_constant, at.TORQUE_CONSTANT, 1e-9)
-        yield named("joint{}.motor.back_emf_constant", drive.back_emf_constant, at.BACK_EMF, 0.0)
-        yield named("joint{}.motor.rotor_inertia", drive.rotor_inertia, at.ROTOR_INERTIA, 0.0)
+        motor = f"{place}.motor"
+        yield motor, Kind.DRIVE, "resistance", drive.resistance, at.RESISTANCE, 1e-6
+        yield motor, Kind.DRIVE, "torque_constant", drive.torque_constant, at.TORQUE_CONSTANT, 1e-9
+        yield motor, Kind.DRIVE, "back_emf_constant", drive.back_emf_constant, at.BACK_EMF, 0.0
+        yield motor, Kind.INERTIA, "rotor_inertia", drive.rotor_inertia, at.ROTOR_INERTIA, 0.0
     else:
-        yield named("joint{}.drive.gain", drive.gain, at.TORQUE_CONSTANT)
+        yield f"{place}.drive", Kind.DRIVE, "gain", drive.gain, at.TORQUE_CONSTANT, -math.inf
         if drive.inertia is not None:
-            yield named("joint{}.drive.inertia", drive.inertia, at.ROTOR_INERTIA, 0.0)
+            yield f"{place}.drive", Kind.INERTIA, "inertia", drive.inertia, at.ROTOR_INERTIA, 0.0
 
 
 def nominal_vector(machine: Machine) -> NDArray[np.float64]:

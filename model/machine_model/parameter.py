@@ -1,38 +1,129 @@
-"""A named number of a model: unit, bounds, where it does nothing, how far the real machine may be from it."""
+"""A number of a model and what it is: kind, joints, effect and part, unit, bounds, and where it lies."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import StrEnum
+
+from model.machine_model import layout as at
 
 
-@dataclass(frozen=True)
+class Kind(StrEnum):
+    """What sort of number a parameter is."""
+
+    GEOMETRY = "geometry"
+    """Length, offset or radius of a link: what a ruler measures."""
+    INERTIA = "inertia"
+    """Mass, centre of mass or moment of inertia of a link, mass of the load, inertia of a rotor or of a plain drive."""
+    DRIVE = "drive"
+    """Resistance, torque constant or back-EMF constant of a motor, gain of a plain drive."""
+    CONTROLLER = "controller"
+    """Delay of the controller."""
+    EFFECT = "effect"
+    """A number that an effect of the library brings with it; friction is one of them."""
+    PRESLIDING = "presliding"
+    """Distance over which a joint's friction builds up."""
+    PRESLIDING_SHAPE = "presliding shape"
+    """Shape of that rise, from 0 (Prandtl) to 1 (Dahl)."""
+    INITIAL_POSITION = "initial position"
+    """Where a joint starts: how far off the posture that was read."""
+    INITIAL_VELOCITY = "initial velocity"
+    """How fast a joint starts: beyond the speed that was read."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """One parameter of one model.
+    """One number of one model, or of the state from which a run of it starts.
+
+    What it is stands in `kind`, `part`, `effect` and `joints`. The name is for people and files: nothing parses it.
 
     Args:
         name: such as `joint2.viscous_friction.coefficient`, `link3.mass`, `controller.delay`; joints that share it are
             joined by a plus: `joints1+2.coulomb_friction.torque`.
+        kind: what sort of number it is.
+        part: which number of its link, motor, controller or effect it is: `mass`, `resistance`, `coefficient`; of
+            parameters that share one value, the part of the first.
         unit: as written in reports.
         value: of this model.
+        source: where the value comes from.
+        slots: indices in the flat vector that it fills, all with the same value; none for an initial state.
         low, high: what is physically possible; ±inf where nothing bounds it.
         null: value at which the effect does nothing; None for a number that every model has, and for one that only
             shapes an effect.
         deviation: expected standard deviation of the real machine from the nominal value; None where none is claimed.
-        source: where the value comes from.
-        slots: indices in the flat vector that it fills, all with the same value.
         effect: the effect it belongs to; None for a number of the machine itself.
         joints: the joints it belongs to, from 1; empty for the whole machine.
     """
 
     name: str
+    kind: Kind
+    part: str
     unit: str
     value: float
-    source: str
-    slots: tuple[int, ...]
+    source: str = ""
+    slots: tuple[int, ...] = ()
     low: float = -math.inf
     high: float = math.inf
     null: float | None = None
     deviation: float | None = None
     effect: str | None = None
     joints: tuple[int, ...] = ()
+
+    @property
+    def initial(self) -> tuple[int, int] | None:
+        """Its place in an initial state (n, 2): row of the joint, column 0 for position and 1 for velocity. None for
+        a number of the model itself."""
+        if self.kind is Kind.INITIAL_POSITION:
+            return self.joints[0] - 1, 0
+        if self.kind is Kind.INITIAL_VELOCITY:
+            return self.joints[0] - 1, 1
+        return None
+
+    @property
+    def sets_torque_scale(self) -> bool:
+        """Whether it is a data-sheet number that fixes the scale of all torques, which motion alone cannot show."""
+        return self.kind is Kind.DRIVE and self.part in ("torque_constant", "resistance", "gain")
+
+
+def initial_position(joint: int, trace: int | None = None) -> Parameter:
+    """How far a joint starts off the posture that was read, rad. `trace`: number (from 1) of the trace, if of one."""
+    return _initial(Kind.INITIAL_POSITION, "position", "rad", joint, trace)
+
+
+def initial_velocity(joint: int, trace: int | None = None) -> Parameter:
+    """How much faster a joint starts than was read, rad/s. `trace`: number (from 1) of the trace, if of one."""
+    return _initial(Kind.INITIAL_VELOCITY, "velocity", "rad/s", joint, trace)
+
+
+def presliding(joint: int, value: float) -> Parameter:
+    """The distance over which a joint's friction builds up, rad."""
+    slots = (at.slot(joint, at.PRESLIDING),)
+    return Parameter(
+        name=f"presliding.joint{joint}",
+        kind=Kind.PRESLIDING,
+        part="distance",
+        unit="rad",
+        value=value,
+        slots=slots,
+        joints=(joint,),
+    )
+
+
+def presliding_shape(joint: int, value: float) -> Parameter:
+    """The shape of a joint's presliding, from 0 (Prandtl) to 1 (Dahl)."""
+    slots = (at.slot(joint, at.PRESLIDING_SHAPE),)
+    return Parameter(
+        name=f"presliding_shape.joint{joint}",
+        kind=Kind.PRESLIDING_SHAPE,
+        part="shape",
+        unit="1",
+        value=value,
+        slots=slots,
+        joints=(joint,),
+    )
+
+
+def _initial(kind: Kind, part: str, unit: str, joint: int, trace: int | None) -> Parameter:
+    place = f"joint{joint}" if trace is None else f"trace{trace}.joint{joint}"
+    return Parameter(name=f"initial.{place}.{part}", kind=kind, part=part, unit=unit, value=0.0, joints=(joint,))

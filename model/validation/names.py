@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 
 from daq.contracts.errors import SpecError
-from model.fitting.options import HELD_BY_DEFAULT
 from model.machine_model.model import Model
 
 
@@ -24,9 +23,7 @@ def names_to_validate(model: Model, patterns: Sequence[str] | None = None) -> tu
     fitted = (model.lineage.fit or {}).get("fitted", [])
     if chosen := tuple(n for n in names if n in fitted):
         return chosen
-    chosen = tuple(
-        p.name for p in model.parameters if p.deviation and not any(fnmatchcase(p.name, h) for h in HELD_BY_DEFAULT)
-    )
+    chosen = tuple(p.name for p in model.parameters if p.deviation and not p.sets_torque_scale)
     if not chosen:
         raise SpecError("no parameter has an expected deviation: name those to vary with --parameters")
     return chosen

@@ -10,7 +10,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from model.fitting.options import HELD_BY_DEFAULT
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
@@ -71,7 +70,7 @@ def tolerances(model: Model, added: frozenset[str] = frozenset()) -> tuple[tuple
 
 def _held(p: Parameter) -> bool:
     """Data-sheet numbers that fix the scale of torque, and geometry, which a ruler knows better than any torque."""
-    return any(fnmatchcase(p.name, pattern) for pattern in HELD_BY_DEFAULT)
+    return p.sets_torque_scale
 
 
 def _inertial(p: Parameter) -> bool:

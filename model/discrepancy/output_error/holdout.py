@@ -15,9 +15,9 @@ from model.discrepancy.output_error.feedback_share import FOLLOWING_FOR_ERRORS
 from model.discrepancy.output_error.noise_floor import noise_floor
 from model.discrepancy.output_error.observation import Observation, Signals, observed
 from model.discrepancy.output_error.search import Point, point_at, searched
-from model.fitting.simulated import INITIAL
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
+from model.machine_model.parameter import Kind
 
 Floats = NDArray[np.float64]
 
@@ -99,7 +99,7 @@ def _here(point: Point, own: tuple[Unknown, ...]) -> tuple[tuple[Unknown, ...], 
     """A point's unknowns and values for held-out traces: unknowns of their own in place of where the fitted ones
     begin."""
     names = {u.name for u in own}
-    kept = [k for k, u in enumerate(point.unknowns) if not u.name.startswith(INITIAL + ".") and u.name not in names]
+    kept = [k for k, u in enumerate(point.unknowns) if u.kind is not Kind.INITIAL_POSITION and u.name not in names]
     held = [replace(point.unknowns[k], deviation=None) for k in kept]  # no prior and no derivative: they stay
     return (*held, *own), np.concatenate([point.values[kept], [u.start for u in own]])
 
@@ -115,7 +115,7 @@ def _phases(point: Point) -> tuple[Unknown, ...]:
         values = [float(fitted.get(p.name, p.value)) for p in (sine, cosine)]
         size = math.hypot(*values)
         if size > 0.0:
-            found += [Unknown(p.name, p.unit, v, deviation=size) for p, v in zip((sine, cosine), values, strict=True)]
+            found += [Unknown(p, v, deviation=size) for p, v in zip((sine, cosine), values, strict=True)]
     return tuple(found)
 
 
@@ -139,7 +139,7 @@ def held_out(model: Model, traces: Sequence[Trace]) -> HeldOut | None:
     if not traces:
         return None
     observation, _, unknowns = observed(model, traces, FOLLOWING_FOR_ERRORS)
-    return HeldOut(observation, tuple(u for u in unknowns if u.name.startswith(INITIAL + ".")))
+    return HeldOut(observation, tuple(u for u in unknowns if u.kind is Kind.INITIAL_POSITION))
 
 
 def errors(

@@ -22,9 +22,10 @@ from model.discrepancy.output_error.feedback_share import FOLLOWING
 from model.fitting.fit import fit_problem
 from model.fitting.options import FitOptions
 from model.fitting.records import Record
-from model.fitting.simulated import INITIAL, SimulatedProblem, unknown_place
+from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
+from model.machine_model.parameter import Kind
 from model.simulation.engines import engine_for
 from model.simulation.inputs import readings_on_grid
 from model.simulation.period import OUT_READING, OUTPUTS
@@ -134,9 +135,9 @@ class Observation:
         vector = model.vector.copy()
         initials = [record.inputs.initial.copy() for record in self.records]
         for value, unknown in zip(values, unknowns, strict=True):
-            slots, place = unknown_place(model, unknown.name)
+            place = unknown.parameter.initial
             if place is None:
-                vector[slots] = value
+                vector[list(model.by_name.get(unknown.name, unknown.parameter).slots)] = value
             else:
                 for t in range(len(initials)) if unknown.trace is None else (unknown.trace,):
                     initials[t][place] += value
@@ -252,14 +253,14 @@ def _difference(model: Model, unknown: Unknown, value: float, seconds: float) ->
     last = None if parameter is None else (parameter.effect, unknown.name.rpartition(".")[2])
     if last in (("torque_ripple", "cycles"), ("periodic_disturbance", "frequency")):
         size = TONE_DIFFERENCE / (1.0 if last[1] == "cycles" else seconds)
-    if unknown.name.startswith(INITIAL + "."):
+    if unknown.kind is Kind.INITIAL_POSITION:
         size /= LOOSE_START
     return -size if value + size > unknown.high else size
 
 
 def _loose_start(unknown: Unknown) -> Unknown:
     """A posture at the start, free to be where the trace shows it."""
-    if not unknown.name.startswith(INITIAL + ".") or unknown.deviation is None:
+    if unknown.kind is not Kind.INITIAL_POSITION or unknown.deviation is None:
         return unknown
     limit = 2 * LOOSE_START * unknown.deviation
     return replace(unknown, deviation=LOOSE_START * unknown.deviation, low=-limit, high=limit)

@@ -239,7 +239,7 @@ def _started(point: Point, probed: Probed) -> Point:
         start = float(np.clip(probed.start.get(p.name, p.value), low, high))
         shape = p.null is None
         deviation = SHAPE_PRIOR * p.deviation if shape and p.deviation else None
-        unknowns.append(Unknown(p.name, p.unit, start, low, high, start if shape else 0.0, deviation))
+        unknowns.append(Unknown(p, start, low, high, start if shape else 0.0, deviation))
         values.append(start)
     tangents = np.concatenate([point.tangents[kept], np.zeros((len(candidate.free), point.tangents.shape[1]))])
     return replace(

@@ -21,6 +21,7 @@ from model.discrepancy.grounds import Note
 from model.discrepancy.options import DiagnosisOptions
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import base_model
+from model.machine_model.parameter import Kind, Parameter
 from tests.daq.traces.samples import record
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.models.conftest import write_csv
@@ -64,7 +65,8 @@ def test_other_verdicts_are_said_as_what_they_are(answer: Diagnosis) -> None:
 
 
 def test_numbers_far_from_what_is_stated_stand_right_under_the_verdict(answer: Diagnosis) -> None:
-    mass = Unknown("load.mass", "kg", start=500.0, expected=500.0, deviation=50.0)
+    load = Parameter(name="load.mass", kind=Kind.INERTIA, part="mass", unit="kg", value=500.0)
+    mass = Unknown(load, start=500.0, expected=500.0, deviation=50.0)
     notes = (Note(kind="positions-of-links"), *on_stated_numbers([mass], {"load.mass": 1.3}))
     warned = with_sentences(answer.model_copy(update={"notes_data": notes}))
     lines = [line for line in answer_text(warned).splitlines() if line]

@@ -15,6 +15,7 @@ from model.fitting.least_squares import Search, solve
 from model.fitting.problem import Evaluation
 from model.fitting.unknowns import Unknown
 from model.fitting.whitening import white
+from model.machine_model.parameter import Kind, Parameter
 
 Floats = NDArray[np.float64]
 
@@ -32,7 +33,8 @@ class Curve:
     def unknowns(self) -> tuple[Unknown, ...]:
         starts = (1.0, 0.5, 0.0)
         return tuple(
-            Unknown(n, "1", s, low, high) for n, s, (low, high) in zip("abc", starts, self.bounds, strict=True)
+            Unknown(Parameter(name=n, kind=Kind.EFFECT, part=n, unit="1", value=s), s, low, high)
+            for n, s, (low, high) in zip("abc", starts, self.bounds, strict=True)
         )
 
     @property

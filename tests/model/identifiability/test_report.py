@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 
 from model.fitting.unknowns import Unknown, torque_power
 from model.identifiability.report import judged
+from model.machine_model.parameter import Kind, Parameter
 
 Floats = NDArray[np.float64]
 RANDOM = partial(np.random.default_rng, 5)
 
 
 def unknown(name: str, unit: str, value: float, deviation: float | None = None, nuisance: bool = False) -> Unknown:
-    return Unknown(name, unit, value, expected=value, deviation=deviation, nuisance=nuisance, torque=torque_power(unit))
+    parameter = Parameter(name=name, kind=Kind.INERTIA, part="mass", unit=unit, value=value)
+    return Unknown(parameter, value, expected=value, deviation=deviation, nuisance=nuisance)
 
 
 def pendulum_jacobian(values: Floats, noise: float) -> Floats:

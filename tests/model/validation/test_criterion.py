@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from daq.contracts.errors import SpecError
-from model.machine_model.parameter import Parameter
 from model.validation.criterion import contribution, required_deviation
 from model.validation.expected_deviation import expected_deviation, gaussian_share
 from tests.model.validation.synthetic import arm
@@ -57,7 +57,7 @@ def test_expected_deviations_follow_the_source(name: str, share: float, basis: s
 
 
 def test_a_parameter_around_zero_takes_its_stated_deviation_or_is_refused() -> None:
-    offset = Parameter("joint1.potentiometer_offset.angle", "rad", 0.0, "test", (0,), deviation=0.01)
-    assert expected_deviation(offset, "source") == (0.01, "stated")
+    offset = arm().with_effect("potentiometer_offset", (1,)).parameter("joint1.potentiometer_offset.angle")
+    assert expected_deviation(offset, "source") == (offset.deviation, "stated")
     with pytest.raises(SpecError, match="no expected deviation"):
-        expected_deviation(Parameter("x.y", "rad", 0.0, "test", (0,)), "source")
+        expected_deviation(replace(offset, deviation=None), "source")

@@ -60,7 +60,7 @@ def dead_zone_fitted(noise: float) -> tuple[Observation, Judged, Parameter]:
     begun = imagined.arm().with_effect("dead_zone", (1,), {"width": 0.7 * WIDTH})
     observation, model, unknowns = observed(begun, [imagined.trace(arm, seconds=20.0, noise=noise)])
     parameter = model.by_name["joint1.dead_zone.width"]
-    width = Unknown(parameter.name, parameter.unit, 0.7 * WIDTH, 0.0, 10.0, 0.0, None)
+    width = Unknown(parameter, 0.7 * WIDTH, 0.0, 10.0, 0.0, None)
     free = (*(u for u in unknowns if u.name != parameter.name), width)
     given = point_at(observation, model, free, np.array([u.start for u in free]))
     return observation, judge(observation, settled(observation, given, 4)), parameter
@@ -87,7 +87,7 @@ def test_derivatives_by_a_tones_frequency_are_taken_over_little_of_a_turn(monkey
     arm = imagined.arm().with_effect("torque_ripple", (3,), ripple)
     observation, model, unknowns = observed(arm, [imagined.trace(arm, seconds=20.0)])
     cycles = model.by_name["joint3.torque_ripple.cycles"]
-    free = (*unknowns, Unknown(cycles.name, cycles.unit, 30.0, 1.0, 100.0, 30.0, 18.0))
+    free = (*unknowns, Unknown(cycles, 30.0, 1.0, 100.0, 30.0, 18.0))
     values = np.array([u.start for u in free])
     taken = observation.tangents(model, free, values, [len(free) - 1])
     monkeypatch.setattr("model.discrepancy.output_error.observation.TONE_DIFFERENCE", 0.005)

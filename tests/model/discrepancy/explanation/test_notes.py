@@ -30,9 +30,10 @@ def test_a_record_that_ended_early_is_named() -> None:
 
 
 def test_numbers_far_from_what_is_stated_are_one_warning_the_furthest_first() -> None:
-    mass = Unknown("link1.mass", "kg", start=5.5, low=0.0, expected=5.5, deviation=1.0)
-    length = Unknown("link2.length", "m", start=0.23, low=0.0, expected=0.23, deviation=0.01)
-    free = Unknown("joint1.coulomb_friction.torque", "N", start=0.0)
+    arm = imagined.arm().with_effect("coulomb_friction", (1,))
+    mass = Unknown(arm.parameter("link1.mass"), start=5.5, low=0.0, expected=5.5, deviation=1.0)
+    length = Unknown(arm.parameter("link2.length"), start=0.23, low=0.0, expected=0.23, deviation=0.01)
+    free = Unknown(arm.parameter("joint1.coulomb_friction.torque"), start=0.0)
     values = {"link1.mass": 0.0, "link2.length": 0.02, "joint1.coulomb_friction.torque": 900.0}
     (note,) = on_stated_numbers([mass, length, free], values)
     assert note.warning

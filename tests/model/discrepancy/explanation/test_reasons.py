@@ -26,7 +26,7 @@ from model.discrepancy.explanation.reasons import reason
 from model.discrepancy.explanation.renderer import reason_text, step_with_sentences, what_is_left, with_sentences
 from model.discrepancy.grounds import ControllerProof, Reason, Refusal
 from model.discrepancy.numbers import plain
-from model.discrepancy.output_error.excess import worse_held_out
+from model.discrepancy.verdict import worse_held_out
 from model.effects.library import effect
 from model.fitting.records import records_of, resolution
 from model.machine_model.model import Model
