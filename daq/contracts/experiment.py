@@ -176,7 +176,7 @@ class Pause(_Part):
 
 Simple = Annotated[
     Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | Pause, Field(discriminator="kind")
-]  # fmt: skip
+]
 
 
 class Segment(_Part):
@@ -196,7 +196,7 @@ class Sequence(_Part):
 Trajectory = Annotated[
     Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | PickAndPlace | Path | Pause | Sequence,
     Field(discriminator="kind"),
-]  # fmt: skip
+]
 
 
 class ExperimentSpec(_Part):

@@ -29,10 +29,12 @@ def _slow(speed: float) -> OfferedExperiment:
     size = math.radians(1.5 * speed)
     amplitude = {1: size, 2: -size, 3: size}
     moves = (
-        Cubic(amplitude=there, duration=3.0), Pause(duration=0.5),
-        SlowRamp(amplitude=amplitude, speed=math.radians(speed), reversals=3), Pause(duration=0.5),
+        Cubic(amplitude=there, duration=3.0),
+        Pause(duration=0.5),
+        SlowRamp(amplitude=amplitude, speed=math.radians(speed), reversals=3),
+        Pause(duration=0.5),
         Cubic(amplitude=back, duration=3.0),
-    )  # fmt: skip
+    )
     name = f"slow-reversals-{speed:g}"
     spec = ExperimentSpec(
         trajectory=Sequence(segments=tuple(Segment(move=m) for m in moves)), joints=(1, 2, 3), hold=0.5, name=name

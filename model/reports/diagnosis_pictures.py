@@ -54,8 +54,15 @@ def evidence_picture(
         for place, c in zip(places, [*fitted, *probed], strict=True):
             _bar(axes, place, c, scale, named=(c.effect, c.joints) in named)
         if fitted and probed:
-            axes.text(0.0, places[len(fitted)] + 0.72, "promised by probes alone, not fitted", va="center",
-                      fontsize=6.8, style="italic", color=QUIET)  # fmt: skip
+            axes.text(
+                0.0,
+                places[len(fitted)] + 0.72,
+                "promised by probes alone, not fitted",
+                va="center",
+                fontsize=6.8,
+                style="italic",
+                color=QUIET,
+            )
         axes.set_yticks(places, [placed(c.effect, c.joints) for c in (*fitted, *probed)])
         axes.set_ylim((places[-1] if places else 0) - 0.6, 0.6)
         if needed is not None:
@@ -155,9 +162,11 @@ def log_ticks(low: float, high: float, most: int = MOST_TICKS) -> list[float]:
             if len(inside) <= most:
                 return inside
     step = next(
-        float(f"{s}e{d}") for d in range(decades[0] - 3, decades[-1] + 1) for s in (1, 2, 5)
+        float(f"{s}e{d}")
+        for d in range(decades[0] - 3, decades[-1] + 1)
+        for s in (1, 2, 5)
         if (high - low) / float(f"{s}e{d}") < most
-    )  # fmt: skip
+    )
     return [round(step * k, 12) for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
 
 

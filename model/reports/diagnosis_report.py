@@ -136,12 +136,13 @@ def _shape_in_words(shapes: Sequence[RemainingShape]) -> Text:
 def _shapes(shapes: Sequence[RemainingShape]) -> Table:
     rows = tuple(
         (
-            Cell(f"joint {s.joint}"), Cell(s.against),
+            Cell(f"joint {s.joint}"),
+            Cell(s.against),
             Cell(_span([t for t in s.torque if t is not None], s.torque_unit), number=True),
             Cell(f"{100 * s.explained:.0f} %", number=True),
         )
         for s in shapes
-    )  # fmt: skip
+    )
     return Table(("joint", "goes with", "torque", "explains"), rows)
 
 
@@ -152,11 +153,14 @@ def _span(torques: Sequence[float], unit: str) -> str:
 def _acquired(runs: Sequence[Acquired]) -> Section:
     rows = tuple(
         (
-            Cell(r.experiment), Cell(f"{r.duration:.1f} s", number=True),
-            Cell(r.outcome, "plain" if r.outcome == "complete" else "warning"), Cell(r.trace), Cell(r.reason),
+            Cell(r.experiment),
+            Cell(f"{r.duration:.1f} s", number=True),
+            Cell(r.outcome, "plain" if r.outcome == "complete" else "warning"),
+            Cell(r.trace),
+            Cell(r.reason),
         )
         for r in runs
-    )  # fmt: skip
+    )
     caption = (
         "In the order in which they were asked for. Only complete runs are used, and are among what was fitted to."
     )

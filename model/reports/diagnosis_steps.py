@@ -57,17 +57,19 @@ def _moving(where: Where) -> Table:
     ranges = [f"{v} %" for v in column([100 * m.relative_range for m in where.moving], digits=2)]
     rows = tuple(
         (
-            Cell(m.parameter), Cell(told, number=True),
+            Cell(m.parameter),
+            Cell(told, number=True),
             Cell("–" if m.moves_with is None else f"{m.moves_with} ({m.correlation:+.2f})"),
         )
         for m, told in zip(where.moving, ranges, strict=True)
-    )  # fmt: skip
+    )
     return Table(
-        ("parameter", "would have to range over", "and moves with"), rows,
+        ("parameter", "would have to range over", "and moves with"),
+        rows,
         "The distortion method in time: which parameter alone, moving with time, would explain most, and what it would "
         "move with (correlation; a dash: with nothing). A parameter that moves with something stands for a term that "
         "the model lacks.",
-    )  # fmt: skip
+    )
 
 
 def _what(step: Step, before: Sequence[Step]) -> tuple[Block, ...]:

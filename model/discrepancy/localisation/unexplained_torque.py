@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from daq.contracts.machine import NoController
-from model.analysis.bodies import chain_of
 from model.discrepancy.diagnosis import RemainingShape
 from model.discrepancy.localisation.dependence import AGAINST, dependence, quantities
 from model.discrepancy.localisation.disagreement import optional
@@ -24,6 +23,7 @@ from model.discrepancy.localisation.residuals import Residuals
 from model.dynamics.recursive import mass_matrix
 from model.fitting.records import Record, Signal
 from model.machine_model.model import Model
+from model.simulation.chain_of_model import chain_of
 from model.simulation.period import OUT_READING, OUT_SPEED
 from model.simulation.simulate import Options, sensitivities, simulate
 

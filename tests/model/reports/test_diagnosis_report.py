@@ -35,9 +35,14 @@ def test_the_page_tells_the_whole_story_in_order(answer: tuple[Diagnosis, Compar
     found, comparison = answer
     report = diagnosis_report(found, comparison)
     assert [s.title for s in report.sections] == [
-        "Where they disagree", "What is missing", "What adding it did", "Measured, before and after", "What remains",
-        "What to run next", "What to know about this answer",
-    ]  # fmt: skip
+        "Where they disagree",
+        "What is missing",
+        "What adding it did",
+        "Measured, before and after",
+        "What remains",
+        "What to run next",
+        "What to know about this answer",
+    ]
     page = html(report)
     text = words(page)
     assert found.summary in text
@@ -105,15 +110,24 @@ def test_that_nothing_is_significant_is_proved(answer: tuple[Diagnosis, Comparis
     best = step.candidates[0].model_copy(update={"evidence": 3.0})
     sound = found.model_copy(
         update={
-            "verdict": "nothing-significant", "steps": (), "remaining": (), "where": step.where, "significant": 10.0,
-            "candidates": (best, *step.candidates[3:]), "rmse_fit": step.rmse_fit, "rmse_holdout": step.rmse_holdout,
+            "verdict": "nothing-significant",
+            "steps": (),
+            "remaining": (),
+            "where": step.where,
+            "significant": 10.0,
+            "candidates": (best, *step.candidates[3:]),
+            "rmse_fit": step.rmse_fit,
+            "rmse_holdout": step.rmse_holdout,
         }
-    )  # fmt: skip
+    )
     report = diagnosis_report(sound, comparison)
     titles = [s.title for s in report.sections]
     assert titles[:4] == [
-        "Where they disagree", "What was tried", "Errors beside the noise", "Measured, before and after",
-    ]  # fmt: skip
+        "Where they disagree",
+        "What was tried",
+        "Errors beside the noise",
+        "Measured, before and after",
+    ]
     assert all(any(isinstance(b, Picture) for b in s.blocks) for s in report.sections[:4])
     text = words(html(report))
     assert (
@@ -173,9 +187,14 @@ def test_what_the_controllers_numbers_prove_has_no_candidates_and_no_errors(
     zero = tuple(e.model_copy(update={"before": 0.0, "after": 0.0}) for e in step.rmse_fit)
     proof = step.candidates[0].model_copy(update={"refitted": False, "misfit": None})
     shown = step.model_copy(
-        update={"rmse_fit": zero, "rmse_holdout": (), "candidates": (proof,), "sum_lambda2_before": None,
-                "proof": ControllerProof(samples=40, of=50)}
-    )  # fmt: skip
+        update={
+            "rmse_fit": zero,
+            "rmse_holdout": (),
+            "candidates": (proof,),
+            "sum_lambda2_before": None,
+            "proof": ControllerProof(samples=40, of=50),
+        }
+    )
     text = words(diagnosis_page(found.model_copy(update={"steps": (shown,)})))
     assert "the recorded numbers of the controller prove it, and nothing was fitted for it." in text
     assert "probe" not in text

@@ -60,10 +60,22 @@ def samples(lag: np.ndarray, speed: np.ndarray) -> Samples:
     since = np.array([0.01 * (k - max(t for t in turns if t <= k)) for k in range(len(lag))])
     since[: turns[1] if len(turns) > 1 else None] += 1e4  # long ago
     return Samples(
-        without=-direction * lag, left=zero, time=0.01 * np.arange(len(lag)), asked=np.cumsum(0.01 * speed),
-        speed=speed, acceleration=zero, direction=direction, since_turn=since, moving=np.ones(len(lag), dtype=bool),
-        gravity=zero, drive=zero, error=zero, expected_drive=zero, expected_error=zero, rate=100.0,
-    )  # fmt: skip
+        without=-direction * lag,
+        left=zero,
+        time=0.01 * np.arange(len(lag)),
+        asked=np.cumsum(0.01 * speed),
+        speed=speed,
+        acceleration=zero,
+        direction=direction,
+        since_turn=since,
+        moving=np.ones(len(lag), dtype=bool),
+        gravity=zero,
+        drive=zero,
+        error=zero,
+        expected_drive=zero,
+        expected_error=zero,
+        rate=100.0,
+    )
 
 
 @pytest.mark.parametrize(
