@@ -10,7 +10,8 @@ from pydantic import BaseModel, ConfigDict
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, sensitivities
+from model.simulation.prepared import Options
+from model.simulation.simulate import sensitivities
 from model.validation.expected_deviation import Convention, expected_deviation
 
 
@@ -62,15 +63,14 @@ def sensitivity_curves(
     """
     if not names:
         raise SpecError("no parameters: name at least one")
-    found = sensitivities(model, trace, names, options)
+    found = sensitivities(model, trace, [model.parameter(name) for name in names], options)
     curves = []
-    for name, derivative in zip(names, found.reading, strict=True):
-        parameter = model.parameter(name)
+    for parameter, derivative in zip(found.parameters, found.reading, strict=True):
         expected, _ = expected_deviation(parameter, convention)
         moved = expected * derivative
         curves.append(
             SensitivityCurve(
-                name=name, unit=parameter.unit, expected=expected,
+                name=parameter.name, unit=parameter.unit, expected=expected,
                 by_joint=tuple(tuple(map(float, column)) for column in moved.T), rms=float(np.sqrt((moved**2).mean())),
             )
         )  # fmt: skip

@@ -12,7 +12,8 @@ from model.analysis.bodies import chain_of
 from model.dynamics import recursive
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from model.validation import differentiation
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,8 @@ from model.comparison.difference import differences
 from model.discrepancy.localisation.disagreement import located
 from model.discrepancy.localisation.statistics import chance_significance
 from model.fitting.records import noise_floor, records_of
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from server.jobs.overlays import overlays
 from server.jobs.results import DiagnosisData, DiagnosisStep, GivenWhere
 

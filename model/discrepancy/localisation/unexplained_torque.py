@@ -24,8 +24,10 @@ from model.discrepancy.localisation.disagreement import optional
 from model.dynamics.recursive import mass_matrix
 from model.fitting.records import Record, Signal
 from model.machine_model.model import Model
+from model.machine_model.parameter import initial_velocity
 from model.simulation.period import OUT_READING, OUT_SPEED
-from model.simulation.simulate import Options, sensitivities, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import sensitivities, simulate
 
 Floats = NDArray[np.float64]
 
@@ -124,8 +126,8 @@ def _answer(model: Model, record: Record, j: int, signal: Signal, following: flo
         first_drive=run.drive[max(begin - 1, 0)].copy(), rows=np.arange(float(len(run.time[part]))),
         noise=record.inputs.noise[part],
     )  # fmt: skip
-    names = [f"initial.joint{number}.velocity" for number in model.machine.modelled_joints]
-    slopes = sensitivities(model, inputs, names, Options(loop=loop, following=following)).of(
+    speeds_at_start = [initial_velocity(joint) for joint in model.machine.modelled_joints]
+    slopes = sensitivities(model, inputs, speeds_at_start, Options(loop=loop, following=following)).of(
         OUT_SPEED if signal == "velocity" else OUT_READING
     )
     speeds = np.linalg.inv(mass_matrix(chain_of(model), run.position[begin]))[:, j]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from daq.contracts.machine import BoardPid, Machine
 from daq.contracts.trace import Trace
+from model import layout as at
 from model.drives.controller import POWER_MAX
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 
 COUNTS_OF_ROUNDING = 1.5
