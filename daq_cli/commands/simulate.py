@@ -27,7 +27,7 @@ from daq_cli.models.model_input import (
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
     from model.machine_model.model import Model
-    from model.simulation.simulate import Options
+    from model.simulation.prepared import Options
 
 app = typer.Typer(add_completion=False)
 
@@ -61,7 +61,7 @@ def simulate(
     from daq_cli.models.agreement_table import agreement_data, print_agreement
     from daq_cli.models.model_progress import shown_progress
     from model.comparison.compare import compare
-    from model.simulation.simulate import Options
+    from model.simulation.prepared import Options
 
     call = invocation(context)
     load_effects(effect_file)

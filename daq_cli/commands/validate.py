@@ -55,7 +55,7 @@ def validate(
     The time-domain form says of every parameter how it would have to vary with time, and what that goes with.
     """
     from daq_cli.models.model_progress import shown_progress
-    from model.simulation.simulate import Options
+    from model.simulation.prepared import Options
     from model.validation.conventions import in_convention
     from model.validation.fidelity import validate_by_distortion
     from model.validation.names import names_to_validate

@@ -22,8 +22,8 @@ def check_held(model: Model, traces: Sequence[Trace]) -> None:
     A machine whose file limits no supply, or has another drive than a motor, is taken to hold anything."""
     import numpy as np
 
+    from model import layout as at
     from model.discrepancy.inverse_dynamics.supplied import gravity_along
-    from model.machine_model import layout as at
     from model.simulation.bodies import chain_body
 
     joints = np.ascontiguousarray(model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT))

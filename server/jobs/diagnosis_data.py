@@ -12,7 +12,8 @@ from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.statistics import chance_significance
 from model.fitting.records import noise_floor, records_of
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from server.jobs.overlays import overlays
 from server.jobs.results import DiagnosisData, DiagnosisStep, GivenWhere
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from model import layout as at
 from model.effects.library import effect, library
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 

@@ -23,9 +23,11 @@ from model.discrepancy.localisation.residuals import Residuals
 from model.dynamics.recursive import mass_matrix
 from model.fitting.records import Record, Signal
 from model.machine_model.model import Model
+from model.machine_model.parameter import initial_velocity
 from model.simulation.chain_of_model import chain_of
 from model.simulation.period import OUT_READING, OUT_SPEED
-from model.simulation.simulate import Options, sensitivities, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import sensitivities, simulate
 
 Floats = NDArray[np.float64]
 
@@ -122,8 +124,8 @@ def _impulse_response(model: Model, record: Record, j: int, signal: Signal, feed
         rows=np.arange(float(len(run.time[part]))),
         noise=record.inputs.noise[part],
     )
-    names = [f"initial.joint{number}.velocity" for number in model.machine.modelled_joints]
-    slopes = sensitivities(model, inputs, names, Options(loop=loop, following=feedback_share)).of(
+    speeds_at_start = [initial_velocity(joint) for joint in model.machine.modelled_joints]
+    slopes = sensitivities(model, inputs, speeds_at_start, Options(loop=loop, following=feedback_share)).of(
         OUT_SPEED if signal == "velocity" else OUT_READING
     )
     speeds = np.linalg.inv(mass_matrix(chain_of(model), run.position[begin]))[:, j]

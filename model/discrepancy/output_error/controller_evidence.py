@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from daq.contracts.machine import BoardPid, Machine
 from daq.contracts.trace import Trace
+from model import layout as at
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
 from model.discrepancy.grounds import ControllerProof
 from model.discrepancy.output_error.holdout import signal_errors
 from model.discrepancy.output_error.observation import Observation, Signals
 from model.drives.controller import POWER_MAX
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 
 COUNTS_OF_ROUNDING = 1.5

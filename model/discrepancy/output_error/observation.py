@@ -30,10 +30,11 @@ from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
-from model.simulation.engines import engine_for
+from model.simulation.batch import BatchRun
 from model.simulation.inputs import readings_on_grid
 from model.simulation.period import OUT_READING, OUTPUTS
-from model.simulation.simulate import Options, Prepared, at_rows, prepare
+from model.simulation.prepared import Options, Prepared, prepare
+from model.simulation.simulate import at_rows
 
 Floats = NDArray[np.float64]
 Signals = tuple[Floats, ...]
@@ -120,7 +121,7 @@ class Observation:
             per record (p, m, n), rad; NaN where a run diverged.
         """
         longest = max(len(r.inputs) for r in self.records)
-        engine, count = engine_for(model), len(self.records)
+        count = len(self.records)
         found: list[list[Floats]] = [[] for _ in self.records]
         for begin in range(0, len(vectors), BATCH):
             own = vectors[begin : begin + BATCH]
@@ -130,8 +131,7 @@ class Observation:
             repeated = np.ascontiguousarray(np.tile(own, (count, 1)))
             left, step = np.arange(len(which)), min(longest_step, longest_step_of(model))
             for _ in range(1 + HALVINGS):
-                tried = out[left]
-                engine.run(self.prepared, which[left], repeated[left], starts[left], model.flags, step, tried)
+                tried = BatchRun(model, self.prepared, which[left], repeated[left], starts[left], step).run()
                 out[left] = tried
                 left = left[~np.isfinite(tried[:, OUT_READING]).all(axis=(1, 2))]
                 if not len(left):

@@ -15,7 +15,8 @@ from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.unexplained_torque import remaining_shapes
 from model.fitting.records import noise_floor, records_of
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from tests.model.discrepancy.motions import trace_of
 from tests.model.fitting import imagined
 

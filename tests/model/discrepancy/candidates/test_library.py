@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from daq.contracts.errors import SpecError
+from model import layout as at
 from model.discrepancy.candidates.library import STICTION_SPEED, TONES, hypotheses, tone
 from model.effects.library import add_own, library, remove_own
-from model.machine_model import layout as at
 from tests.model.discrepancy.own_effects import own_effect
 from tests.model.fitting import imagined
 

@@ -11,7 +11,8 @@ from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.unexplained_torque import remaining_shapes, torque_of
 from model.fitting.records import Record, noise_floor, records_of
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from tests.model.discrepancy.motions import trace_of
 from tests.model.fitting import imagined
 
