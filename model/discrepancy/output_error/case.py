@@ -21,7 +21,7 @@ from model.discrepancy.output_error.noise_floor import noise_floor
 from model.discrepancy.output_error.observation import Observation, Signals
 from model.discrepancy.output_error.search import Point
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS, THRESHOLDS, Thresholds
-from model.discrepancy.verdict import excess_removed
+from model.discrepancy.verdict import excess_removed, rises_too_much
 
 Floats = NDArray[np.float64]
 
@@ -88,8 +88,7 @@ class Case:
         rise, deviation = self.held.rise(*held)
         share = self.held.observation.samples / self.scoring.samples
         fall = self._square(current) - self._square(found.fit.point)
-        by_chance = max(lines.worse * deviation, lines.lost * fall * share, lines.significant)
-        if rise > min(by_chance, max(deviation, found.evidence - lines.significant)):
+        if rises_too_much(rise, deviation, fall * share, found.evidence, lines):
             return Refusal(kind="error-rises", numbers={"rise": rise, "deviation": deviation})
         return None
 
