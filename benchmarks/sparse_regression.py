@@ -36,8 +36,8 @@ from daq.contracts.errors import TraceError
 from daq.contracts.machine import BoardPid
 from daq.contracts.trace import Trace
 from daq.traces.reader import read_trace
+from model import layout as at
 from model.discrepancy.inverse_dynamics.records import acts_until_next_sample
-from model.machine_model import layout as at
 from model.machine_model.model import Model, base_model
 from model.simulation.torque_space import TorquesAlongTrace, torque_balance
 

@@ -16,6 +16,8 @@ from model.trial.registration import Registration, parse_registration
 REGISTERED = (
     "model/discrepancy/thresholds.py",
     "model/discrepancy",
+    "model/arrays.py",
+    "model/layout.py",
     "model/effects",
     "model/simulation",
     "model/fitting",

@@ -14,7 +14,8 @@ from daq.contracts.trace import Trace
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.fitting.records import Record, Signal, noise_floor, records_of, resolution
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 
 Floats = NDArray[np.float64]
 

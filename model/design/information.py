@@ -28,7 +28,8 @@ from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown, prior_precision, scales
 from model.fitting.whitening import white
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from daq.contracts.errors import SpecError
-from model.reports.effect_names import effect_name
+from model.effects.names import effect_name
 
 Tone = Literal["plain", "good", "warning", "quiet"]
 

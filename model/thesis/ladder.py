@@ -15,7 +15,7 @@ from daq.contracts.trace import Trace
 from model.fitting.fit import fit
 from model.fitting.options import FitOptions, Prior
 from model.machine_model.model import Model
-from model.simulation.simulate import Options
+from model.simulation.prepared import Options
 from model.thesis.check import Check, Choice
 from model.thesis.published_models import FRICTION_SYMBOLS, PARAMETER, model_of, unfitted
 from model.thesis.tables import (

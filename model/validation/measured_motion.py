@@ -10,8 +10,8 @@ from scipy.interpolate import CubicSpline
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
+from model import layout as at
 from model.dynamics.compilation import compiled
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
 from model.validation import differentiation as d

@@ -33,6 +33,11 @@ class Event(StrEnum):
 class IllegalEventError(Exception):
     """An event that the state does not allow; nothing has changed."""
 
+    def __init__(self, state: ExperimentState, event: Event) -> None:
+        super().__init__(f"an experiment that is {state} cannot be {event}")
+        self.state = state
+        self.event = event
+
 
 _TRANSITIONS: dict[tuple[ExperimentState, Event], ExperimentState] = {
     ("queued", Event.TAKEN): "running",
@@ -48,7 +53,7 @@ _TRANSITIONS: dict[tuple[ExperimentState, Event], ExperimentState] = {
 def advance(state: ExperimentState, event: Event) -> ExperimentState:
     """The state after `event`. Raises IllegalEventError."""
     if (state, event) not in _TRANSITIONS:
-        raise IllegalEventError(f"an experiment that is {state} cannot be {event}")
+        raise IllegalEventError(state, event)
     return _TRANSITIONS[state, event]
 
 

@@ -130,7 +130,7 @@ class _Worker:
     def validate(self, request: ValidateRequest) -> Ended:
         """As `daq validate`."""
         from model.reports.validation_report import validation_report
-        from model.simulation.simulate import Options
+        from model.simulation.prepared import Options
         from model.validation.conventions import in_convention
         from model.validation.fidelity import validate_by_distortion
         from model.validation.names import names_to_validate

@@ -13,6 +13,9 @@ JobKind = Literal["fit", "validate", "compare", "diagnose"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
 """The same states as those of experiments; an interrupted job is not run again by itself either."""
 
+JobFailure = Literal["refused", "program-fault", "lost"]
+"""Why a job has no result: something spoke against it; a fault of the program; the process or the service ended."""
+
 MACHINE = "machine"
 """In place of a model's number: the model that the robot's machine file describes."""
 TraceNumber = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
@@ -133,6 +136,8 @@ class Job(Wire):
     progress_text: str = ""
     reason: str = ""
     """Why it is not done, in one line."""
+    failure: JobFailure | None = None
+    """The same for programs; None where it was cancelled, or nothing failed."""
     headline: str = ""
     """The result in one line."""
     model: str | None = None

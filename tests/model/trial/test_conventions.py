@@ -16,7 +16,8 @@ from mock_controller.hidden.experiment import Experiment
 from mock_controller.modifications import build_modifications
 from mock_controller.plant import default_plant
 from model.machine_model.model import Model, base_model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from model.trial.conventions import LEFT_OUT, TRANSLATIONS, true_parameters
 from model.trial.truth import HiddenEffect, Truth
 from tests.model.simulation.records import trace_of

@@ -10,7 +10,8 @@ import numpy as np
 from daq.contracts.machine import load_machine
 from daq.contracts.trace import Trace, TraceRecord
 from model.machine_model.model import Model, base_model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 
 PERIOD = 0.02
 START = (np.pi, np.pi / 4, 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
-from model.machine_model import layout as at
+from model import layout as at
 from model.validation import differentiation as d
 from model.validation.acceleration_model import averaged_volts
 from tests.model.validation.synthetic import arm

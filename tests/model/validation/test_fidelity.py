@@ -8,7 +8,8 @@ import pytest
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from model.validation.fidelity import validate_by_distortion
 from tests.model.validation.synthetic import arm, ramp_trace
 

@@ -201,7 +201,8 @@ def test_a_worker_that_cannot_be_had_ends_its_job_and_no_other(bench: Bench) -> 
     first, second = _submitted(bench), _submitted(bench)
     bench.desk.start()
     assert bench.end_of(second).state == "done"
-    assert bench.end_of(first).reason == "program fault: OSError: no process any more"
+    failed = bench.end_of(first)
+    assert (failed.failure, failed.reason) == ("program-fault", "program fault: OSError: no process any more")
 
 
 def test_a_job_whose_executor_is_broken_is_given_to_a_new_one(bench: Bench) -> None:
@@ -260,7 +261,8 @@ def test_a_model_that_can_never_be_kept_holds_up_no_other_job(
     bench.desk.start()
     assert bench.end_of(second).state == "done"
     if isinstance(error, ValueError):  # nothing that another look could mend
-        assert bench.end_of(first).reason == "program fault: ValueError: no model"
+        failed = bench.end_of(first)
+        assert (failed.failure, failed.reason) == ("program-fault", "program fault: ValueError: no model")
 
 
 def test_what_could_not_be_begun_is_begun_at_the_next_look(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""How the numbers of a reason are said: as many digits as a person reads, with units, and never with an exponent."""
+"""How the numbers of a sentence are written: as many digits as a person reads, with units, and never an exponent."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import numpy as np
 
 
 def plain(value: float, digits: int = 2) -> str:
-    """A number with so many digits that count: 720, −0.15, 0.00008."""
+    """A number with so many significant digits: 720, −0.15, 0.00008."""
     text = np.format_float_positional(abs(value), precision=digits, unique=False, fractional=False, trim="-")
     return f"−{text}" if value < 0 and text != "0" else text
 
 
 def from_to(first: float, last: float) -> tuple[str, str]:
-    """Two numbers with digits enough to tell them apart: 1.54 and 1.46, where both are 1.5."""
+    """Two numbers with enough digits to tell them apart: 1.54 and 1.46, where both round to 1.5."""
     digits = 2 if plain(first) != plain(last) else 3
     return plain(first, digits), plain(last, digits)
 
 
 @dataclass(frozen=True)
-class Spoken:
-    """How a joint's numbers are said.
+class ReadingUnits:
+    """Units in which people read the numbers of one joint.
 
-    factor: from rad (m) to ° (mm). unit: of its residual. place_unit: of its position. least: rad (m), below which
-    nobody can read a deviation off a plot; 0 where everything is said.
+    factor: from rad (m) to ° (mm). unit: of its residual. place_unit: of its position. least: rad (m), the smallest
+    deviation that can be read off a plot; 0 for no limit. turns: whether the joint turns; otherwise it slides.
     """
 
     factor: float
@@ -37,9 +37,9 @@ class Spoken:
     turns: bool = True
 
     def size(self, value: float) -> str:
-        """How large a residual is, with its unit."""
+        """The magnitude of a residual, with its unit."""
         if self.unread(value):
-            return f"less than {_with_unit(plain(self._least_said, 1), self.unit)}"
+            return f"less than {_with_unit(plain(self._least_shown, 1), self.unit)}"
         return _with_unit(plain(abs(value) * self.factor), self.unit)
 
     def signed(self, value: float) -> str:
@@ -48,8 +48,8 @@ class Spoken:
         return f"{sign}{self.size(value)}"
 
     def behind(self, first: float, second: float) -> tuple[str, str]:
-        """Two distances behind what was expected, to be said one after the other, each with the verb that its sign
-        needs: “lags by 0.067°” and “leads by 0.037°”, or “lags by 0.067°” and “by 0.02°”."""
+        """Two lags, to be written one after the other, each with the verb for its sign: “lags by 0.067°” and “leads by
+        0.037°”, or “lags by 0.067°” and “by 0.02°”."""
         verbs = [None if self.unread(v) else "lags" if v >= 0 else "leads" for v in (first, second)]
         one = verbs[0] or verbs[1] or "lags"
         two = verbs[1] or one
@@ -65,16 +65,16 @@ class Spoken:
         return f"{_with_unit(plain(abs(value) * self.factor), self.place_unit)}/s"
 
     def cycles(self, value: float) -> str:
-        """How often something repeats over the position, from radians of phase a rad (m)."""
+        """How often something repeats over the position, from radians of phase per rad (m)."""
         return f"{plain(value, 3)} times a turn" if self.turns else f"{plain(value / (2 * math.pi), 3)} times a metre"
 
     def unread(self, value: float) -> bool:
         """Whether a residual is too small to be read off a plot."""
-        return abs(value) * self.factor < self._least_said
+        return abs(value) * self.factor < self._least_shown
 
     @property
-    def _least_said(self) -> float:
-        """`least` in the unit that is said, rounded up to one digit."""
+    def _least_shown(self) -> float:
+        """`least` in the unit that is shown, rounded up to one digit."""
         if self.least <= 0.0:
             return 0.0
         least = self.least * self.factor

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from model.discrepancy.candidates.candidate_order import in_order
-from model.discrepancy.diagnosis import Candidate
+from model.discrepancy.diagnosis import Candidate, in_order
 
 
 def candidate(effect: str, evidence: float, *, refitted: bool) -> Candidate:
