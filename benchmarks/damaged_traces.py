@@ -24,8 +24,15 @@ SECTOR = 512
 ROWS, ROWS_A_CHUNK, JOINTS = 60, 15, (1, 2)
 PERIOD = 0.02
 BOUNDARIES = (
-    0, 1, 2**16, 2**31 - 1, 2**31, 2**31 + 1, 2**32 - 1, 2**32, 2**32 + 1, 2**62, 2**63 - 1, 2**63, 2**64 - 1,
-)  # fmt: skip
+    0,
+    1,
+    2**16,
+    *(2**bits + by for bits in (31, 32) for by in (-1, 0, 1)),
+    2**62,
+    2**63 - 1,
+    2**63,
+    2**64 - 1,
+)
 
 Choice = Callable[[], bool]
 """Whether the next damage is done, for a share of all of them."""

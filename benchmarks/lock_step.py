@@ -150,9 +150,12 @@ def main() -> int:
         at_least("by the clock", best.times_real_time, TARGET, "× real time", rival),
         Figure("by processor time", f"{cheapest.cpu_times_real_time:.3g} × real time"),
         Figure("host a period", f"{1e3 * cheapest.host_s / cheapest.periods:.3f} ms"),
-        Figure("mock a period", f"{1e3 * cheapest.mock_s / cheapest.periods:.3f} ms",
-               beside=f"board and plant alone: {1e3 * alone_s / best.periods:.3f} ms"),
-    ]  # fmt: skip
+        Figure(
+            "mock a period",
+            f"{1e3 * cheapest.mock_s / cheapest.periods:.3f} ms",
+            beside=f"board and plant alone: {1e3 * alone_s / best.periods:.3f} ms",
+        ),
+    ]
     title = f"Lock-step on one core, best of {runs} runs of {ramps_a_run} ramps ({best.periods * PERIOD_S:.0f} s)"
     return show(title, "python -m benchmarks lock_step", figures)
 

@@ -192,6 +192,8 @@ def clients(url: str, watchers: int, paths: Sequence[str], rate: float, live: st
         made = Clients(watching, asking)
         yield made
     asked = asking.seen
-    made.seen = asked if watching is None else replace(
-        watching.seen, latencies=asked.latencies, own_lateness=asked.own_lateness, refused=asked.refused
-    )  # fmt: skip
+    made.seen = (
+        asked
+        if watching is None
+        else replace(watching.seen, latencies=asked.latencies, own_lateness=asked.own_lateness, refused=asked.refused)
+    )

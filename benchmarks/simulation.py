@@ -44,11 +44,20 @@ from tests.model.simulation.records import ramp_inputs
 REPEATS = 40
 BATCH = 1000
 JACOBIAN = (
-    "link1.mass", "link2.mass", "link3.mass", "load.mass", "link2.length", "link3.length",
-    "joint1.motor.back_emf_constant", "joint2.motor.back_emf_constant", "joint3.motor.back_emf_constant",
-    "joint1.viscous_friction.coefficient", "joint2.viscous_friction.coefficient",
-    "joint3.viscous_friction.coefficient", "joint2.load_dependent_friction.arm",
-)  # fmt: skip
+    "link1.mass",
+    "link2.mass",
+    "link3.mass",
+    "load.mass",
+    "link2.length",
+    "link3.length",
+    "joint1.motor.back_emf_constant",
+    "joint2.motor.back_emf_constant",
+    "joint3.motor.back_emf_constant",
+    "joint1.viscous_friction.coefficient",
+    "joint2.viscous_friction.coefficient",
+    "joint3.viscous_friction.coefficient",
+    "joint2.load_dependent_friction.arm",
+)
 """Thirteen parameters of table 7.9's model."""
 FOLDER = Path(__file__).parent
 Pointer = ctypes.POINTER(ctypes.c_double)
@@ -139,9 +148,12 @@ def _c_runs(model: Model, prepared: Prepared, count: int) -> Callable[[int], NDA
     flags = np.array(model.flags, dtype=ctypes.c_long)
     deflection = _initial_deflection(model, prepared)
     tail = (
-        flags.ctypes.data_as(ctypes.POINTER(ctypes.c_long)), deflection.ctypes.data_as(Pointer), ctypes.c_long(1),
-        ctypes.c_double(LONGEST_STEP), out.ctypes.data_as(Pointer),
-    )  # fmt: skip
+        flags.ctypes.data_as(ctypes.POINTER(ctypes.c_long)),
+        deflection.ctypes.data_as(Pointer),
+        ctypes.c_long(1),
+        ctypes.c_double(LONGEST_STEP),
+        out.ctypes.data_as(Pointer),
+    )
 
     def piece(first: int, last: int) -> None:
         library.run_many(ctypes.c_long(first), ctypes.c_long(last), ctypes.c_long(periods), *pointers, *tail)
@@ -198,9 +210,15 @@ def _mujoco_run(inputs: RunInputs) -> Callable[[], NDArray[np.float64]]:
     damping = gain * gear * [d.back_emf_constant.value for d in drives] + gear**2 * viscous
     masses = [j.link.mass.value for j in joints]
     arm = RodArm(
-        masses[0], 0.062899, masses[1], masses[2], 1.250307, joints[1].geometry.a.value, joints[2].geometry.a.value,
+        masses[0],
+        0.062899,
+        masses[1],
+        masses[2],
+        1.250307,
+        joints[1].geometry.a.value,
+        joints[2].geometry.a.value,
         rotor_inertia=(float(rotor[0]), float(rotor[1]), float(rotor[2])),
-    )  # fmt: skip
+    )
     xml = mjcf(arm.chain()).replace("armature=", 'frictionloss="1.5" armature=')
     xml = xml.replace(' constraint="disable"', "").replace('angle="radian"', 'angle="radian" boundinertia="1e-6"')
     plant = mujoco.MjModel.from_xml_string(xml)

@@ -186,8 +186,12 @@ def _terms(
         yield (name, None), _moved(model.with_effect(name, (), values), trace, target)
     joints = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
     for j, joint in enumerate(model.machine.modelled_joints):
-        for name, values in (("link_mass", {"added": 0.1}), ("centre_of_mass", {"shift": 0.01}),
-                             ("back_emf_error", {"relative": 0.05}), ("input_delay", {"time": 0.005})):  # fmt: skip
+        for name, values in (
+            ("link_mass", {"added": 0.1}),
+            ("centre_of_mass", {"shift": 0.01}),
+            ("back_emf_error", {"relative": 0.05}),
+            ("input_delay", {"time": 0.005}),
+        ):
             yield (name, joint), _moved(model.with_effect(name, (joint,), values), trace, target)
         arm = {"arm": float(joints[j, at.COULOMB_ARM]) + ARM}
         yield ("load_dependent_friction", joint), _moved(_with_friction(model, joint, arm), trace, target)
@@ -246,14 +250,19 @@ def _own_terms(
         wanted = asked / gain + joints[j, at.GEAR] * joints[j, at.BACK_EMF] * v
         sign = np.tanh(v / max(0.02 * float(np.quantile(np.abs(v), 0.95)), 1e-6))
         own: list[tuple[str | None, Floats]] = [
-            ("viscous_friction", v), ("coulomb_friction", sign), ("direction_dependent_friction", sign**2),
-            ("gear_loss", sign * np.abs(asked)), ("stiction", sign * np.exp(-np.abs(v) / STICTION_SPEED)),
-            ("spring_torque", q - q.mean()), (None, np.ones_like(q)),
-            ("dead_zone", np.sign(wanted)), ("resistance_drift", asked * np.cumsum(base.motor[:, j] ** 2)),
+            ("viscous_friction", v),
+            ("coulomb_friction", sign),
+            ("direction_dependent_friction", sign**2),
+            ("gear_loss", sign * np.abs(asked)),
+            ("stiction", sign * np.exp(-np.abs(v) / STICTION_SPEED)),
+            ("spring_torque", q - q.mean()),
+            (None, np.ones_like(q)),
+            ("dead_zone", np.sign(wanted)),
+            ("resistance_drift", asked * np.cumsum(base.motor[:, j] ** 2)),
             ("motor_inductance", np.gradient(asked, step)),
             ("joint_compliance", _second(base.required[:, j], step)),
             ("backlash", _second(np.tanh(base.required[:, j] / (0.05 * base.required[:, j].std())), step)),
-        ]  # fmt: skip
+        ]
         own += [("stribeck_friction", sign * np.exp(-np.abs(v) / speed)) for speed in STRIBECK_SPEEDS]
         own += _waves(base, left, j)
         largest = float(np.abs(volts).max())
@@ -346,12 +355,16 @@ def _scored(folder: Path) -> list[Scored]:
     recorded = {row["seed"]: row for row in _rows(folder / "record.jsonl")}
     return [
         Scored(
-            folder / "traces" / recorded[row["seed"]]["trace"], row["known_as"][0], frozenset(row["joints"][0]),
-            row["named_right"], row["in_first"], bool(row["joint_right"]),
+            folder / "traces" / recorded[row["seed"]]["trace"],
+            row["known_as"][0],
+            frozenset(row["joints"][0]),
+            row["named_right"],
+            row["in_first"],
+            bool(row["joint_right"]),
         )
         for row in _rows(folder / "score.jsonl")
         if row["kind"] == "single" and row["detectable"]
-    ]  # fmt: skip
+    ]
 
 
 def _rows(file: Path) -> list[dict[str, Any]]:

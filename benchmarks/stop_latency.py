@@ -191,8 +191,15 @@ def figures_of(line: str, results: dict[str, Stops], retries: int, clock: dict[s
                 rows.append(at_most(name, quantile(times, 0.99), target, "ms", beside))
     unconfirmed = sum(stops.unconfirmed for stops in results.values())
     late = f"mock behind its clock by more than 2 ms in {clock['late_ticks']} periods"
-    rows.append(Figure(f"{line}: stops without confirmation", f"{unconfirmed}", "0", unconfirmed == 0,
-                       f"{retries} repetitions; {late}"))  # fmt: skip
+    rows.append(
+        Figure(
+            f"{line}: stops without confirmation",
+            f"{unconfirmed}",
+            "0",
+            unconfirmed == 0,
+            f"{retries} repetitions; {late}",
+        )
+    )
     return rows
 
 

@@ -269,11 +269,5 @@ class Refused(Reply):
     reason: int
 
 
-REPLIES: dict[int, type[Reply]] = {
-    kind.OPCODE: kind
-    for kind in (
-        HelloReply, Block, BlockWritten, SetPointsTaken, Gains, GainsSet, ErrorsPositionsPowers, Snapshot, Stopped,
-        Released, Process, OutputsWritten, GripperSet, Status, Advanced, Refused,
-    )
-}  # fmt: skip
+REPLIES: dict[int, type[Reply]] = {kind.OPCODE: kind for kind in Reply.__subclasses__()}
 """Every reply by its opcode."""

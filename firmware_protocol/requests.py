@@ -256,11 +256,5 @@ class Advance(Request):
     microseconds: int
 
 
-REQUESTS: dict[int, type[Request]] = {
-    kind.OPCODE: kind
-    for kind in (
-        Hello, ReadBlock, WriteBlock, WriteSetPoints, ReportGains, SetGains, ReportErrorsPositionsPowers, Sample,
-        Stop, Release, ReadProcess, WriteOutputs, SetGripper, ReadStatus, Advance,
-    )
-}  # fmt: skip
+REQUESTS: dict[int, type[Request]] = {kind.OPCODE: kind for kind in Request.__subclasses__()}
 """Every request by its opcode."""

@@ -44,9 +44,13 @@ class Jobs:
         return self._connection.every(Job, self._path, state=states or None, kind=kind)
 
     def wait(
-        self, job: str, told: Callable[[Job], None] | None = None, clock: Callable[[], float] = time.monotonic,
-        seconds: float | None = None, look_every: float = WAIT,
-    ) -> Job:  # fmt: skip
+        self,
+        job: str,
+        told: Callable[[Job], None] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        seconds: float | None = None,
+        look_every: float = WAIT,
+    ) -> Job:
         """Waits until it has ended; `told` is called with it at least every `look_every` s.
 
         Raises TimeoutError after `seconds`; it goes on then.
@@ -108,9 +112,13 @@ class Models:
         except OSError as error:
             raise SpecError(f"model {file}: cannot be read: {error.strerror or error}") from error
         request = Request(
-            "POST", self._path, content=content, query={"name": name or Path(file).stem},
-            headers={"Content-Type": "application/json"}, repeatable=True,
-        )  # fmt: skip
+            "POST",
+            self._path,
+            content=content,
+            query={"name": name or Path(file).stem},
+            headers={"Content-Type": "application/json"},
+            repeatable=True,
+        )
         return self._connection.ask(ModelEntry, request)
 
     def download(self, model: str, target: Path) -> Path:

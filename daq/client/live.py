@@ -34,10 +34,15 @@ class LiveStream:
         try:
             self._socket: ClientConnection = self._closed_last.enter_context(
                 connect(
-                    self._url, additional_headers=headers, open_timeout=CONNECT_WITHIN, close_timeout=CLOSE_WITHIN,
-                    max_size=LARGEST_FRAME, compression=None, proxy=proxy_to(connection.url),
+                    self._url,
+                    additional_headers=headers,
+                    open_timeout=CONNECT_WITHIN,
+                    close_timeout=CLOSE_WITHIN,
+                    max_size=LARGEST_FRAME,
+                    compression=None,
+                    proxy=proxy_to(connection.url),
                 )
-            )  # fmt: skip
+            )
         except (OSError, InvalidHandshake, InvalidProxy, InvalidURI, TimeoutError) as error:
             raise ServiceNotReachedError(f"{self._url}: no stream: {error or 'no answer in time'}") from error
 

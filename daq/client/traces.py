@@ -42,9 +42,16 @@ class Traces:
     ) -> Iterator[CatalogueEntry]:
         """The newest first; `text` is looked for in number, file, name, kind, operator, notes and tags."""
         return self._connection.every(
-            CatalogueEntry, self._path, q=text, tag=tag, source=source, outcome=outcome, kind=kind,
-            since=None if since is None else since.isoformat(), until=None if until is None else until.isoformat(),
-        )  # fmt: skip
+            CatalogueEntry,
+            self._path,
+            q=text,
+            tag=tag,
+            source=source,
+            outcome=outcome,
+            kind=kind,
+            since=None if since is None else since.isoformat(),
+            until=None if until is None else until.isoformat(),
+        )
 
     def get(self, trace: str) -> TraceDetails:
         """What one says about itself, its figures and events."""

@@ -28,7 +28,5 @@ def carrying(machine: Machine, kilograms: float, source: str) -> Machine:
         raise SpecError(f"load {kilograms:g} kg: the machine file of {machine.title} allows {allowed}")
     scale = kilograms / own.value if own.value > 0 else 1.0
     deviation = None if own.deviation is None else max(own.deviation * scale, LEAST_DEVIATION)
-    load = Quantity(
-        value=kilograms, unit=own.unit, source=source, low=own.low, high=own.high, deviation=deviation
-    )  # fmt: skip
+    load = Quantity(value=kilograms, unit=own.unit, source=source, low=own.low, high=own.high, deviation=deviation)
     return machine.model_copy(update={"load": load})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import sys
+from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool, ValidationError, model_validator
@@ -175,7 +176,7 @@ class Pause(_Part):
 
 Simple = Annotated[
     Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | Pause, Field(discriminator="kind")
-]  # fmt: skip
+]
 
 
 class Segment(_Part):
@@ -195,7 +196,7 @@ class Sequence(_Part):
 Trajectory = Annotated[
     Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | PickAndPlace | Path | Pause | Sequence,
     Field(discriminator="kind"),
-]  # fmt: skip
+]
 
 
 class ExperimentSpec(_Part):
@@ -239,6 +240,16 @@ class ExperimentSpec(_Part):
             columns = len(self.trajectory.positions[0])
             raise ValueError(f"the path has {columns} columns for {len(self.joints)} joints")
         return self
+
+
+@dataclass(frozen=True)
+class OfferedExperiment:
+    """An experiment that a diagnosis may ask for. general: whether it is made for effects of every kind."""
+
+    name: str
+    description: str
+    spec: ExperimentSpec
+    general: bool = False
 
 
 def parse_spec(data: object, origin: str = "experiment") -> ExperimentSpec:

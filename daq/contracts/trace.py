@@ -22,9 +22,24 @@ TRACE_FORMAT = 1
 
 Outcome = Literal["complete", "stopped", "fault", "interrupted"]
 EventKind = Literal[
-    "start", "ramp_start", "ramp_end", "reversal", "gains", "limit", "pause", "resume", "retry", "missing",
-    "missed_set_point", "restart", "link_lost", "stop", "fault", "note", "end",
-]  # fmt: skip
+    "start",
+    "ramp_start",
+    "ramp_end",
+    "reversal",
+    "gains",
+    "limit",
+    "pause",
+    "resume",
+    "retry",
+    "missing",
+    "missed_set_point",
+    "restart",
+    "link_lost",
+    "stop",
+    "fault",
+    "note",
+    "end",
+]
 
 
 EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(2262, 1, 1, tzinfo=UTC)

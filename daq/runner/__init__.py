@@ -2,7 +2,7 @@
 
 from daq.runner.arm_control import ArmControl, StoppedError
 from daq.runner.experiment import Arrangement, Outside, RunFaultError, RunResult, run_experiment
-from daq.runner.preparation import Consent, MissingConsentError
+from daq.runner.preparation import Consent, MissingConsentError, require_not_stopped
 from daq.runner.recorder import Ears
 
 __all__ = [
@@ -15,5 +15,6 @@ __all__ = [
     "RunFaultError",
     "RunResult",
     "StoppedError",
+    "require_not_stopped",
     "run_experiment",
 ]

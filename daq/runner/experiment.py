@@ -112,9 +112,15 @@ def _move_to_start(run: Arrangement, prepared: Prepared) -> None:
     """Raises StoppedError or RunFaultError when the arm did not get there; it is frozen then."""
     run.ears.progress(0.0, "moving to the start")
     approach = Follower(
-        run.controller, run.control, run.machine, run.limits, EVERY_JOINT, ToldOnly(run.ears), run.outside.ended,
+        run.controller,
+        run.control,
+        run.machine,
+        run.limits,
+        EVERY_JOINT,
+        ToldOnly(run.ears),
+        run.outside.ended,
         every_period=False,
-    )  # fmt: skip
+    )
     ending = approach.follow(prepared.move, lambda _index: None)
     if ending.kind == "finished":
         ending = approach.arrive(prepared.move.moving, ARRIVED_WITHIN, round(ARRIVAL_TIME / run.controller.period_s))
@@ -126,10 +132,12 @@ def _move_to_start(run: Arrangement, prepared: Prepared) -> None:
 def _record(run: Arrangement, prepared: Prepared, changes: tuple[GainChange, ...]) -> RunResult:
     record = _trace_record(run)
     writer = TraceWriter(
-        trace_path(run.folder, record), record, prepared.joints,
+        trace_path(run.folder, record),
+        record,
+        prepared.joints,
         attachments={"experiment.json": run.spec.model_dump_json().encode()},
         patience=PATIENCE_IN_LOCK_STEP if run.controller.link.lock_step else 0.0,
-    )  # fmt: skip
+    )
     recorder = Recorder(writer, prepared.joints, run.ears)
     follower = Follower(
         run.controller, run.control, run.machine, run.limits, prepared.joints, recorder, run.outside.ended

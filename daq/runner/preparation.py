@@ -36,6 +36,13 @@ class Consent:
         """Raises SpecError for what only counts as true."""
         require_word(self.moves_real_arm)
 
+    def require(self, controller: Controller) -> None:
+        """Raises MissingConsentError when the controller has a real arm that nobody has agreed to move."""
+        if not controller.identity.simulated and not self.moves_real_arm:
+            raise MissingConsentError(
+                f"{controller.link.url} is a real arm: it moves only with the operator's consent (--yes)"
+            )
+
 
 class MissingConsentError(SafetyError):
     """A real arm, and nobody has agreed that it may move."""
@@ -55,10 +62,9 @@ def prepare(
 ) -> Prepared:
     """Looks at the arm, plans, and checks. Raises SafetyError, SpecError, TraceError (no room), LinkError,
     NoSampleError, ControllerRestartedError; nothing has changed on the board then."""
-    _require_consent(controller, consent)
+    consent.require(controller)
     _require_period(controller, machine)
-    if StatusFlag.FROZEN in controller.status().flags:
-        raise SafetyError("the arm has been stopped and holds its posture; `daq reset` ends that")
+    require_not_stopped(controller)
     _require_driven(controller, spec, machine)
     here = _look(controller, machine)
     _require_still(here, machine, limits)
@@ -82,11 +88,10 @@ def recorded_joints(controller: Controller, spec: ExperimentSpec) -> tuple[int, 
     return EVERY_JOINT if both_ways <= room else spec.joints
 
 
-def _require_consent(controller: Controller, consent: Consent) -> None:
-    if not controller.identity.simulated and not consent.moves_real_arm:
-        raise MissingConsentError(
-            f"{controller.link.url} is a real arm: it moves only with the operator's consent (--yes)"
-        )
+def require_not_stopped(controller: Controller) -> None:
+    """Raises SafetyError for an arm that a stop has frozen."""
+    if StatusFlag.FROZEN in controller.status().flags:
+        raise SafetyError("the arm has been stopped and holds its posture; `daq reset` ends that")
 
 
 def _require_period(controller: Controller, machine: Machine) -> None:

@@ -9,6 +9,19 @@ from daq.safety.states import Action, Arm, Event, IllegalEventError, State, adva
 from daq.safety.violation import Violation
 
 __all__ = [
-    "Action", "Arm", "Event", "Finding", "IllegalEventError", "RestGuards", "RunningGuards", "State", "Verdict",
-    "Violation", "advance", "check_move_to_start", "check_plan", "largest_step", "unchecked",
-]  # fmt: skip
+    "Action",
+    "Arm",
+    "Event",
+    "Finding",
+    "IllegalEventError",
+    "RestGuards",
+    "RunningGuards",
+    "State",
+    "Verdict",
+    "Violation",
+    "advance",
+    "check_move_to_start",
+    "check_plan",
+    "largest_step",
+    "unchecked",
+]

@@ -84,7 +84,7 @@ class Gripper(_Part):
 
 Instruction = Annotated[
     Absolute | Relative | PlayPath | Wait | SetOutput | AwaitInput | Gripper, Field(discriminator="kind")
-]  # fmt: skip
+]
 
 
 class Program(_Part):

@@ -43,8 +43,17 @@ RECORDED_SIGNALS = ("tick", "host_time", "status", "set_point", "position", "err
 """What a record of the controller holds."""
 
 ALL_SIGNALS = (
-    "time", "position", "set_point", "error", "drive", "velocity", "power_raw", "tick", "host_time", "status",
-)  # fmt: skip
+    "time",
+    "position",
+    "set_point",
+    "error",
+    "drive",
+    "velocity",
+    "power_raw",
+    "tick",
+    "host_time",
+    "status",
+)
 """Columns of a trace."""
 
 _CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
@@ -68,9 +77,9 @@ JOINT_SAMPLE_DTYPE = np.dtype(
 """schemas/JointSample.msg in CDR: a 4-byte header, then every field on its natural boundary, without padding."""
 
 _LEVELS: dict[EventKind, int] = {
-    "limit": 3, "pause": 3, "retry": 3, "missing": 3, "missed_set_point": 3, "restart": 4, "link_lost": 4, "stop": 3,
-    "fault": 4,
-}  # fmt: skip
+    **dict.fromkeys(("limit", "pause", "retry", "missing", "missed_set_point", "stop"), 3),
+    **dict.fromkeys(("restart", "link_lost", "fault"), 4),
+}
 _INFORMATION = 2
 
 

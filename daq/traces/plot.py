@@ -225,10 +225,17 @@ def _head(axes: Axes, trace: Trace, joint: int, column: int) -> None:
         axes.set_title("P {} · I {} · D {}".format(*gains), loc="right", fontsize=8, color=QUIET, pad=14)
     for event in _labelled(trace, column):
         axes.annotate(
-            _mark(event), (event.time, 1.0), xycoords=("data", "axes fraction"),
-            xytext=(0, 2), textcoords="offset points", ha="center", va="bottom", fontsize=6.5,
-            color=ALARM if event.kind in _ALARMS else QUIET, annotation_clip=False,
-        )  # fmt: skip
+            _mark(event),
+            (event.time, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 2),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=6.5,
+            color=ALARM if event.kind in _ALARMS else QUIET,
+            annotation_clip=False,
+        )
 
 
 def _mark(event: TraceEvent) -> str:

@@ -243,8 +243,9 @@ class _Walk:
         self._attached += len(body)
         count = len(self._found.attachments) + 1
         require(count, self._limits.attachments, "there are more than {} attachments", "attachments")
-        require(self._attached, self._limits.attachment_bytes, "attachments have more than {} bytes",
-                "attachment_bytes")  # fmt: skip
+        require(
+            self._attached, self._limits.attachment_bytes, "attachments have more than {} bytes", "attachment_bytes"
+        )
         if len(body) < _CRC.size or zlib.crc32(body[: -_CRC.size]) != _CRC.unpack(body[-_CRC.size :])[0]:
             raise ValueError("an attachment does not match its checksum")
         self._found.attachments.append(fields.attachment_of(body))

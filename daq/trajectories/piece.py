@@ -51,8 +51,10 @@ def require_sampled(duration: float, period: float, what: str, least: int = 1) -
     """
     if duration < (least - TIME_TOLERANCE) * period:
         shortest = f"{least * period * 1e3:g} ms" + (" (two control periods)" if least == 2 else " (a control period)")
-        raise SpecError(f"{what}: {duration:g} s is too short for a set point every {period * 1e3:g} ms: "
-                        f"allowed are {shortest} and more")  # fmt: skip
+        raise SpecError(
+            f"{what}: {duration:g} s is too short for a set point every {period * 1e3:g} ms: "
+            f"allowed are {shortest} and more"
+        )
 
 
 def sample_times(duration: float, period: float) -> Floats:

@@ -11,21 +11,18 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SpecError
 from daq_cli.app.context import Invocation
 from daq_cli.app.lazy import HERE, LazyGroup
 from firmware_protocol.errors import ProtocolError
 
-EXIT_PROGRAM_FAULT = 1
-EXIT_WRONG_INPUT = 2
 WRONG_NAMES = frozenset({
     errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS,
 })  # fmt: skip
 """What the operating system says of files that were named wrongly; the rest is its own trouble."""
 LONGEST_LINE = 800
 """Characters of an error; a command line may hold a megabyte."""
-EXIT_INTERRUPTED = 130
-"""As shells report a process that Ctrl-C has ended."""
 
 SERVER_VARIABLE = "DAQ_SERVER"
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
@@ -91,22 +88,22 @@ def main() -> None:
     except DaqError as error:
         fail(str(error), error.exit_code)
     except ProtocolError as error:
-        fail(str(error), EXIT_WRONG_INPUT)
+        fail(str(error), exit_codes.WRONG_INPUT)
     except UsageError as error:
         _show_usage_error(error)
     except (KeyboardInterrupt, typer.Abort):
-        fail("interrupted", EXIT_INTERRUPTED)
+        fail("interrupted", exit_codes.INTERRUPTED)
     except MemoryError:
-        fail("the computer has not enough memory for this", EXIT_PROGRAM_FAULT)
+        fail("the computer has not enough memory for this", exit_codes.PROGRAM_FAULT)
     except BrokenPipeError:
         # `daq traces ls | head`: whoever read has enough. Python would complain at exit.
         _drop_output()
-        raise SystemExit(EXIT_PROGRAM_FAULT) from None
+        raise SystemExit(exit_codes.PROGRAM_FAULT) from None
     except OSError as error:
         # Where nobody knew better: a name that is too long, a folder that may not be read, a full disk.
         file = "" if error.filename is None else f"{error.filename}: "
         _drop_output()
-        code = EXIT_WRONG_INPUT if error.errno in WRONG_NAMES else EXIT_PROGRAM_FAULT
+        code = exit_codes.WRONG_INPUT if error.errno in WRONG_NAMES else exit_codes.PROGRAM_FAULT
         fail(f"{file}{error.strerror or error}", code)
     # typer hands back either an exit code or what the command returned.
     raise SystemExit(exit_code if isinstance(exit_code, int) else 0)
@@ -138,9 +135,9 @@ def _show_usage_error(error: Any) -> NoReturn:
     message = error.format_message().strip()
     if type(error).__name__ == "NoArgsIsHelpError":
         print(message, file=sys.stderr)
-        raise SystemExit(EXIT_WRONG_INPUT)
+        raise SystemExit(exit_codes.WRONG_INPUT)
     path = "daq" if error.ctx is None else error.ctx.command_path
-    fail(f"{message} (see `{path} --help`)", EXIT_WRONG_INPUT)
+    fail(f"{message} (see `{path} --help`)", exit_codes.WRONG_INPUT)
 
 
 def fail(message: str, exit_code: int) -> NoReturn:

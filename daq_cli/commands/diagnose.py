@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from daq.contracts import exit_codes
 from daq.contracts.carried_load import carrying
 from daq_cli.app import completion
 from daq_cli.app.context import Invocation, JsonOption, YesOption, console, invocation, print_json
@@ -27,7 +28,6 @@ from daq_cli.models.model_input import (
     read_traces,
 )  # fmt: skip
 from daq_cli.robot.remote.jobs import numbers_of, require_no_programs
-from daq_cli.robot.run_result import EXIT_CODES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -115,7 +115,7 @@ def diagnose(
     if failure is not None:
         raise failure
     if found.acquired and (outcome := found.acquired[-1].outcome) != "complete":
-        raise typer.Exit(EXIT_CODES[outcome])
+        raise typer.Exit(exit_codes.OF_OUTCOME[outcome])
 
 
 def _save(found: Diagnosis, out: Path | None) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq_cli.app.context import Invocation, JsonOption, invocation, print_json
 
@@ -14,8 +15,6 @@ if TYPE_CHECKING:
     from daq.acquisition.stop_socket import StopAnswer, StopAttempt
 
 app = typer.Typer(add_completion=False)
-
-EXIT_NOT_DELIVERED = 3
 
 
 @app.command()
@@ -46,7 +45,7 @@ def stop(context: typer.Context, json: JsonOption = False) -> None:
         for answer in answers:
             print(_told(answer))
     if not answers or not all(answer.confirmed for answer in answers):
-        raise typer.Exit(EXIT_NOT_DELIVERED)
+        raise typer.Exit(exit_codes.NOT_REACHED)
 
 
 def _stop_configured(call: Invocation, reached: set[str]) -> list[StopAnswer]:

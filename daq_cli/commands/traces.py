@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import SpecError, TraceError
 from daq_cli.app import completion
 from daq_cli.app.context import Invocation, JsonOption, console, invocation, print_json, print_table, printable
@@ -28,7 +29,6 @@ TraceArgument = Annotated[
 ]
 FolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (default: the configured one).")]
 
-EXIT_NOT_TRUSTWORTHY = 5
 SHOWN_DIGITS = 8
 """Of a trace's number in the list, which then fits into 80 columns; the beginning of a number names the trace."""
 
@@ -254,7 +254,7 @@ def check(
             print(printable(f"{finding.level}: {finding.message}"))
         print("trustworthy" if found.trustworthy else "NOT to be trusted")
     if not found.trustworthy:
-        raise typer.Exit(EXIT_NOT_TRUSTWORTHY)
+        raise typer.Exit(exit_codes.FAULT)
 
 
 @app.command()
@@ -274,7 +274,7 @@ def salvage(context: typer.Context, folder: FolderOption = None, json: JsonOptio
     if not results:
         console().print("nothing to salvage")
     if any(result.path is None for result in results):
-        raise typer.Exit(EXIT_NOT_TRUSTWORTHY)
+        raise typer.Exit(exit_codes.FAULT)
 
 
 def _salvage_line(result: Salvaged) -> str:

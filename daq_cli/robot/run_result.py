@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import SafetyError, SpecError
 from daq_cli.app.consent import agreed, can_be_asked
 from daq_cli.app.context import Invocation, console, print_json
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from daq.acquisition.messages import Failed, Finished, Job
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import Machine
-
-EXIT_CODES = {"complete": 0, "stopped": 6, "fault": 5, "interrupted": 5}
 
 
 def carry_out(
@@ -41,7 +40,7 @@ def carry_out(
     else:
         print_result(finished)
     if finished.outcome != "complete":
-        raise typer.Exit(EXIT_CODES[finished.outcome])
+        raise typer.Exit(exit_codes.OF_OUTCOME[finished.outcome])
     return finished
 
 
@@ -51,7 +50,7 @@ def acquire_whole(call: Invocation, spec: ExperimentSpec, machine: Machine, fold
     if finished.outcome != "complete":
         why = f"{finished.outcome}: {finished.reason}" if finished.reason else finished.outcome
         raise AcquisitionFailedError(
-            f"{why}; the run is not complete, so its trace is not used", EXIT_CODES[finished.outcome]
+            f"{why}; the run is not complete, so its trace is not used", exit_codes.OF_OUTCOME[finished.outcome]
         )
     return finished
 

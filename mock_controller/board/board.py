@@ -16,12 +16,13 @@ from functools import partial
 
 from firmware_protocol.memory_map import JOINTS, MemoryMap
 from firmware_protocol.units import DAC_MAX, GAIN_MAX, POSTURE_UNITS, counts_to_posture, posture_to_counts
+from mock_controller.board.extension_points import ChangesBoard, ChangesSetPoint
 from mock_controller.board.memory import SharedMemory
 from mock_controller.board.parameters import BoardParameters
 from mock_controller.board.pid import IntegerPid
 from mock_controller.board.sensor import PositionSensors
 from mock_controller.board.snapshot import PeriodSnapshot, SnapshotRing
-from mock_controller.modifications.interface import ChangesBoard, ChangesSetPoint, Modification, of_kind
+from mock_controller.modification import Modification, of_kind
 from mock_controller.plant import Plant
 
 

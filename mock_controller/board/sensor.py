@@ -12,8 +12,9 @@ from random import Random
 
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.units import ADC_COUNTS, JointCalibration
+from mock_controller.board.extension_points import ChangesReading, ChangesSensor, KnowsBoard
 from mock_controller.board.parameters import BoardParameters
-from mock_controller.modifications.interface import ChangesReading, ChangesSensor, KnowsBoard, Modification, of_kind
+from mock_controller.modification import Modification, of_kind
 
 _CELLS = 256
 """Cells of a linearity curve's table, interpolated linearly: good to a hundredth of a count."""

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.units import DAC_MAX, posture_to_counts
+from mock_controller.board.extension_points import ChangesBoard, ChangesSetPoint
 from mock_controller.board.parameters import BoardParameters
 from mock_controller.board.sensor import PositionSensors
 from mock_controller.hidden.experiment import Experiment
-from mock_controller.modifications.interface import ChangesBoard, ChangesSetPoint, Modification, of_kind
+from mock_controller.modification import Modification, of_kind
 from mock_controller.plant import STEP_US, Plant, PlantParameters
 
 ROUNDING_VARIANCE = 1.0 / 12.0

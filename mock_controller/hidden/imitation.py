@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from mock_controller.hidden.tolerances import tolerances
+from mock_controller.modification import Modification
 from mock_controller.modifications.friction import LoadDependentFriction, ViscousFriction
-from mock_controller.modifications.interface import Modification
 from mock_controller.modifications.load import LinkMass, Payload
 from mock_controller.modifications.motor import BackEmfError
 from mock_controller.modifications.sensor import PotentiometerGain

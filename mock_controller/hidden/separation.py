@@ -37,9 +37,10 @@ from mock_controller.hidden.tolerances import (
     harmonic_deviation,
     tolerances,
 )
+from mock_controller.modification import Modification, of_kind
 from mock_controller.modifications.controller import InputDelay
-from mock_controller.modifications.interface import ChangesTransmission, Modification, of_kind
 from mock_controller.plant import STEP_US, PlantParameters
+from mock_controller.plant.extension_points import ChangesTransmission
 
 Priors = Literal["stated", "drawn"]
 MODELLED = 3

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from math import pi
 from random import Random
 
-from mock_controller.modifications.registry import fields_of, known_modifications
+from mock_controller.modifications.parameter import fields_of
+from mock_controller.modifications.registry import known_modifications
 
 Range = tuple[float, float]
 

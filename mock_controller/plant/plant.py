@@ -14,7 +14,9 @@ from collections.abc import Iterable, Sequence
 import mujoco
 import numpy as np
 
-from mock_controller.modifications.interface import (
+from mock_controller.modification import Modification, Restartable, of_kind
+from mock_controller.plant.drive_train import DriveTrain
+from mock_controller.plant.extension_points import (
     AddsJointTorque,
     AddsTorque,
     ChangesDriveVoltage,
@@ -25,11 +27,7 @@ from mock_controller.modifications.interface import (
     ChangesTransmission,
     CouplesDrives,
     KnowsPlant,
-    Modification,
-    Restartable,
-    of_kind,
 )
-from mock_controller.plant.drive_train import DriveTrain
 from mock_controller.plant.friction import CoulombLevel, deflect
 from mock_controller.plant.parameters import JOINTS, PlantParameters
 from mock_controller.plant.rigid_body import build_model

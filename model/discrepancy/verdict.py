@@ -1,4 +1,4 @@
-"""What is answered once no further effect is found, and what an answer that only resembles the truth takes back."""
+"""The verdict of a diagnosis, and the comparison of errors with their noise floor that it rests on."""
 
 from __future__ import annotations
 
@@ -8,43 +8,69 @@ from collections.abc import Sequence
 from model.discrepancy.diagnosis import SignalError, Step, Verdict
 from model.discrepancy.thresholds import Thresholds
 
+LEAST_EXCESS = 0.25
+"""Least relative excess variance for which a removed share is reported; a 17 s record resolves it to ±0.06."""
 SCATTER = 4.0
-"""Standard deviations of a variance known from so many samples, within which it may be above its floor by chance."""
+"""Standard deviations of an estimated variance, within which it may exceed its floor by chance."""
 
 
-def unexplained(
-    fitted: Sequence[SignalError], held: Sequence[SignalError], thresholds: Thresholds, *, named: bool,
-    samples: tuple[int, int] = (10**9, 10**9),
-) -> tuple[int, ...]:  # fmt: skip
-    """Joints on which more is left than noise leaves, and than a law that is only nearly the arm's may leave.
+def verdict(steps: Sequence[Step], *, unexplained: bool) -> Verdict:
+    """The verdict of either method.
 
     Args:
-        fitted, held: errors before any effect was added, and now, on fitted and on held-out traces.
-        named: whether effects have been added. samples: of a joint, on fitted and on held-out traces.
+        steps: all of them; only those that were adopted count. A group that held-out traces have refused is not one.
+        unexplained: whether what is left speaks against the steps, or is there without any. By output error that is
+            any joint above its line; by inverse dynamics a shape in the remaining torque, where no step was adopted.
     """
-    in_sample = thresholds.unexplained if named else thresholds.unnamed
-    found = []
-    for errors, line, count in ((fitted, in_sample, samples[0]), (held, thresholds.unexplained, samples[1])):
-        least = max(line, SCATTER * math.sqrt(2.0 / max(count, 1)))
-        for e in errors:
-            before, after = ((size / e.floor) ** 2 - 1.0 for size in (e.before, e.after))
-            if after > max(least, (1.0 - thresholds.least_share) * before if named else 0.0):
-                found.append(e.joint)
-    return tuple(dict.fromkeys(found))
-
-
-def verdict(steps: Sequence[Step], left: Sequence[int]) -> Verdict:
-    """The answer, from the steps and the joints that stay unexplained. A group that held-out traces have refused is
-    none."""
-    if left:
+    if unexplained:
         return "unknown-effect"
     if any(s.adopted and s.group for s in steps):
         return "ambiguous"
     return "named" if any(s.adopted for s in steps) else "nothing-significant"
 
 
+def excess_variance(error: SignalError) -> tuple[float, float]:
+    """Variance above the noise floor in units of the floor's, before and after."""
+    before, after = ((size / error.floor) ** 2 - 1.0 for size in (error.before, error.after))
+    return before, after
+
+
+def excess_removed(errors: Sequence[SignalError]) -> float | None:
+    """Share of the excess variance that is gone, summed over the joints with at least `LEAST_EXCESS` before.
+
+    None where no joint has so much: a share of what may be noise means nothing.
+    """
+    shown = [(before, after) for before, after in map(excess_variance, errors) if before >= LEAST_EXCESS]
+    return 1.0 - sum(after for _, after in shown) / sum(before for before, _ in shown) if shown else None
+
+
+def unexplained(
+    fitted: Sequence[SignalError],
+    held: Sequence[SignalError],
+    thresholds: Thresholds,
+    *,
+    named: bool,
+    samples: tuple[int, int] = (10**9, 10**9),
+) -> tuple[int, ...]:
+    """Joints whose error stays above what noise leaves, and above what a nearly right law of the effect would leave.
+
+    Args:
+        fitted, held: errors before any effect was added and now, on fitted and on held-out traces.
+        named: whether effects have been added. samples: per joint, on fitted and on held-out traces.
+    """
+    in_sample = thresholds.unexplained if named else thresholds.unnamed
+    found = []
+    for errors, line, count in ((fitted, in_sample, samples[0]), (held, thresholds.unexplained, samples[1])):
+        least = max(line, SCATTER * math.sqrt(2.0 / max(count, 1)))
+        for e in errors:
+            before, after = excess_variance(e)
+            if after > max(least, (1.0 - thresholds.least_share) * before if named else 0.0):
+                found.append(e.joint)
+    return tuple(dict.fromkeys(found))
+
+
 def first_to_withdraw(steps: Sequence[Step], left: Sequence[int]) -> int | None:
-    """Index of the first step on a joint that stays unexplained: with it the search took a wrong way."""
+    """Index of the first adopted step on a joint that stays unexplained: from there the search was on a wrong way."""
     for k, step in enumerate(steps):
         if step.adopted and (not step.joints or set(step.joints) & set(left)):
             return k

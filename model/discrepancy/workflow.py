@@ -129,7 +129,7 @@ def _answer(
     """What the turns have come to, and what is taken back of it. The time that it took is not known here."""
     looked = None if found.added else case.where(found.current.point)
     left = _unexplained(case, found, looked)
-    answered = verdict((*proved, *found.steps), left)
+    answered = verdict((*proved, *found.steps), unexplained=bool(left))
     if answered == "unknown-effect":
         found = _taken_back(found, left)
     current, steps = as_last_fitted(case.observation, found.current, found.steps)

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from model.analysis.bodies import chain_of
 from model.dynamics.compilation import compiled
 from model.dynamics.dual import DUAL_STEP
 from model.dynamics.recursive import mass_matrix
@@ -17,6 +16,7 @@ from model.fitting.problem import Evaluation
 from model.fitting.unknowns import Unknown
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
+from model.simulation.chain_of_model import chain_of
 from model.torque_space.recorded_motion import RecordedMotion
 from model.validation.acceleration_model import expected_accelerations
 

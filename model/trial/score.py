@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import Diagnosis, Step, Verdict
-from model.discrepancy.output_error.excess import excess_removed as share_removed
+from model.discrepancy.verdict import excess_removed as share_removed
 from model.trial.conventions import true_parameters
 from model.trial.truth import Detectability, HiddenEffect, Kind, Truth, merged
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,25 @@ class MeasuredMotion:
     width: float
 
 
+class _Signals(NamedTuple):
+    """A motion for compiled code, real or dual: position, speed, friction, volts (k, n) at the motors; time (k,)."""
+
+    position: NDArray[Any]
+    speed: NDArray[Any]
+    friction: NDArray[Any]
+    volts: NDArray[Any]
+    time: NDArray[Any]
+
+
+class _Numbers(NamedTuple):
+    """A model for compiled code: its parameters, real or dual, what it has and how it is computed."""
+
+    vector: NDArray[Any]
+    flags: NDArray[Any]
+    settings: NDArray[Any]
+    own: NDArray[Any]
+
+
 def expected_accelerations(model: Model, motion: MeasuredMotion, names: Sequence[str]) -> tuple[Floats, Floats]:
     """Accelerations f (k, n) and their derivatives (p, k, n) by the named parameters.
 
@@ -84,11 +103,12 @@ def _accelerations(model: Model, motion: MeasuredMotion, vector: NDArray[Any]) -
     settings[at.PUBLISHED_LOADS] = int(rods)
     volts = smoothed(averaged_volts(motion.drive, motion.period, vector), motion.width)
     out = np.zeros(motion.position.shape, dtype=vector.dtype)
+    measured = (motion.position, motion.speed, motion.friction, volts)
+    position, speed, friction, volts = (np.ascontiguousarray(s, dtype=vector.dtype) for s in measured)
+    signals = _Signals(position, speed, friction, volts, motion.time)
+    numbers = _Numbers(np.ascontiguousarray(vector), model.flags, settings, own_table(model, vector.dtype))
     run = _along_rods if rods else _along_chain
-    signals = (
-        np.ascontiguousarray(s, dtype=vector.dtype) for s in (motion.position, motion.speed, motion.friction, volts)
-    )
-    run(*signals, motion.time, np.ascontiguousarray(vector), model.flags, settings, own_table(model, vector.dtype), out)
+    run(signals, numbers, out)
     return out
 
 
@@ -130,11 +150,9 @@ def _after_amplifier(drive: NDArray[Any], joints: NDArray[Any], volts: NDArray[A
 
 
 @compiled
-def _along(
-    kind: Any, position: NDArray[Any], speed: NDArray[Any], friction: NDArray[Any], volts: NDArray[Any],
-    time: NDArray[Any], vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any],
-    own: NDArray[Any], out: NDArray[Any],
-) -> None:  # fmt: skip
+def _along(kind: Any, signals: _Signals, numbers: _Numbers, out: NDArray[Any]) -> None:
+    position, speed, friction, volts, time = signals
+    vector, flags, settings, own = numbers
     n = position.shape[1]
     shared = vector[: at.SHARED]
     joints = vector[at.SHARED :].reshape(n, at.PER_JOINT)
@@ -161,18 +179,10 @@ def _along(
 
 
 @entry
-def _along_rods(
-    position: NDArray[Any], speed: NDArray[Any], friction: NDArray[Any], volts: NDArray[Any], time: NDArray[Any],
-    vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any],
-    own: NDArray[Any], out: NDArray[Any],
-) -> None:  # fmt: skip
-    _along(ClosedForm(0), position, speed, friction, volts, time, vector, flags, settings, own, out)
+def _along_rods(signals: _Signals, numbers: _Numbers, out: NDArray[Any]) -> None:
+    _along(ClosedForm(0), signals, numbers, out)
 
 
 @entry
-def _along_chain(
-    position: NDArray[Any], speed: NDArray[Any], friction: NDArray[Any], volts: NDArray[Any], time: NDArray[Any],
-    vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any],
-    own: NDArray[Any], out: NDArray[Any],
-) -> None:  # fmt: skip
-    _along(AnyChain(0), position, speed, friction, volts, time, vector, flags, settings, own, out)
+def _along_chain(signals: _Signals, numbers: _Numbers, out: NDArray[Any]) -> None:
+    _along(AnyChain(0), signals, numbers, out)

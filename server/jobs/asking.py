@@ -8,11 +8,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from daq.safety.planned import planned
-from daq.trajectories.asked import asked_experiments
+from daq.trajectories.offered import offered_experiments
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
-    from model.discrepancy.experiment_design.next_experiment import Asker, Experiment
+    from model.discrepancy.experiment_design.next_experiment import Asker
 
 
 def asker(machine: Machine, budget: float | None = None) -> Asker:
@@ -23,11 +23,4 @@ def asker(machine: Machine, budget: float | None = None) -> Asker:
     """
     from model.discrepancy.experiment_design.next_experiment import Asker
 
-    return Asker(library(), lambda spec: planned(spec, machine), budget)
-
-
-def library() -> tuple[Experiment, ...]:
-    """The experiments that may be asked for."""
-    from model.discrepancy.experiment_design.next_experiment import Experiment
-
-    return tuple(Experiment(one.name, one.description, one.spec, one.general) for one in asked_experiments())
+    return Asker(offered_experiments(), lambda spec: planned(spec, machine), budget)

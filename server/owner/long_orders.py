@@ -6,6 +6,7 @@ import time
 
 from daq.acquisition.guardian import EndCause
 from daq.acquisition.messages import Finished
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, ReachError, SafetyError
 from daq.contracts.limp import limp_line
 from daq.contracts.sample import SampleRow
@@ -27,9 +28,6 @@ from server.owner.messages import (
     RunProgram,
 )
 from server.owner.quick_orders import carry_out
-
-EXIT_WRONG_INPUT = 2
-EXIT_CODES = {"complete": 0, "fault": 5, "interrupted": 5, "stopped": 6}
 
 
 def require_in_time(order: Long) -> None:
@@ -65,7 +63,7 @@ def run(desk: Desk, order: RunExperiment) -> Answer:
         counters=result.counters,
         reason=result.reason,
     )
-    return Answer(number=order.number, finished=finished, exit_code=EXIT_CODES[result.outcome])
+    return Answer(number=order.number, finished=finished, exit_code=exit_codes.OF_OUTCOME[result.outcome])
 
 
 def jog_until_finished(desk: Desk, order: JogBegin) -> Answer:
@@ -124,7 +122,7 @@ def answered_quickly(desk: Desk, order: Quick) -> Answer:
     except DaqError as error:
         return Answer(number=order.number, problem=str(error), exit_code=error.exit_code)
     except ProtocolError as error:
-        return Answer(number=order.number, problem=str(error), exit_code=EXIT_WRONG_INPUT)
+        return Answer(number=order.number, problem=str(error), exit_code=exit_codes.WRONG_INPUT)
 
 
 def _require_ready(desk: Desk) -> None:

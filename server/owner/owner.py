@@ -6,6 +6,7 @@ import time
 from dataclasses import dataclass
 
 from daq.acquisition.guardian import EndCause
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, ReachError
 from daq.driver import ControllerRestartedError, NoSampleError
 from daq.link import LinkError, LinkState
@@ -91,7 +92,7 @@ def _carry_out(desk: Desk, order: Long | Quick) -> None:
     except DaqError as error:
         answer = Answer(number=order.number, problem=str(error), exit_code=error.exit_code)
     except ProtocolError as error:
-        answer = Answer(number=order.number, problem=str(error), exit_code=long_orders.EXIT_WRONG_INPUT)
+        answer = Answer(number=order.number, problem=str(error), exit_code=exit_codes.WRONG_INPUT)
     desk.activity = "none"
     desk.inbox.done()
     desk.tell_arm()

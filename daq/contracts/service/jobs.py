@@ -88,9 +88,7 @@ class DiagnoseRequest(Wire):
     name: ModelName | None = None
 
 
-JobRequest = Annotated[
-    FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest, Field(discriminator="kind")
-]  # fmt: skip
+JobRequest = Annotated[FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest, Field(discriminator="kind")]
 
 
 class KnownEffect(Wire):

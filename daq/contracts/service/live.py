@@ -138,10 +138,20 @@ class RefusedMessage(Wire):
 
 
 LiveMessage = Annotated[
-    SampleMessage | HistoryMessage | RecordEventMessage | RobotMessage | LinkMessage | QueueMessage | ProgressMessage
-    | JobMessage | EventMessage | TeachingMessage | ThinnedMessage | RefusedMessage,
+    SampleMessage
+    | HistoryMessage
+    | RecordEventMessage
+    | RobotMessage
+    | LinkMessage
+    | QueueMessage
+    | ProgressMessage
+    | JobMessage
+    | EventMessage
+    | TeachingMessage
+    | ThinnedMessage
+    | RefusedMessage,
     Field(discriminator="topic"),
-]  # fmt: skip
+]
 
 
 class LiveFrame(Wire):

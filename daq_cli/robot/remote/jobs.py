@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.service.jobs import MACHINE, JobKind, JobRequest
 from daq_cli.app.context import Invocation, console
@@ -29,9 +30,13 @@ KINDS: dict[JobKind, str] = {
     "compare": "comparison",
     "diagnose": "diagnosis",
 }
-EXIT_PROGRAM_FAULT, PROGRAM_FAULT = 1, "program fault"
-"""As the reason of such a job begins."""
-EXIT_CODES = {"failed": 2, "cancelled": 130, "interrupted": 3}
+PROGRAM_FAULT = "program fault"
+"""What the reason of a job begins with that failed by a fault of the program."""
+EXIT_CODES = {
+    "failed": exit_codes.WRONG_INPUT,
+    "cancelled": exit_codes.INTERRUPTED,
+    "interrupted": exit_codes.NOT_REACHED,
+}
 
 
 class JobEndedError(DaqError):
@@ -40,7 +45,7 @@ class JobEndedError(DaqError):
     def __init__(self, job: Job) -> None:
         super().__init__(f"job {job.id} {job.state}: {job.reason or 'no reason is known'}")
         fault = job.reason.startswith(PROGRAM_FAULT)
-        self.exit_code = EXIT_PROGRAM_FAULT if fault else EXIT_CODES[job.state]  # type: ignore[misc]
+        self.exit_code = exit_codes.PROGRAM_FAULT if fault else EXIT_CODES[job.state]  # type: ignore[misc]
 
 
 def require_no_programs(effect_files: Sequence[Path] | None, call: Invocation) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.client import Robot, ServiceNotReachedError
+from daq.contracts import exit_codes
 from daq.contracts.errors import SafetyError, TraceError
 from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.live import EventMessage, LiveMessage, ProgressMessage, QueueMessage, RecordEventMessage
@@ -22,8 +23,12 @@ if TYPE_CHECKING:
     from daq.contracts.service.experiments import Experiment
     from daq.contracts.service.robot import RobotStatus
 
-EXIT_CODES = {"failed": 4, "cancelled": 6, "interrupted": 3}
-"""Of an experiment that has left no trace."""
+EXIT_CODES = {
+    "failed": exit_codes.REFUSED,
+    "cancelled": exit_codes.STOPPED,
+    "interrupted": exit_codes.NOT_REACHED,
+}
+"""Exit code by the state of an experiment that has left no trace."""
 LOOK_EVERY = 2.0
 """s without news after which the experiment is looked at."""
 LOOKS_IN_VAIN = 5
@@ -140,7 +145,7 @@ def _finished(robot: Robot, ended: Experiment, folder: Path) -> Finished:
 
     if ended.outcome is None or ended.trace is None:
         line = f"experiment {ended.id} {ended.state}: {ended.reason or 'no reason is known'}"
-        raise AcquisitionFailedError(line, EXIT_CODES.get(ended.state, 1))
+        raise AcquisitionFailedError(line, EXIT_CODES.get(ended.state, exit_codes.PROGRAM_FAULT))
     details = robot.traces.get(ended.trace)
     try:
         folder.mkdir(parents=True, exist_ok=True)

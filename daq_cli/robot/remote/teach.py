@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SafetyError
 from daq_cli.app.context import Invocation, console
 from daq_cli.app.stop_keys import StopKeys
@@ -26,13 +27,12 @@ if TYPE_CHECKING:
 
 LOOK_EVERY = 0.1
 """s between two looks at how it goes on."""
-EXIT_STOPPED = 6
 
 
 class StoppedAtServerError(DaqError):
     """A person has stopped the arm."""
 
-    exit_code = EXIT_STOPPED
+    exit_code = exit_codes.STOPPED
 
 
 @contextmanager

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.experiment import ExperimentSpec, OfferedExperiment
 from daq.contracts.trace import Trace
 from model.discrepancy.candidates.decision import Decision
 from model.discrepancy.candidates.ranking import Ranking, describe
@@ -56,16 +56,6 @@ ENOUGH = 10.0
 
 
 @dataclass(frozen=True)
-class Experiment:
-    """One of the library: what is said of it, and whether it is made for effects of every kind."""
-
-    name: str
-    description: str
-    spec: ExperimentSpec
-    general: bool = False
-
-
-@dataclass(frozen=True)
 class Asked:
     """The experiment to make next, or None; `note` says why there is none, or what it will not tell apart."""
 
@@ -77,7 +67,7 @@ class Asked:
 class Asker:
     """What may be asked for. budget: s of robot time that are left; None for no limit."""
 
-    experiments: tuple[Experiment, ...]
+    experiments: tuple[OfferedExperiment, ...]
     plan: Planner
     budget: float | None = None
 
@@ -99,7 +89,7 @@ class Asker:
 class _Judged:
     """An experiment with its pairs' separations, and what of each difference could not be hidden, (N,)."""
 
-    experiment: Experiment
+    experiment: OfferedExperiment
     there: Imagined
     separations: dict[Pair, float]
     left: dict[Pair, Floats]
@@ -130,7 +120,7 @@ def settled(observation: Observation, rivals: Sequence[Refitted]) -> list[Refitt
 
 
 def best_experiment(
-    rivals: Sequence[Refitted], experiments: Sequence[Experiment], plan: Planner, budget: float | None = None
+    rivals: Sequence[Refitted], experiments: Sequence[OfferedExperiment], plan: Planner, budget: float | None = None
 ) -> Asked:
     """The experiment on which the rivals that are hardest to tell apart differ most for its robot time; pairs that no
     experiment tells apart are named in the note."""
@@ -158,7 +148,7 @@ def best_experiment(
 
 
 def most_information(
-    point: Point, experiments: Sequence[Experiment], plan: Planner, done: Sequence[ExperimentSpec],
+    point: Point, experiments: Sequence[OfferedExperiment], plan: Planner, done: Sequence[ExperimentSpec],
     budget: float | None = None,
 ) -> Asked:  # fmt: skip
     """Of the experiments for effects of every kind that were not made yet, the one that tells most of the arm; of the
@@ -174,7 +164,9 @@ def most_information(
     return Asked(None)
 
 
-def _judged(rivals: Sequence[Refitted], experiment: Experiment, plan: Planner, budget: float | None) -> _Judged | None:
+def _judged(
+    rivals: Sequence[Refitted], experiment: OfferedExperiment, plan: Planner, budget: float | None
+) -> _Judged | None:
     points = [r.judged.point for r in rivals]
     there = _possible(points[0], experiment, plan, budget)
     if there is None:
@@ -223,8 +215,8 @@ def _unhidden(there: Imagined, wrong: Refitted, target: Floats, known: dict[str,
 
 
 def _information(
-    point: Point, experiment: Experiment, plan: Planner, budget: float | None
-) -> tuple[Experiment, Imagined, float] | None:
+    point: Point, experiment: OfferedExperiment, plan: Planner, budget: float | None
+) -> tuple[OfferedExperiment, Imagined, float] | None:
     there = _possible(point, experiment, plan, budget)
     if there is None:
         return None
@@ -237,7 +229,7 @@ def _information(
     return experiment, there, float(nats)
 
 
-def _possible(point: Point, experiment: Experiment, plan: Planner, budget: float | None) -> Imagined | None:
+def _possible(point: Point, experiment: OfferedExperiment, plan: Planner, budget: float | None) -> Imagined | None:
     there = imagined(point.model, experiment.spec, plan)
     return None if there is None or (budget is not None and there.duration > budget) else there
 
@@ -252,7 +244,7 @@ def _same_motion(one: ExperimentSpec, other: ExperimentSpec) -> bool:
 
 
 def _next(
-    experiment: Experiment, there: Imagined, separates: tuple[str, ...], separation: float, reason: str
+    experiment: OfferedExperiment, there: Imagined, separates: tuple[str, ...], separation: float, reason: str
 ) -> NextExperiment:
     return NextExperiment(
         name=experiment.name, spec=experiment.spec, duration=there.duration, separates=separates,

@@ -16,7 +16,7 @@ from model.discrepancy.explanation.table import telling
 from model.discrepancy.localisation.clear_shape import CLEAR_SHAPE, FEWEST_BINS, clear_shape, filled_bins
 from model.discrepancy.localisation.dependence import drive_units
 from model.discrepancy.localisation.disagreement import spoken_unit
-from model.discrepancy.output_error.excess import LEAST_EXCESS
+from model.discrepancy.verdict import LEAST_EXCESS
 from model.fitting.records import Record, Signal, resolution
 from model.machine_model.model import Model
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.machine import NoController
-from model.analysis.bodies import gravity_loads
 from model.discrepancy.localisation.phases import HOLD, asked_motion, asked_speed, directions, phases_of
 from model.fitting.records import Record, Signal
 from model.machine_model.model import Model
+from model.simulation.chain_of_model import gravity_loads
 from model.simulation.prepared import Options
 from model.simulation.simulate import Simulation, at_rows, simulate
 

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.trace import Trace
-from model.analysis.bodies import chain_of
 from model.discrepancy.inverse_dynamics.cutoff import measured_signal
 from model.dynamics.recursive import mass_matrix
 from model.machine_model.model import Model
+from model.simulation.chain_of_model import chain_of
 
 Floats = NDArray[np.float64]
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from daq.contracts.machine import NoController
-from model.analysis.bodies import chain_of
 from model.discrepancy.diagnosis import RemainingShape
 from model.discrepancy.localisation.dependence import AGAINST, dependence, quantities
 from model.discrepancy.localisation.disagreement import optional
@@ -25,6 +24,7 @@ from model.dynamics.recursive import mass_matrix
 from model.fitting.records import Record, Signal
 from model.machine_model.model import Model
 from model.machine_model.parameter import initial_velocity
+from model.simulation.chain_of_model import chain_of
 from model.simulation.period import OUT_READING, OUT_SPEED
 from model.simulation.prepared import Options
 from model.simulation.simulate import sensitivities, simulate

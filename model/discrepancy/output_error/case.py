@@ -13,7 +13,6 @@ from model.discrepancy.diagnosis import RemainingShape, SignalError, Where
 from model.discrepancy.localisation.disagreement import located
 from model.discrepancy.localisation.unexplained_torque import shapes
 from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.output_error.excess import excess_removed
 from model.discrepancy.output_error.feedback_share import FOLLOWING_FOR_ERRORS
 from model.discrepancy.output_error.holdout import HeldOut, errors
 from model.discrepancy.output_error.noise_floor import noise_floor
@@ -21,6 +20,7 @@ from model.discrepancy.output_error.observation import Observation, Signals
 from model.discrepancy.output_error.refitting import Refitted
 from model.discrepancy.output_error.search import Point
 from model.discrepancy.thresholds import Thresholds
+from model.discrepancy.verdict import excess_removed
 from model.machine_model.model import Model
 
 Floats = NDArray[np.float64]

@@ -12,11 +12,11 @@ from model.discrepancy.explanation import reasons
 from model.discrepancy.explanation.samples import Left
 from model.discrepancy.output_error.case import Case, with_point
 from model.discrepancy.output_error.distortion import sum_of_contributions
-from model.discrepancy.output_error.excess import excess_removed
 from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.refitting import Judged, Refitted, same_answer, with_evidence
 from model.discrepancy.output_error.search import Point, settled
 from model.discrepancy.thresholds import Thresholds
+from model.discrepancy.verdict import excess_removed
 
 LAST_STEPS = 4
 """Of a search after its derivatives are computed anew."""

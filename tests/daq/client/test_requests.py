@@ -169,11 +169,24 @@ def test_a_trace_is_never_written_over_another(tmp_path: Path) -> None:
 
 def _entries(*names: tuple[str, str]) -> httpx.Response:
     items = [
-        {"id": number, "robot": "ma2000", "file": file, "created": "2026-01-01T00:00:00Z", "source": "mock",
-         "kind": None, "name": None, "joints": [1], "outcome": None, "samples": 1, "duration": 0, "size": 1,
-         "operator": None, "experiment": None}
+        {
+            "id": number,
+            "robot": "ma2000",
+            "file": file,
+            "created": "2026-01-01T00:00:00Z",
+            "source": "mock",
+            "kind": None,
+            "name": None,
+            "joints": [1],
+            "outcome": None,
+            "samples": 1,
+            "duration": 0,
+            "size": 1,
+            "operator": None,
+            "experiment": None,
+        }
         for number, file in names
-    ]  # fmt: skip
+    ]
     return httpx.Response(200, content=json.dumps({"items": items, "next": None}))
 
 

@@ -78,9 +78,16 @@ class StandIn:
         seen = np.array([own.counts_to_rad(c) for own, c in zip(CALIBRATIONS, counts, strict=True)])
         status = StatusFlag.FROZEN if self.frozen else 0
         return SampleRow(
-            self.tick, self.tick * PERIOD, self.tick * PERIOD, tuple(targets.tolist()), tuple(seen.tolist()),
-            tuple((targets - seen).tolist()), (0.0,) * 6, (0,) * 6, int(status),
-        )  # fmt: skip
+            self.tick,
+            self.tick * PERIOD,
+            self.tick * PERIOD,
+            tuple(targets.tolist()),
+            tuple(seen.tolist()),
+            tuple((targets - seen).tolist()),
+            (0.0,) * 6,
+            (0,) * 6,
+            int(status),
+        )
 
     def set_points(self, postures: Mapping[int, int]) -> None:
         assert self.running

@@ -165,9 +165,13 @@ def test_sequence_goes_on_from_where_each_piece_ended_on_its_own_joints() -> Non
     assert offsets(planned, 2)[[5, 10, 15]] == pytest.approx([0.0, 0.0, -0.2])
     marks = [(mark.kind, mark.index, mark.joint) for mark in planned.marks]
     assert marks == [
-        ("start", 0, None), ("ramp_start", 0, 1), ("ramp_end", 5, 1), ("ramp_start", 10, None), ("ramp_end", 15, None),
+        ("start", 0, None),
+        ("ramp_start", 0, 1),
+        ("ramp_end", 5, 1),
+        ("ramp_start", 10, None),
+        ("ramp_end", 15, None),
         ("end", 15, None),
-    ]  # fmt: skip
+    ]
 
 
 def test_pause_alone_stands_still() -> None:

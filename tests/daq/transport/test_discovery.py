@@ -14,9 +14,7 @@ def test_found_ports_are_named_by_urls_in_order(monkeypatch: pytest.MonkeyPatch)
     adapter = SimpleNamespace(
         device="/dev/ttyUSB1", name="ttyUSB1", description="USB serial", manufacturer="Maker", serial_number="42"
     )
-    bare = SimpleNamespace(
-        device="/dev/ttyS0", name="ttyS0", description="n/a", manufacturer=None, serial_number=None
-    )  # fmt: skip
+    bare = SimpleNamespace(device="/dev/ttyS0", name="ttyS0", description="n/a", manufacturer=None, serial_number=None)
     monkeypatch.setattr(list_ports, "comports", lambda: [adapter, bare])
     assert ports() == (
         FoundPort("serial:///dev/ttyS0", "ttyS0", None, None),

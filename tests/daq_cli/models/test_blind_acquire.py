@@ -76,6 +76,7 @@ def ramp(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made.file
 
 
+@pytest.mark.slow
 def test_the_diagnoser_asks_where_it_may_and_only_there(
     ramp: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

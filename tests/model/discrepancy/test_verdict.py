@@ -43,19 +43,19 @@ def test_held_out_traces_tell_too() -> None:
 
 def test_verdicts() -> None:
     taken = step("backlash", (2,))
-    assert verdict([taken], (2,)) == "unknown-effect"
-    assert verdict([taken], ()) == "named"
-    assert verdict([], ()) == "nothing-significant"
-    assert verdict([withdrawn(taken, (2,))], ()) == "nothing-significant"
+    assert verdict([taken], unexplained=True) == "unknown-effect"
+    assert verdict([taken], unexplained=False) == "named"
+    assert verdict([], unexplained=False) == "nothing-significant"
+    assert verdict([withdrawn(taken, (2,))], unexplained=False) == "nothing-significant"
 
 
 def test_a_group_that_held_out_traces_refuse_is_no_answer() -> None:
     group = (Candidate(effect="backlash", joints=(2,), evidence=50.0),)
     close = step("backlash", (2,)).model_copy(update={"group": group})
     refused = close.model_copy(update={"adopted": False, "rejected_because": "the held-out error rises"})
-    assert verdict([close], ()) == "ambiguous"
-    assert verdict([refused], ()) == "nothing-significant"
-    assert verdict([step("stiction", (3,)), refused], ()) == "named"
+    assert verdict([close], unexplained=False) == "ambiguous"
+    assert verdict([refused], unexplained=False) == "nothing-significant"
+    assert verdict([step("stiction", (3,)), refused], unexplained=False) == "named"
 
 
 def test_steps_on_a_joint_that_stays_unexplained_are_taken_back() -> None:

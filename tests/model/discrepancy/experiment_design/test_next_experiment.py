@@ -9,17 +9,17 @@ import pytest
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from daq.contracts.experiment import ExperimentSpec, Ramp
+from daq.contracts.experiment import ExperimentSpec, OfferedExperiment, Ramp
 from daq.contracts.progress import Never, silent
 from daq.contracts.trace import Trace
 from daq.safety.planned import planned
+from daq.trajectories.offered import offered_experiments
 from daq_cli.trial.experiments import trial_experiment
 from model.discrepancy.candidates.decision import decide
 from model.discrepancy.candidates.library import Candidate
 from model.discrepancy.candidates.probing import Probed
 from model.discrepancy.candidates.ranking import Ranking, ranked
 from model.discrepancy.experiment_design.next_experiment import (
-    Experiment,
     best_experiment,
     most_information,
     rivals_of,
@@ -32,10 +32,9 @@ from model.discrepancy.output_error.refitting import Refitted, judge
 from model.discrepancy.output_error.search import Point, point_at, searched, with_new_tangents
 from model.discrepancy.thresholds import THRESHOLDS
 from model.machine_model.model import Model
-from server.jobs.asking import library
 from tests.model.fitting import imagined
 
-EXPERIMENTS = {e.name: e for e in library()}
+EXPERIMENTS = {e.name: e for e in offered_experiments()}
 FRICTION = ("coulomb_friction", "stribeck_friction")
 SPEED_LAWS = {
     "viscous_friction": "joint2.viscous_friction.coefficient",
@@ -149,7 +148,7 @@ def test_what_no_experiment_tells_is_said() -> None:
 def test_without_rivals_what_tells_most_is_asked_for_once(ramp_step: Trace) -> None:
     point = known(ramp_step)
     short = Ramp(amplitude=0.1, duration=0.5)
-    slight = Experiment("slight", "a small ramp", ExperimentSpec(trajectory=short, hold=0.5))
+    slight = OfferedExperiment("slight", "a small ramp", ExperimentSpec(trajectory=short, hold=0.5))
     rich = replace(EXPERIMENTS["diagnostic-d"], general=True)
     asked = most_information(point, [slight, rich], plan, []).experiment
     assert asked is not None

@@ -1,27 +1,13 @@
-"""The places where a modification may act.
-
-A modification is an object with a `name` that also satisfies one or more of these protocols; plant
-and board pick those they know by `of_kind`. Where none is present the inner loop runs as if the place did not
-exist. State, where an effect has any, is its own, and `restart` brings it back to the beginning. Joints are numbered
-from 1, angles in rad and torques in N·m, at the joint.
-"""
+"""Protocols by which a modification changes the plant: its constants, drives, gears, friction, or the torques on it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
+from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
 
-if TYPE_CHECKING:
-    from mock_controller.board.parameters import BoardParameters
-    from mock_controller.plant.parameters import PlantParameters
-    from mock_controller.plant.transmission import Transmission
-
-
-@runtime_checkable
-class Modification(Protocol):
-    """What every modification has: the name it is asked for by."""
-
-    name: ClassVar[str]
+from mock_controller.modification import Modification
+from mock_controller.plant.parameters import PlantParameters
+from mock_controller.plant.transmission import Transmission
 
 
 @runtime_checkable
@@ -36,13 +22,6 @@ class KnowsPlant(Modification, Protocol):
     """Is told the arm's constants and the length of a step (s), once, before anything moves."""
 
     def know_plant(self, parameters: PlantParameters, step_s: float) -> None: ...
-
-
-@runtime_checkable
-class KnowsBoard(Modification, Protocol):
-    """Is told the board's constants, once, before the first reading."""
-
-    def know_board(self, parameters: BoardParameters) -> None: ...
 
 
 @runtime_checkable
@@ -111,49 +90,3 @@ class AddsTorque(Modification, Protocol):
     """Torque from outside on all joints, a function of time and state (six values). Asked every step."""
 
     def external_torque(self, time_s: float, angles: Sequence[float], rates: Sequence[float]) -> Sequence[float]: ...
-
-
-@runtime_checkable
-class ChangesSensor(Modification, Protocol):
-    """Angle that one joint's potentiometer shows for the joint's true angle. Asked every control period."""
-
-    joint: int
-
-    def sensed_angle(self, angle: float) -> float: ...
-
-
-@runtime_checkable
-class ChangesReading(Modification, Protocol):
-    """Reading (ADC counts, not yet rounded) of one joint's converter. Asked every control period."""
-
-    joint: int
-
-    def reading(self, counts: float) -> float: ...
-
-
-@runtime_checkable
-class ChangesBoard(Modification, Protocol):
-    """Other constants of the board: timing, gains, scales. Applied once, before the board exists."""
-
-    def change_board(self, parameters: BoardParameters) -> BoardParameters: ...
-
-
-@runtime_checkable
-class ChangesSetPoint(Modification, Protocol):
-    """Set point (ADC counts) that one joint's controller works with. Asked every control period."""
-
-    joint: int
-
-    def set_point(self, counts: int, tick: int) -> int: ...
-
-
-@runtime_checkable
-class Restartable(Modification, Protocol):
-    """A modification with state of its own."""
-
-    def restart(self) -> None: ...
-
-
-def of_kind(modifications: Iterable[Modification], kind: type) -> list[Any]:
-    """Those modifications that act at the place `kind`, in the order given."""
-    return [modification for modification in modifications if isinstance(modification, kind)]

@@ -32,7 +32,7 @@ from server.store.models import ModelStore
 from server.store.traces import TraceStore
 from tests.daq.traces.samples import write
 from tests.server.clocks import HandClock
-from tests.server.test_store import _trace
+from tests.server.store.rows import new_trace
 
 MACHINE = load_machine("ma2000")
 TRACE = f"{1:012x}"
@@ -68,7 +68,7 @@ class Bench:
         traces = folder / "traces"
         traces.mkdir()
         self.catalogue = Catalogue(traces, "ma2000", self.traces, ExperimentStore(self.store))
-        self.traces.insert(_trace(1))
+        self.traces.insert(new_trace(1))
         (traces / "1.mcap").touch()
         self.models = Models(folder / "models", "ma2000", MACHINE, ModelStore(self.store), self.clock)
         self.carry_out: Callable[[Path], Ended] = lambda _folder: Ended(headline="found")

@@ -23,7 +23,8 @@ from server.store.experiments import ExperimentStore
 from server.store.pages import Cursor
 from server.store.remembered import Remembered
 from server.store.tables import Table
-from server.store.traces import NewTrace, TraceSearch, TraceStore
+from server.store.traces import TraceSearch, TraceStore
+from tests.server.store.rows import new_trace
 
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
 
@@ -150,20 +151,11 @@ def test_a_cursor_of_somebodys_own_making_is_refused(text_: str) -> None:
         Cursor.parse(text_)
 
 
-def _trace(number: int, **changes: object) -> NewTrace:
-    fields: dict[str, object] = {
-        "id": f"{number:012x}", "robot": "ma2000", "file": f"{number}.mcap", "created": NOW + timedelta(seconds=number),
-        "source": "mock", "kind": "ramp", "name": None, "joints": (1, 2, 3), "outcome": "complete", "samples": 10,
-        "duration": 0.2, "size": 1000, "operator": None, "experiment": None, "notes": "",
-    }  # fmt: skip
-    return NewTrace(**(fields | changes))  # type: ignore[arg-type]
-
-
 def test_search_finds_what_it_is_asked_for_and_takes_nothing_as_a_pattern(store: Store) -> None:
     traces = TraceStore(store)
-    traces.insert(_trace(1, notes="Loose BELT at 100%"))
-    traces.insert(_trace(2, name="belt_test", kind="sine"))
-    traces.insert(_trace(3, outcome="fault"))
+    traces.insert(new_trace(1, notes="Loose BELT at 100%"))
+    traces.insert(new_trace(2, name="belt_test", kind="sine"))
+    traces.insert(new_trace(3, outcome="fault"))
 
     def found(**search: object) -> list[int]:
         page = traces.page("ma2000", TraceSearch(**search), None, 10)  # type: ignore[arg-type]
@@ -186,7 +178,7 @@ def test_search_finds_what_it_is_asked_for_and_takes_nothing_as_a_pattern(store:
 
 def test_a_file_that_is_gone_is_marked_and_comes_back(store: Store) -> None:
     traces = TraceStore(store)
-    traces.insert(_trace(1))
+    traces.insert(new_trace(1))
     traces.mark_missing(["1.mcap"], missing=True)
     assert traces.get("ma2000", f"{1:012x}").missing
     traces.mark_missing(["1.mcap"], missing=False)

@@ -65,7 +65,7 @@ def test_everything_of_a_robot_names_it(described: dict[str, Any]) -> None:
 
 def test_every_address_of_the_guide_is_one(described: dict[str, Any]) -> None:
     """Those that begin with … for the robot; a name in capitals is a parameter."""
-    guide = Path(__file__).parents[2].joinpath("docs", "service.md").read_text("utf-8")
+    guide = Path(__file__).parents[3].joinpath("docs", "service.md").read_text("utf-8")
     named = {path.rstrip("/") for path in re.findall(r"…(/[\w/-]+)", guide)}
     known = {re.sub(r"\{\w+\}", "ID", path.removeprefix("/api/v1/robots/{robot}")) for path in described["paths"]}
     assert {path for path in named if path not in known} == {"/live"}, "a WebSocket, which OpenAPI does not describe"

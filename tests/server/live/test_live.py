@@ -23,8 +23,8 @@ from server.live.outbox import DROP_AFTER, THIN_AFTER, THIN_BEYOND, Outbox
 from server.live.stream import stream
 from server.owner.messages import LiveSample
 from tests.server.clocks import HandClock
+from tests.server.live.watching import frames, messages, watching
 from tests.server.service import Service
-from tests.server.watching import frames, messages, watching
 
 
 def test_samples_come_one_a_period_and_say_how_old_they_are(service: Service) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from server.queue.attendance import ATTENDANCE
 from server.robot.control import LEASE_TIME
-from tests.server.queue_bench import CALM, REAL, Bench
+from tests.server.queue.bench import CALM, REAL, Bench
 
 LOOK = "look at the arm, then resume the queue"
 LOST = CALM.model_copy(update={"link": "lost"})

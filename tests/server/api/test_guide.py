@@ -15,7 +15,7 @@ from tests.daq_cli.invoke import CommandLine
 from tests.server.desk import anothers_desk
 from tests.server.service import Service
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 GUIDE = ROOT.joinpath("docs", "service.md").read_text("utf-8")
 URL, STOP_URL = "http://127.0.0.1:8300", "http://127.0.0.1:8301"
 BLOCKS = re.findall(r"^```console\n(.*?)^```", GUIDE, re.MULTILINE | re.DOTALL)

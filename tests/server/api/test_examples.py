@@ -17,7 +17,7 @@ from server.app import bare_app
 from tests.server.service import Service
 
 JSON = ("application/json", "application/problem+json")
-GUIDE = Path(__file__).parents[2].joinpath("docs", "service.md").read_text("utf-8")
+GUIDE = Path(__file__).parents[3].joinpath("docs", "service.md").read_text("utf-8")
 NO_ADDRESS = {"ticket-unknown", "no-such-method", "fault", "head-too-large"}
 """Of the WebSocket, of addresses that are none, of what never happens, of requests whose address is not read."""
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from daq.config.service import ServiceSettings
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 GUIDE = (ROOT / "docs" / "service.md").read_text("utf-8")
 
 

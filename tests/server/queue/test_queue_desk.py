@@ -17,7 +17,7 @@ from daq.contracts.service.experiments import Experiment, ExperimentRequest
 from server.owner.messages import Answer
 from server.problems import ProblemError
 from server.queue.due_runs import DueRuns
-from tests.server.queue_bench import CALM, FULL, REAL, SPEC, Bench, done
+from tests.server.queue.bench import CALM, FULL, REAL, SPEC, Bench, done
 
 
 def test_a_run_that_a_full_disk_refuses_is_not_counted_and_comes_when_there_is_room(

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
-from daq.contracts.experiment import Cubic, ExperimentSpec, Pause, Segment, Sequence, SlowRamp
+from daq.contracts.experiment import Cubic, ExperimentSpec, OfferedExperiment, Pause, Segment, Sequence, SlowRamp
 from daq.trajectories.presets import PRESETS
 
 GENERAL = "diagnostic"
@@ -14,38 +13,30 @@ ELSEWHERE = (40.0, 35.0, -50.0)
 """Degrees from the rest posture: the second posture of the diagnostic set."""
 
 
-@dataclass(frozen=True)
-class AskedExperiment:
-    """One of the library: what is said of it, and whether it is made for effects of every kind."""
-
-    name: str
-    description: str
-    spec: ExperimentSpec
-    general: bool = False
-
-
-def asked_experiments() -> tuple[AskedExperiment, ...]:
+def offered_experiments() -> tuple[OfferedExperiment, ...]:
     """The diagnostic set, its parts, the source's ramp, and slow reversals at a second posture."""
     named = [
-        AskedExperiment(name, PRESETS[name].description, PRESETS[name].spec, name == GENERAL)
+        OfferedExperiment(name, PRESETS[name].description, PRESETS[name].spec, name == GENERAL)
         for name in (GENERAL, *SINGLE)
     ]
     return (*named, *(_slow(speed) for speed in (2.0, 5.0)))
 
 
-def _slow(speed: float) -> AskedExperiment:
+def _slow(speed: float) -> OfferedExperiment:
     """Reversals of all three joints at one low speed (°/s), at the second posture."""
     there = {joint: math.radians(angle) for joint, angle in enumerate(ELSEWHERE, start=1)}
     back = {joint: -angle for joint, angle in there.items()}
     size = math.radians(1.5 * speed)
     amplitude = {1: size, 2: -size, 3: size}
     moves = (
-        Cubic(amplitude=there, duration=3.0), Pause(duration=0.5),
-        SlowRamp(amplitude=amplitude, speed=math.radians(speed), reversals=3), Pause(duration=0.5),
+        Cubic(amplitude=there, duration=3.0),
+        Pause(duration=0.5),
+        SlowRamp(amplitude=amplitude, speed=math.radians(speed), reversals=3),
+        Pause(duration=0.5),
         Cubic(amplitude=back, duration=3.0),
-    )  # fmt: skip
+    )
     name = f"slow-reversals-{speed:g}"
     spec = ExperimentSpec(
         trajectory=Sequence(segments=tuple(Segment(move=m) for m in moves)), joints=(1, 2, 3), hold=0.5, name=name
     )
-    return AskedExperiment(name, f"slow reversals at {speed:g} °/s at a second posture", spec)
+    return OfferedExperiment(name, f"slow reversals at {speed:g} °/s at a second posture", spec)
