@@ -16,7 +16,7 @@ WORKERS ?= -n 2 --dist loadfile --no-loadscope-reorder
 .DELETE_ON_ERROR:
 # Also with -j: `page` and what `lint` runs in the background use the page's packages, which are installed into one folder.
 .NOTPARALLEL:
-.PHONY: help serve demo page test test-all lint format types requirements bench clean distclean
+.PHONY: help serve demo page test test-all lint format types requirements bench golden clean distclean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -62,6 +62,9 @@ types: $(FOR_DEVELOPMENT) ## make the page's types of the API anew, after a chan
 
 bench: $(FOR_DEVELOPMENT) ## measure the figures about recording of docs/benchmarks.md, shorter than there
 	@$(BIN)/python -m benchmarks main-job --quick
+
+golden: $(FOR_DEVELOPMENT) ## compare answers of every command with those recorded before, to the digit (20 minutes)
+	@$(BIN)/python -m benchmarks.golden
 
 clean: ## remove caches and what was built
 	@rm -rf build dist server/dashboard/dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache

@@ -93,8 +93,8 @@ DESIGNS = (
     ("ma2000", "--experiments", "2", "--duration", "4", "--candidates", "12"),
     ("ma2000", "--parameters", "*.mass", "--experiments", "1", "--duration", "6", "--candidates", "8", "--seed", "3"),
     ("ma2000", "--parameters", "joint2.*", "--experiments", "2", "--duration", "5", "--candidates", "10"),
-    (str(EXAMPLES / "single_axis.toml"), "--experiments", "3", "--duration", "5", "--candidates", "10"),
-    (str(EXAMPLES / "single_axis.toml"), "--experiments", "1", "--duration", "9", "--candidates", "20", "--seed", "1"),
+    ("ma2000", "--experiments", "1", "--duration", "3", "--candidates", "6", "--seed", "2"),
+    ("ma2000", "--parameters", "joint1.*", "--experiments", "2", "--duration", "4", "--candidates", "8"),
 )
 COMPARISONS = (
     ("ma2000", "models/0.json", "traces/secret-110/held-out.mcap"),
@@ -207,7 +207,7 @@ def _models(place: Path) -> list[Question]:
         found.append(
             Question(f"simulate/{number}-{name}", ("simulate", "ma2000", held_out, "--json", *SIMULATIONS[number]))
         )
-    for rig in RIGS[:2]:
+    for rig in RIGS[1:2]:
         first, second = (str(place / "rigs" / rig.name / record) for record in rig.records)
         model = str(EXAMPLES / rig.model)
         out = str(made / f"{rig.name}.json")
