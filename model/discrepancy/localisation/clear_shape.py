@@ -1,4 +1,4 @@
-"""Which of the shapes of what remains is clear enough that a person could write an effect after it."""
+"""The shape of the remaining torque that is clear enough to write a new effect from, if there is one."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from model.discrepancy.diagnosis import RemainingShape
 
 CLEAR_SHAPE = 0.3
-"""Share of the remaining torque's variance from which a dependence is clear enough to write an effect after it; and"""
+"""Least share of the remaining torque's variance that a clear shape explains."""
 FEWEST_BINS = 5
-"""bins with a torque that it needs for that: two or three values are no curve. Directions are never more than three."""
+"""Least number of bins with a torque in a clear shape: two or three values are no curve. Directions need fewer."""
 
 
 def clear_shape(found: Sequence[RemainingShape]) -> RemainingShape | None:

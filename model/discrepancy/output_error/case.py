@@ -94,6 +94,8 @@ class Case:
         fall = self._square(current) - self._square(found.judged.point)
         by_chance = max(lines.worse * deviation, lines.lost * fall * share, lines.significant)
         if rise > min(by_chance, max(deviation, found.evidence - lines.significant)):
+            if not np.isfinite(rise):
+                return Refusal(kind="diverges")
             return Refusal(kind="error-rises", numbers={"rise": rise, "deviation": deviation})
         return None
 
