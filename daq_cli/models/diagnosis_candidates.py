@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from model.discrepancy.candidates.candidate_order import in_order
+from model.discrepancy.diagnosis import in_order
 from model.effects.names import effect_on
 
 if TYPE_CHECKING:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -18,6 +19,13 @@ Phase = Literal["ramp_start", "steady_ramp", "reversal", "creep", "hold"]
 AgainstWhat = Literal["time", "position", "speed", "direction", "drive"]
 UNWRITTEN = ""
 """A sentence that the renderer writes once the answer is complete."""
+
+CLEAR_SHAPE = 0.3
+"""Least share of the remaining torque's variance that a dependence must explain to count as a shape that a person could
+write an effect after."""
+FEWEST_BINS = 5
+"""Bins with a torque that such a shape needs: two or three values are no curve. Directions are never more than
+three."""
 
 
 class _Part(BaseModel):
@@ -136,6 +144,11 @@ class RemainingShape(_Part):
     explained: float
     """Share of the remaining torque's variance that this dependence explains."""
 
+    @property
+    def filled_bins(self) -> int:
+        """Bins in which a torque is known."""
+        return sum(torque is not None for torque in self.torque)
+
 
 class Step(_Part):
     """One step of the workflow: what was found, what adding it did. `reason` and `rejected_because` are written from
@@ -247,3 +260,20 @@ class Diagnosis(_Part):
     """Joints on which more is left than noise, where the verdict is `unknown-effect`."""
     worse_held_out: tuple[int, ...] = ()
     """Joints whose held-out error grew although no effect was added: the tolerance parameters were fitted wrongly."""
+
+
+def in_order(candidates: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
+    """The fitted candidates and those that were only probed, each by evidence, the best first.
+
+    The two kinds are not comparable: a fit shows what a candidate takes off the residual, a probe extrapolates it.
+    """
+    best_first = sorted(candidates, key=lambda c: -c.evidence)
+    return [c for c in best_first if c.refitted], [c for c in best_first if not c.refitted]
+
+
+def clear_shape(found: Sequence[RemainingShape]) -> RemainingShape | None:
+    """The dependence that explains most, of those clear enough to be called a shape; None where there is none."""
+    clear = [
+        s for s in found if s.explained >= CLEAR_SHAPE and (s.against == "direction" or s.filled_bins >= FEWEST_BINS)
+    ]
+    return max(clear, key=lambda s: s.explained, default=None)

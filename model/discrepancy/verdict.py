@@ -47,6 +47,17 @@ def excess_removed(errors: Sequence[SignalError]) -> float | None:
     return 1.0 - sum(after for _, after in shown) / sum(before for before, _ in shown) if shown else None
 
 
+def rises_too_much(rise: float, deviation: float, fall: float, evidence: float, thresholds: Thresholds) -> bool:
+    """Whether the held-out sum of squares rises by more than an effect may cost there.
+
+    Args:
+        rise, deviation: of that sum, and the standard deviation that noise gives it. fall: of the fitted sum, for as
+            many samples. evidence: of the effect.
+    """
+    by_chance = max(thresholds.worse * deviation, thresholds.lost * fall, thresholds.significant)
+    return rise > min(by_chance, max(deviation, evidence - thresholds.significant))
+
+
 def worse_held_out(held: Sequence[SignalError]) -> tuple[int, ...]:
     """Joints whose error on held-out traces has grown beyond what noise may do."""
     return tuple(e.joint for e in held if (e.after / e.floor) ** 2 > GROWN * (e.before / e.floor) ** 2 + LEAST_EXCESS)

@@ -11,8 +11,8 @@ from typing import Any
 
 from daq.contracts.effects import effect_names
 from daq.contracts.errors import SpecError
+from model import layout as at
 from model.effects.effect import Effect, EffectFile, EffectParameter
-from model.machine_model import layout as at
 
 ARGUMENTS = ("position", "speed", "drive", "load", "time")
 """What the torque of an own effect may depend on beside its parameters."""

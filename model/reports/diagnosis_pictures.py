@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from model.discrepancy.candidates.candidate_order import in_order
-from model.discrepancy.diagnosis import Candidate, RemainingShape, SignalError
+from model.discrepancy.diagnosis import Candidate, RemainingShape, SignalError, in_order
 from model.effects.names import placed
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels
 from model.reports.numbers import whole

@@ -5,9 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from model.comparison.compare import Comparison
-from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment, RemainingShape, Step
+from model.discrepancy.diagnosis import (
+    Acquired,
+    Diagnosis,
+    NextExperiment,
+    RemainingShape,
+    Step,
+    clear_shape,
+)
 from model.discrepancy.explanation.renderer import best_tried, sentence, what_is_left
-from model.discrepancy.localisation.clear_shape import clear_shape
 from model.reports.diagnosis_map import map_picture
 from model.reports.diagnosis_pictures import evidence_picture, remaining_picture
 from model.reports.diagnosis_steps import error_blocks, step_sections, where_blocks

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from model import layout as at
 from model.dynamics import recursive
 from model.kinematics.chain import ChainArrays
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.simulation.bodies import chain_body
 

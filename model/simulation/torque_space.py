@@ -14,12 +14,12 @@ from scipy.signal import savgol_filter
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
+from model import layout as at
 from model.dynamics import recursive
-from model.machine_model import layout as at
 from model.machine_model.model import Model
+from model.machine_model.nominal import is_rod_arm
 from model.simulation.bodies import chain_body
 from model.simulation.dynamics_of_run import chain_levels
-from model.simulation.engines import is_rod_arm
 
 Floats = NDArray[np.float64]
 

@@ -9,8 +9,9 @@ import math
 from collections.abc import Mapping, Sequence
 
 from daq.contracts.errors import SpecError
-from model.discrepancy.candidates.candidate_order import in_order
 from model.discrepancy.diagnosis import (
+    CLEAR_SHAPE,
+    FEWEST_BINS,
     UNWRITTEN,
     Candidate,
     Diagnosis,
@@ -21,12 +22,13 @@ from model.discrepancy.diagnosis import (
     RemainingShape,
     Step,
     Where,
+    clear_shape,
+    in_order,
 )
 from model.discrepancy.explanation.effect_words import shape_in_torques, size_of, words_of
 from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.explanation.pattern_words import pattern_words
 from model.discrepancy.grounds import NamedEffect, Reason, Refusal
-from model.discrepancy.localisation.clear_shape import CLEAR_SHAPE, FEWEST_BINS, clear_shape, filled_bins
 from model.discrepancy.numbers import from_to, plain
 from model.effects.names import capitalised, effect_on, joints_in_words
 
@@ -161,7 +163,7 @@ def what_is_left(remaining: Sequence[RemainingShape]) -> str:
         return f"{shape_words(best)} explains {share}"
     if best.explained < CLEAR_SHAPE:
         return f"no clear shape: the best, {shape_words(best)}, explains only {share}"
-    few = f"rests on {filled_bins(best)} of the {FEWEST_BINS} bins that a shape needs"
+    few = f"rests on {best.filled_bins} of the {FEWEST_BINS} bins that a shape needs"
     return f"no clear shape: the best, {shape_words(best)}, explains {share}, but {few}"
 
 

@@ -14,7 +14,8 @@ from model.discrepancy.localisation.phases import HOLD, asked_motion, asked_spee
 from model.fitting.records import Record, Signal
 from model.machine_model.model import Model
 from model.simulation.chain_of_model import gravity_loads
-from model.simulation.simulate import Options, Simulation, at_rows, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import Simulation, at_rows, simulate
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

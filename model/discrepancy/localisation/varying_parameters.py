@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from daq.contracts.trace import Trace
+from model import layout as at
 from model.discrepancy.diagnosis import AgainstWhat, MovingParameter
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.validation.names import names_to_validate
 from model.validation.time_domain import vary_in_time

@@ -11,7 +11,8 @@ from daq.contracts.machine import load_machine
 from model.effects.library import library
 from model.machine_model.model import Model, base_model
 from model.simulation.inputs import RunInputs, inputs_of
-from model.simulation.simulate import Options, prepare, simulate
+from model.simulation.prepared import Options, prepare
+from model.simulation.simulate import simulate
 from tests.model.simulation import continuous_time
 from tests.model.simulation.records import PERIOD, START, trace_of
 
