@@ -2314,7 +2314,7 @@ export interface components {
         };
         /**
          * FitRequest
-         * @description Finds the parameters with which a model best repeats traces. Fields as those of `daq fit`.
+         * @description Estimates the parameters with which a model best reproduces traces. The fields are the options of `daq fit`.
          */
         FitRequest: {
             /**
@@ -2603,7 +2603,7 @@ export interface components {
         };
         /**
          * JobMessage
-         * @description A job that has changed, or gone on.
+         * @description A job whose state or progress has changed.
          */
         JobMessage: {
             /**
@@ -2615,7 +2615,8 @@ export interface components {
         };
         /**
          * JogRequest
-         * @description Velocities (rad/s) of joints, kept up for 0.3 s at most: whoever holds the key repeats it. Empty: hold.
+         * @description Velocities (rad/s) of joints, applied for at most 0.3 s: the client repeats the request while the key is held.
+         *     Empty: hold.
          */
         JogRequest: {
             /** Velocities */
@@ -2743,7 +2744,7 @@ export interface components {
         };
         /**
          * JointResidual
-         * @description Measured less expected acceleration of a joint (rad/s²; None where it does not move) and what it goes with.
+         * @description Measured − expected acceleration of a joint (rad/s²; None where it does not move) and what it depends on.
          *
          *     `noise` is its noise floor: the root mean square that is left of records which the model itself has made.
          */
@@ -2932,7 +2933,7 @@ export interface components {
         };
         /**
          * Me
-         * @description Who the service takes the caller for.
+         * @description The caller as the service identified it.
          */
         Me: {
             /** Name */
@@ -3118,7 +3119,8 @@ export interface components {
         };
         /**
          * ModelParameter
-         * @description A parameter of a model, in its unit. `deviation`: of what is expected; None where nothing is claimed.
+         * @description A parameter of a model, in its unit. `deviation` is the standard deviation of the expected value; None where
+         *     nothing is claimed.
          */
         ModelParameter: {
             /** Name */
@@ -3380,11 +3382,11 @@ export interface components {
         };
         /**
          * ParameterDistortion
-         * @description What one parameter alone would have to do.
+         * @description How one parameter alone would have to vary to explain the residual.
          *
          *     `change_down` and `change_up` (magnitudes, in `unit`) double the total mean squared error; None where no change
-         *     within the bounds does. `required` is σ, the standard deviation that would explain the residual: None is a very
-         *     large one, an insensitive parameter. `expected` is τ′, `contribution` is λ² = τ′²/σ².
+         *     within the bounds does. `required` is σ, the standard deviation that would explain the residual; None for an
+         *     insensitive parameter, whose σ is very large. `expected` is τ′, `contribution` is λ² = τ′²/σ².
          */
         ParameterDistortion: {
             /** Name */
@@ -3665,7 +3667,7 @@ export interface components {
         };
         /**
          * ProgressMessage
-         * @description How far the experiment is that runs.
+         * @description Progress of the running experiment.
          */
         ProgressMessage: {
             /**
@@ -3720,7 +3722,7 @@ export interface components {
         };
         /**
          * QueueResume
-         * @description The operator's word that the queue may move the arm. A real arm needs `moves_real_arm`.
+         * @description The operator's consent that the queue may move the arm. A real arm needs `moves_real_arm`.
          */
         QueueResume: {
             /**
@@ -3912,7 +3914,7 @@ export interface components {
         };
         /**
          * RobotMessage
-         * @description How the robot is, and who may move it; sent when it changes.
+         * @description State of the robot, and who may move it; sent when it changes.
          */
         RobotMessage: {
             /**
@@ -4266,7 +4268,7 @@ export interface components {
         };
         /**
          * SetOutput
-         * @description Process output `line` (0–7) on or off.
+         * @description Switches process output `line` (0–7) on or off.
          */
         SetOutput: {
             /**
@@ -4429,7 +4431,7 @@ export interface components {
         };
         /**
          * StopResult
-         * @description What became of a stop. Anything but `confirmed`: use the emergency stop.
+         * @description Result of a stop. Unless it is `confirmed`, use the emergency stop.
          */
         StopResult: {
             /** Delivered */
@@ -4512,7 +4514,7 @@ export interface components {
         };
         /**
          * TeachingLine
-         * @description A line for whoever teaches: a joint that is refused, an instruction that begins.
+         * @description A line for the operator who teaches: a joint that is refused, an instruction that begins.
          */
         TeachingLine: {
             /** Number */
@@ -4527,7 +4529,7 @@ export interface components {
         };
         /**
          * TeachingMessage
-         * @description A line for whoever teaches.
+         * @description A line for the operator who teaches.
          */
         TeachingMessage: {
             /**
@@ -4818,7 +4820,8 @@ export interface components {
         };
         /**
          * ValidateRequest
-         * @description What would have to move, when, and against what, for a model to explain traces. Fields as of `daq validate`.
+         * @description Validates a model against traces: which parameters would have to change, and when. The fields are the options of
+         *     `daq validate`.
          */
         ValidateRequest: {
             /**
@@ -4867,7 +4870,7 @@ export interface components {
         };
         /**
          * Variation
-         * @description α(t) of one parameter, all parameters moving together as little as explains the motion.
+         * @description α(t) of one parameter, where all parameters together vary as little as explains the motion.
          *
          *     `values` and `noise` (the standard deviation that the noise floor gives α) are in `unit` at the result's
          *     times; None where no joint that the parameter acts on moves. `deviation` is the rms of α (4.23), corrected for
@@ -4923,7 +4926,7 @@ export interface components {
         };
         /**
          * Wait
-         * @description `duration` s without motion.
+         * @description Waits for `duration` s without motion.
          */
         Wait: {
             /**
