@@ -21,8 +21,8 @@ from daq.contracts.service.jobs import (
     JobState,
     ValidateRequest,
 )
+from server.experiments.states import Event, IllegalEventError, advance
 from server.problems import conflict, not_found
-from server.queue.states import Event, IllegalEventError, advance
 from server.store.engine import Store
 from server.store.pages import newest_first
 from server.store.submitted import digest_of, made_before, new_columns

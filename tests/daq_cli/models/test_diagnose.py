@@ -5,34 +5,19 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from daq.contracts.errors import SpecError
-from daq.contracts.machine import load_machine
-from daq.contracts.trace import Trace
-from daq_cli.commands.diagnose import with_load
 from daq_cli.models.diagnosis_text import WIDTH, answer_text
-from daq_cli.models.held_load import check_held
 from model.discrepancy.diagnosis import Diagnosis, DifferencePlace
 from model.discrepancy.explanation.notes import on_stated_numbers
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import Note
 from model.discrepancy.options import DiagnosisOptions
 from model.fitting.unknowns import Unknown
-from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter
-from tests.daq.traces.samples import record
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.models.conftest import write_csv
 from tests.model.discrepancy.answers import an_answer
-
-
-@pytest.fixture
-def ramp_trace() -> Trace:
-    """The arm stretched out halfway."""
-    position = np.tile([3.14, 0.8, 0.0, 0.0, 0.0, 0.0], (20, 1))
-    return Trace(record(machine=load_machine("ma2000")), tuple(range(1, 7)), 0.02 * np.arange(20.0), position)
 
 
 @pytest.fixture(scope="module")
@@ -80,10 +65,16 @@ def test_an_answer_without_steps_shows_what_it_rests_on(answer: Diagnosis) -> No
     weak = tuple(c.model_copy(update={"evidence": c.evidence / 1000}) for c in step.candidates)
     bare = answer.model_copy(
         update={
-            "verdict": "nothing-significant", "steps": (), "remaining": (), "where": step.where, "candidates": weak,
-            "significant": 10.0, "rmse_fit": step.rmse_fit, "rmse_holdout": step.rmse_holdout,
+            "verdict": "nothing-significant",
+            "steps": (),
+            "remaining": (),
+            "where": step.where,
+            "candidates": weak,
+            "significant": 10.0,
+            "rmse_fit": step.rmse_fit,
+            "rmse_holdout": step.rmse_holdout,
         }
-    )  # fmt: skip
+    )
     text = " ".join(answer_text(bare).split())
     assert f"where {step.where.summary}" in text
     best = "The best of 7 candidates, Coulomb friction on joint 2, has an evidence of 2; an effect is named from 10."
@@ -141,13 +132,6 @@ def test_no_more_than_all_of_the_variance_is_gone_and_numbers_are_plain(answer: 
     assert "the held-out variance beyond noise has grown by 5.0 %" in told(-0.05)
 
 
-def test_a_load_that_no_motor_could_hold_is_refused(ramp_trace: Trace) -> None:
-    arm = base_model(load_machine("ma2000"))
-    check_held(with_load(arm, 5.0), [ramp_trace])
-    with pytest.raises(SpecError, match=r"load 500 kg: joint \d would need \d+ N·m to hold it in these traces"):
-        check_held(with_load(arm, 500.0), [ramp_trace])
-
-
 def test_a_step_not_taken_says_so(answer: Diagnosis) -> None:
     step = answer.steps[0].model_copy(update={"adopted": False, "rejected_because": "the held-out error rises"})
     assert "not taken into the model: the held-out error rises" in answer_text(
@@ -171,9 +155,24 @@ def test_json_is_the_answer_and_files_are_written(
     monkeypatch.setattr("model.reports.diagnosis_pictures.drawn", lambda *_: "<svg></svg>")
     first, second = write_csv(tmp_path / "first.csv"), write_csv(tmp_path / "second.csv")
     said = daq(
-        "diagnose", first, "--holdout", second, "--model", single_axis, "--effects", "backlash,coulomb", "--joints",
-        "1", "--most", "2", "--json", "--out", tmp_path / "new.json", "--report", tmp_path / "page.html",
-    )  # fmt: skip
+        "diagnose",
+        first,
+        "--holdout",
+        second,
+        "--model",
+        single_axis,
+        "--effects",
+        "backlash,coulomb",
+        "--joints",
+        "1",
+        "--most",
+        "2",
+        "--json",
+        "--out",
+        tmp_path / "new.json",
+        "--report",
+        tmp_path / "page.html",
+    )
     assert said.code == 0, said.err
     assert Diagnosis.model_validate(json.loads(said.out)) == answer
     assert asked["options"] == DiagnosisOptions(effects=("backlash", "coulomb_friction"), joints=(1,), most_steps=2)
@@ -198,15 +197,3 @@ def test_what_cannot_be_answered_is_one_line(
 ) -> None:
     first = write_csv(tmp_path / "first.csv")
     daq("diagnose", *[first if w == "FIRST" else w for w in words], "--model", single_axis).complains(2, told)
-
-
-def test_a_load_that_is_given_is_expected_of_the_arm() -> None:
-    arm = base_model(load_machine("ma2000"))
-    light = with_load(arm.with_values({"load.mass": 1.0, "link2.mass": 0.9}), 0.5)
-    assert light.parameter("load.mass").value == 0.5
-    assert light.parameter("link2.mass").value == 0.9
-    before = arm.parameter("load.mass")
-    assert before.deviation is not None
-    assert light.parameter("load.mass").deviation == pytest.approx(0.5 / before.value * before.deviation)
-    with pytest.raises(SpecError, match="has no load"):
-        with_load(base_model(load_machine("ma2000").model_copy(update={"load": None})), 1.0)

@@ -117,9 +117,13 @@ def test_a_sound_arm_is_called_sound_and_the_queue_takes_what_the_diagnosis_asks
     sound_service: Service, ramps: tuple[str, str]
 ) -> None:
     request = {
-        "kind": "diagnose", "traces": [ramps[0]], "held_out": [ramps[1]], "joints": [2], "most_steps": 1,
+        "kind": "diagnose",
+        "traces": [ramps[0]],
+        "held_out": [ramps[1]],
+        "joints": [2],
+        "most_steps": 1,
         "effects": ["coulomb_friction", "stribeck_friction"],
-    }  # fmt: skip
+    }
     job, found = result_of(sound_service, request)
     assert (found.verdict, job["headline"]) == ("nothing-significant", "nothing significant"), found.summary
     assert found.significant == THRESHOLDS.significant

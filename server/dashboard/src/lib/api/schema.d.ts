@@ -4021,7 +4021,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "error-grows" | "error-rises" | "falls-too-little" | "only-resembles" | "superfluous";
+            kind: "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "only-resembles" | "superfluous";
             /**
              * Numbers
              * @default {}
