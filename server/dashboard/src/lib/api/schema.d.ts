@@ -2717,7 +2717,7 @@ export interface components {
          *
          *     `rmse` and `largest` of measured − simulated, `floor` the noise and rounding of the measurement alone, `count` one
          *     count of the sensor (None where it has none), all in `unit`. `share` is the mean square of what is left over that of
-         *     the measured motion about its mean: 0 for a perfect model, 1 for one that says "it stays where it is on average".
+         *     the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
          */
         JointAgreement: {
             /** Joint */
@@ -3480,7 +3480,7 @@ export interface components {
         };
         /**
          * ParameterDifference
-         * @description One parameter with its value in each model, None where a model has it not.
+         * @description One parameter with its value in each model, None where a model does not have it.
          *
          *     `deviations` is the spread of the values in expected deviations; None where one lacks it or none is expected.
          */
