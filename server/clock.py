@@ -1,4 +1,4 @@
-"""What time it is: the wall's for people and schedules, the monotonic one for everything that is measured."""
+"""Clocks: wall time for people and schedules, monotonic time for everything that is measured."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """Two clocks. Only the wall's may be set back."""
+    """Wall clock and monotonic clocks. Only the wall clock may be set back."""
 
     def utc(self) -> datetime:
         """The wall clock."""
@@ -20,12 +20,12 @@ class Clock(Protocol):
         ...
 
     def elapsed(self) -> float:
-        """The same, but it goes on while the computer sleeps."""
+        """As `monotonic`, but it goes on while the computer sleeps."""
         ...
 
 
 class SystemClock:
-    """This computer's."""
+    """The clocks of this computer."""
 
     def utc(self) -> datetime:
         """Now, UTC."""
@@ -36,5 +36,5 @@ class SystemClock:
         return time.monotonic()
 
     def elapsed(self) -> float:
-        """For how long a person's word holds: Linux counts the time for which the computer slept."""
+        """Time including sleep (CLOCK_BOOTTIME), by which leases and confirmed presence expire."""
         return time.clock_gettime(time.CLOCK_BOOTTIME) if sys.platform == "linux" else time.monotonic()

@@ -1,4 +1,4 @@
-"""The end of the service comes in time, whatever still computes, waits or blocks.
+"""Ends the service in time, whatever still computes, waits or blocks.
 
 What can be ended in order has been by then: the robot's owner freezes the arm and closes its trace by itself, and what
 the database was told is on the disk. What is left are threads and processes that nobody can interrupt.
@@ -17,20 +17,20 @@ END_WITHIN = 4.2
 LAST_RESORT = 4.7
 """s after which the kernel ends it, even where its interpreter does not answer any more."""
 FORCED = 1
-"""Exit code of an end that is not in order, so that whoever looks after the service learns of it."""
+"""Exit code of a forced end, so that the supervisor of the service notices it."""
 log = logging.getLogger("server")
 
 
 class EndInTime:
-    """Begins to count when it is armed, once. `children` is called before the end comes by force: nobody else can end
-    processes of this service then."""
+    """A time limit for the end of this process, armed once. `children` ends this service's processes before a
+    forced end."""
 
     def __init__(self, children: Callable[[], None]) -> None:
         self._children = children
         self._armed = threading.Lock()
 
     def arm(self) -> None:
-        """The service has been told to end. Called in the main thread, from a signal's handler."""
+        """Starts the time limit. Called in the main thread, from a signal's handler."""
         if not self._armed.acquire(blocking=False):
             return
         signal.signal(signal.SIGALRM, signal.SIG_DFL)

@@ -1,4 +1,4 @@
-"""Logs for people at a terminal, and as one JSON object a line for everything else; each with its request's number."""
+"""Logs: readable lines at a terminal, otherwise one JSON object a line with the id of its request."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class JsonLines(logging.Formatter):
 
 
 class PlainLines(logging.Formatter):
-    """For a terminal. What strangers send gives it no orders and makes no lines of its own."""
+    """Lines for a terminal. Control characters and line breaks in what clients send are escaped."""
 
     def format(self, record: logging.LogRecord) -> str:
         """The line."""
@@ -49,7 +49,7 @@ class PlainLines(logging.Formatter):
 
 
 def _printable(text: str) -> str:
-    """With every other character written as its escape."""
+    """`text` with every character that is not printable written as its escape."""
     return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
 
 
@@ -79,7 +79,7 @@ class StandardError(io.TextIOBase):
         return len(text)
 
     def fileno(self) -> int:
-        """Of the stream behind."""
+        """The descriptor of the real stream."""
         return self.real.fileno()
 
     def isatty(self) -> bool:

@@ -1,4 +1,4 @@
-"""Everything the service is made of, put together once and ended in order."""
+"""Builds all services once, and ends them in order."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ log = logging.getLogger("server")
 
 @dataclass(frozen=True)
 class RobotServices:
-    """What belongs to one robot."""
+    """The services of one robot."""
 
     robot: Robot
     keeper: Keeper
@@ -88,7 +88,7 @@ class RobotServices:
             raise conflict("consent-needed", line, "take control again, with moves_real_arm")
 
     def word(self, lease: str | None, said: float) -> Word:
-        """That of a client with this lease to move the arm by hand."""
+        """The request of a client with this lease to move the arm by hand."""
         return Word(said, lambda: self.require_motion(lease))
 
 
@@ -112,14 +112,14 @@ class Services:
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
         self.begun = self.clock.monotonic()
         self.stop_port = 0
-        """Of the stop listener, once there is one."""
+        """Port of the stop listener, once there is one."""
         self.lanes = Lanes()
         self.readiness = Readiness(self.clock)
         self.metrics = Metrics()
         limits = Limits(memory=settings.server.upload_memory << 20, seconds=settings.server.upload_time)
         self.uploads = Workers(limits, 1)
         self.motions = Workers(limits, 1)
-        """Apart, so that whoever uploads holds up no preview."""
+        """Separate from uploads, so that they delay no preview."""
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
         self._robots: dict[str, RobotServices] = {}
@@ -136,7 +136,7 @@ class Services:
         return self._robots[name]
 
     def start(self) -> None:
-        """Traces into the catalogue, robots connected, queues begun."""
+        """Updates the catalogue, connects the robots and starts the queues."""
         for rig in self.robots():
             found = rig.catalogue.bring_up_to_date()
             rig.catalogue.clear_uploads()
@@ -245,9 +245,9 @@ class Services:
     def record_event(
         self, robot: str, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None
     ) -> None:
-        """Something that happened: into the log, the database, and to whoever listens.
+        """Records an event in the log and the database, and publishes it to live clients.
 
-        Raises nothing where the database fails: what has happened has happened, and whoever asked for it is told so.
+        Never raises, even if the database fails: the request that caused the event has already been carried out.
         """
         log.info("%s: %s: %s", robot, kind, text, extra={"actor": actor, "experiment": experiment})
         self.metrics.count_event(robot, kind)
@@ -267,11 +267,11 @@ class Services:
         hub.publish("jobs", JobMessage(job=job))
 
     def record_event_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:
-        """The same, for whoever must not wait for a disk."""
+        """As `record_event`, on a thread, for callers that must not wait for the disk."""
         self._later.submit(self.record_event, robot, kind, text, actor=actor)
 
     def _lapsed(self, robot: Robot, holder: str) -> None:
-        """A client went silent: the arm holds, and the queue waits for a person."""
+        """Handles a lapsed lease: the arm holds, and the queue is paused until a person resumes it."""
         rig = self._robots.get(robot.name)
         if rig is not None:
             rig.queue.control_lapsed(holder)
@@ -291,7 +291,7 @@ class Services:
 
 
 def _all_within(seconds: float, steps: Iterable[Callable[[], object]]) -> None:
-    """Each on a thread of its own; one that takes longer is left alone."""
+    """Runs each step on its own thread, and stops waiting after `seconds`."""
     until = time.monotonic() + seconds
     threads = [threading.Thread(target=step, name="closing", daemon=True) for step in steps]
     for thread in threads:

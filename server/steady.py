@@ -1,4 +1,4 @@
-"""What keeps the service's event loop, and the process that keeps time, from being held up by the interpreter."""
+"""Settings of the interpreter that keep pauses of the event loop, and of the process that keeps time, short."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import gc
 import sys
 
 SWITCH_EVERY = 0.001
-"""s that a thread computes before another one has its turn. Python's own 5 ms are what the event loop would wait for
-each time that it has let go of the interpreter beside a thread that reads the database or checks a motion."""
+"""Longest time (s) that a thread holds the interpreter while another one waits. With Python's default of 5 ms the event
+loop would wait that long for every thread that reads the database or checks a motion."""
 
 
 def keep_steady() -> None:
-    """Called when everything is loaded. A full garbage collection would look through all of it, for a tenth of a second
-    during which nothing else runs: what is there now stays there, so it is taken out of what is looked through."""
+    """Freezes loaded objects out of garbage collection, where a full collection would pause everything for 0.1 s; and
+    switches threads more often. Call this when everything is loaded."""
     sys.setswitchinterval(SWITCH_EVERY)
     gc.collect()
     gc.freeze()

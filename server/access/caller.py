@@ -1,4 +1,4 @@
-"""Who calls, and what they may do."""
+"""The caller of a request and their role."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Caller:
-    """A person or program. `name` is their token's; `local` for a user of this computer, who needs none.
+    """A person or program that calls. `name` is that of their token; `local` for a user of this computer without one.
 
-    token: the hash of the token that let them in; None where none was needed
+    token: hash of the token that they were admitted with; None if none was needed
     """
 
     name: str
@@ -34,19 +34,19 @@ LOCAL = Caller("local", "operator")
 
 
 def caller_of(connection: HTTPConnection) -> Caller | None:
-    """Who the gate let in; None where nobody has said who they are."""
+    """The caller that the gate has admitted; None for an anonymous request."""
     found: Caller | None = getattr(connection.state, "caller", None)
     return found
 
 
 def token_needed() -> ProblemError:
-    """A 401 for somebody who has not said who they are."""
+    """A 401 for an anonymous caller."""
     advice = "send the header Authorization: Bearer TOKEN; `daq token add` makes one"
     return ProblemError(401, "token-needed", "this service needs a token", advice, (), {"WWW-Authenticate": "Bearer"})
 
 
 def require_viewer(connection: HTTPConnection) -> Caller:
-    """Anybody who may see the robot. Raises a 401."""
+    """The caller, who may see the robot. Raises a 401."""
     caller = caller_of(connection)
     if caller is None:
         raise token_needed()
@@ -54,7 +54,7 @@ def require_viewer(connection: HTTPConnection) -> Caller:
 
 
 def require_operator(connection: HTTPConnection) -> Caller:
-    """Who may change something. Raises a 401 or a 403."""
+    """The caller, who may change something. Raises a 401 or a 403."""
     caller = require_viewer(connection)
     if not caller.may_operate:
         line = f"{caller.name} may look, and stop the robot; this needs the role operator"

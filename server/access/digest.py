@@ -1,4 +1,4 @@
-"""What is kept of a token."""
+"""The hash of a token, which is all that is stored of it."""
 
 from __future__ import annotations
 
@@ -6,5 +6,5 @@ import hashlib
 
 
 def digest_of(token: str) -> str:
-    """Its SHA-256: it has 256 random bits, so there is nothing to guess, and no dictionary to try."""
+    """The SHA-256 of a token. It needs no salt: a token has 256 random bits, so no dictionary helps."""
     return hashlib.sha256(token.encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""The gate that every request passes: who calls, from where, how often, how much; what browsers are told."""
+"""The gate that every request passes: token, origin, rate and size limits, security headers."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from server.database_errors import DamagedError
 from server.problems import ProblemError, of_damage, of_database, response
 
 STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
-"""The one address whose POST no limit of requests holds up."""
+"""Address of the stop, which no rate limit delays."""
 UPLOADS = re.compile(r"/api/v1/robots/[^/]+/(traces|models)")
 """Addresses whose POST takes a file, and counts its bytes itself."""
 NOT_ALLOWED, TRY_LATER = 1008, 1013
 MOST_SOCKETS = 100
-"""WebSockets of one caller, of the 500 connections that there are for all."""
+"""Most WebSockets of one caller, of 500 connections in all."""
 LOOK_EVERY = 1.0
-"""s between two looks at whether the token of whoever holds a WebSocket has been revoked."""
+"""Time (s) between two checks whether the token of an open WebSocket has been revoked."""
 log = logging.getLogger("server.access")
 
 
@@ -165,7 +165,7 @@ class Gate:
                 await asyncio.gather(task, return_exceptions=True)
 
     async def _admit(self, scope: Scope) -> Caller | None:
-        """Who calls. Raises a 401, 403, 413, 429 or 503."""
+        """The caller of a request. Raises a 401, 403, 413, 429 or 503."""
         headers = Headers(scope=scope)
         changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS
         if not is_known_name(headers.get("host", ""), self.names, loopback_only=self.open_on_loopback):

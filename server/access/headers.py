@@ -1,4 +1,4 @@
-"""What browsers are told about every answer: run and show nothing that does not come from here."""
+"""Security headers of every answer: browsers run and show only what this service has sent."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ API_PREFIX = "/api/"
 
 
 def secure(headers: MutableHeaders, path: str, stop_listener: str | None = None) -> None:
-    """Adds them. Answers of the API are not kept by anybody on the way. `stop_listener`: an origin that the page may
-    ask for a stop, beside its own."""
+    """Adds the security headers, and forbids caches to keep answers of the API. `stop_listener`: a second origin, which
+    the page may ask for a stop."""
     for name, value in SECURITY.items():
         headers.setdefault(name, value)
     if stop_listener is not None and headers[POLICY] == SECURITY[POLICY]:

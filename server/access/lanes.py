@@ -1,7 +1,7 @@
-"""Turns at what costs the service much: reading a trace, working out a motion, searching. On the event loop alone.
+"""Lanes of expensive requests: reading a trace, planning a motion, searching. For the event loop alone.
 
-Each caller has a few turns at once and the rest of their requests wait, without a thread of their own: whoever asks for
-very much waits for themselves, and for nobody else.
+Each caller has a few requests in progress; their others wait without a thread. A caller with very many requests delays
+nobody else.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class _Lane:
 
 
 class Lanes:
-    """One a caller, for as long as it is used."""
+    """The lanes of all callers; each exists while its caller has requests."""
 
     def __init__(self) -> None:
         self._lanes: dict[str, _Lane] = {}

@@ -8,7 +8,7 @@ from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive
 
 REQUESTS_A_SECOND = 300.0
-"""Sustained, for one caller at one address: three times what the whole service is measured with."""
+"""Sustained rate of one caller at one address: three times the load that the whole service is measured with."""
 AT_ONCE = 600.0
 LARGEST_BODY = 16 << 20
 """Bytes: a recorded path of an hour."""
@@ -17,7 +17,7 @@ MOST_REMEMBERED = 10_000
 
 @dataclass
 class Bucket:
-    """Holds up to `size` requests and is filled with `rate` a second."""
+    """A token bucket: it holds up to `size` requests and refills with `rate` requests per second."""
 
     rate: float
     size: float
@@ -25,7 +25,7 @@ class Bucket:
     at: float
 
     def take(self, now: float) -> float:
-        """Takes one. Returns 0, or the s after which there is one again."""
+        """Takes one request from the bucket. Returns 0, or the time (s) until the next one is available."""
         self.level = min(self.size, self.level + (now - self.at) * self.rate)
         self.at = now
         if self.level >= 1:
@@ -36,7 +36,7 @@ class Bucket:
 
 @dataclass
 class Buckets:
-    """One for each caller and address."""
+    """One bucket for each caller and address."""
 
     rate: float = REQUESTS_A_SECOND
     size: float = AT_ONCE

@@ -23,7 +23,7 @@ class Tickets:
         self._given: dict[str, tuple[Caller, float]] = {}
 
     def give(self, caller: Caller) -> Ticket:
-        """A new one, for `caller`. The oldest go when there are too many."""
+        """Issues a new ticket for `caller`. The oldest are dropped when there are too many."""
         ticket = secrets.token_urlsafe(24)
         with self._lock:
             now = self._clock.monotonic()
@@ -34,7 +34,7 @@ class Tickets:
         return Ticket(ticket=ticket, seconds=GOOD_FOR)
 
     def take(self, ticket: str) -> Caller | None:
-        """Whose it is; None for one that is not known, used, or too old. It is good for nothing afterwards."""
+        """The owner of a ticket, which is used up by this; None for one that is unknown, used or too old."""
         with self._lock:
             found = self._given.pop(ticket, None)
         if found is None or found[1] <= self._clock.monotonic():

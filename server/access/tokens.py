@@ -26,7 +26,7 @@ from server.store.engine import Store
 from server.store.tables import TokenRow
 
 PREFIX = "daq_"
-"""So that a token that was published by mistake is recognised."""
+"""Prefix of every token, by which one that was published by mistake is recognised."""
 REMEMBERED_FOR = 2.0
 """s after which a token is looked up again: one that was revoked is refused then."""
 UNKNOWN_FOR = 0.2
@@ -54,7 +54,7 @@ class TokenStore:
         self._store = store
 
     def add(self, name: str, role: Role, now: datetime) -> str:
-        """A new token; it is told once. Raises SpecError when the name is taken."""
+        """Makes a new token and returns it, the only time. Raises SpecError when the name is taken."""
         token = PREFIX + secrets.token_urlsafe(32)
         with self._store.writing() as session:
             if session.scalar(select(TokenRow).filter_by(name=name)) is not None:
@@ -64,7 +64,7 @@ class TokenStore:
         return token
 
     def revoke(self, name: str, now: datetime) -> None:
-        """From now on it opens nothing; its name stays taken. Raises SpecError when there is none."""
+        """Revokes a token; its name stays taken. Raises SpecError when there is none of this name."""
         with self._store.writing() as session:
             row = session.scalar(select(TokenRow).filter_by(name=name))
             if row is None:
@@ -108,7 +108,7 @@ class KnownTokens:
         return self._remembered(digest_of(token))
 
     def was_known(self, token: str) -> bool:
-        """Whether it opened something when the database was asked last, however long ago."""
+        """Whether the token was valid when the database was read last, however long ago."""
         return digest_of(token) in self._known.callers
 
     def look_up(self, token: str) -> Caller | None:

@@ -1,8 +1,8 @@
-"""Turns at plain questions, so that many of them at once hold up nothing else.
+"""Turns of quick read requests, so that many at once do not delay anything else.
 
-The event loop goes round everything that is ready. Were two hundred answers worked out in one round, whatever needs a
-few rounds, as a stop does, would wait for a thousand of them. So few are worked out at a time, and the others wait
-without costing anything; in all it takes them no longer.
+The event loop runs every task that is ready once a round. With two hundred requests in one round, a stop, which needs
+several rounds, would wait for a thousand of them. So only a few are handled at a time and the others wait at no cost;
+all of them together take no longer.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from urllib.parse import parse_qs
 from starlette.types import Message, Scope, Send
 
 AT_ONCE = 8
-"""Questions that are worked out in one round of the event loop: 10 to 20 ms of it."""
+"""Requests handled at the same time: 10 to 20 ms of one round of the event loop."""
 ASKS_THE_ROBOT = re.compile(r"/api/v1/robots/[^/]+/(gains|process)")
 """These answers wait for the robot. Their number is limited elsewhere; they must not take the turns of others."""
 WAITS_FOR_AN_END = re.compile(r"/api/v1/robots/[^/]+/(experiments|jobs)/[^/]+")
@@ -46,12 +46,12 @@ class Turn:
         self._send = send
 
     async def begin(self) -> None:
-        """Waits for it."""
+        """Waits for the turn."""
         if self._free is not None:
             await self._free.acquire()
 
     def end(self) -> None:
-        """The next one's turn."""
+        """Ends the turn, so that the next request gets it."""
         if self._free is not None:
             self._free.release()
             self._free = None
@@ -63,7 +63,7 @@ class Turn:
 
 
 def _is_plain_question(scope: Scope) -> bool:
-    """One that is answered from what is there: no change, no stop, and none that waits for news."""
+    """Whether a request is quick: it changes nothing, stops nothing and waits for nothing."""
     path = scope["path"]
     if scope["method"] not in ("GET", "HEAD") or path == READY or ASKS_THE_ROBOT.fullmatch(path):
         return False

@@ -1,4 +1,4 @@
-"""What the controller holds beside set points: gains, process signals, the gripper."""
+"""Routes of the controller besides set points: gains, process signals, the gripper."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ OutputNumber = Annotated[int, Path(ge=0, le=7)]
 
 @router.get("/gains")
 def get_gains(rig: RobotDep, _: Viewer) -> JointGains:
-    """P, I, D of every joint as the controller has them now."""
+    """The gains P, I and D of every joint, read from the controller."""
     return JointGains.model_validate(answer_of(rig.robot, ReadGains).data)
 
 
@@ -27,21 +27,21 @@ def get_gains(rig: RobotDep, _: Viewer) -> JointGains:
 def set_gains(
     request: JointGains, rig: RobotDep, services: ServicesDep, caller: Operator, lease: LeaseHeader = None
 ) -> JointGains:
-    """Writes gains of the joints named and reads all back. Refused for a joint off its set point, which would jump."""
+    """Writes gains of the named joints and reads all back. Refused for a joint off its set point, which would jump."""
     rig.require_motion(lease)
     count = len(rig.robot.machine.joints)
     for joint in request.gains:
         if joint > count:
             raise SpecError(f"gains.{joint}: {rig.robot.machine.name} has joints 1 to {count}")
     gains = JointGains.model_validate(answer_of(rig.robot, WriteGains, gains=request.gains).data)
-    told = ", ".join(f"joint {joint}: {'/'.join(map(str, gain))}" for joint, gain in sorted(request.gains.items()))
-    services.record_event(rig.robot.name, "gains", f"gains set: {told}", actor=caller.name)
+    gains_of = ", ".join(f"joint {joint}: {'/'.join(map(str, gain))}" for joint, gain in sorted(request.gains.items()))
+    services.record_event(rig.robot.name, "gains", f"gains set: {gains_of}", actor=caller.name)
     return gains
 
 
 @router.get("/process")
 def get_process(rig: RobotDep, _: Viewer) -> ProcessState:
-    """Process inputs and outputs, and the gripper."""
+    """The process inputs and outputs, and the gripper."""
     return _process(answer_of(rig.robot, ReadProcess))
 
 
@@ -54,7 +54,7 @@ def set_output(
     caller: Operator,
     lease: LeaseHeader = None,
 ) -> ProcessState:
-    """Switches one process output, 0 to 7. A stopped arm's is not switched, unless `while_stopped`."""
+    """Switches one process output, 0 to 7. Refused while the arm is stopped, unless `while_stopped` is set."""
     rig.require_motion(lease)
     switched = {"output": output, "on": request.on, "while_stopped": request.while_stopped}
     state = _process(answer_of(rig.robot, WriteOutput, **switched))
@@ -68,7 +68,7 @@ def set_output(
 def set_gripper(
     request: GripperRequest, rig: RobotDep, services: ServicesDep, caller: Operator, lease: LeaseHeader = None
 ) -> ProcessState:
-    """Closes or opens the gripper. A stopped arm's is not moved, unless `while_stopped`: a stop lets it hold."""
+    """Closes or opens the gripper. Refused while the arm is stopped, unless `while_stopped` is set."""
     rig.require_motion(lease)
     state = _process(answer_of(rig.robot, MoveGripper, closed=request.closed, while_stopped=request.while_stopped))
     services.record_event(

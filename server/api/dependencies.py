@@ -1,7 +1,7 @@
-"""What routes ask for: the services, the robot of the address, who calls.
+"""Dependencies and parameters of the routes: the services, the robot in the address, the caller.
 
-All of it is there already, so these are coroutines that wait for nothing: FastAPI would carry each plain function over
-to a thread and back, which under load costs more than most answers.
+The dependencies are coroutines, although they never wait: FastAPI would run each plain function on a thread, which
+under load costs more than most answers.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from server.store.pages import Cursor
 
 
 def services_of(connection: HTTPConnection) -> Services:
-    """All of them."""
+    """The services that the application was made with."""
     services: Services = connection.app.state.services
     return services
 
@@ -38,7 +38,7 @@ async def robot_services(
     robot: Annotated[str, Path(max_length=64, examples=["ma2000"], description="Name of the robot.")],
     services: ServicesDep,
 ) -> RobotServices:
-    """Those of the robot in the address. Raises a 404."""
+    """The services of the robot in the address. Raises a 404."""
     return services.robot(robot)
 
 
@@ -60,14 +60,14 @@ async def _turn(connection: HTTPConnection) -> AsyncIterator[None]:
 
 
 def let_others_ask(connection: HTTPConnection) -> None:
-    """Ends the turn of a plain question, which this is not: it waits among those of its caller."""
+    """Ends the request's turn among the quick requests: it waits in its caller's own lane instead."""
     turn = getattr(connection.state, "turn", None)
     if turn is not None:
         turn.end()
 
 
 Turn = Annotated[None, Depends(_turn, scope="function")]
-"""Of routes that cost much: a caller has a few of them at once. It ends before the answer is sent."""
+"""A turn in the caller's lane, for routes that are expensive. It ends before the answer is sent."""
 
 
 async def _arrived(connection: HTTPConnection) -> float:
@@ -76,13 +76,13 @@ async def _arrived(connection: HTTPConnection) -> float:
 
 
 Arrived = Annotated[float, Depends(_arrived)]
-"""When the request came (s, monotonic): before it waited for anything."""
+"""When the request arrived (s, monotonic), before it waited for anything."""
 Viewer = Annotated[Caller, Depends(_viewer)]
 Operator = Annotated[Caller, Depends(_operator)]
 
 
-def _of_a_list(cursor: str | None) -> str | None:
-    """Raises ValueError for a cursor that no list can have given out. Its number is that of a row or of a moment, and
+def _require_cursor(cursor: str | None) -> str | None:
+    """Raises ValueError for a cursor that no list can have returned. Its number is that of a row or of a moment, and
     its identity is text that can be encoded."""
     if cursor is not None:
         try:
@@ -96,7 +96,7 @@ def _of_a_list(cursor: str | None) -> str | None:
 
 Limit = Annotated[PageLimit, Query(description="Length of this part of the list.")]
 CursorOf = Annotated[
-    str | None, AfterValidator(_of_a_list), Query(max_length=200, description="`next` of the part before.")
+    str | None, AfterValidator(_require_cursor), Query(max_length=200, description="`next` of the part before.")
 ]
 IdempotencyKey = Annotated[
     str | None,

@@ -1,5 +1,4 @@
-"""Completes the description of the API: examples of every body, and problems under the media type that they have; and
-serves it."""
+"""Completes the OpenAPI description, with an example of every body and of every problem, and serves it."""
 
 from __future__ import annotations
 
@@ -21,7 +20,7 @@ Document = dict[str, Any]
 
 
 def install(app: FastAPI) -> None:
-    """From now on `app.openapi()` is complete."""
+    """Makes `app.openapi()` return the completed description."""
     plain = app.openapi
 
     def openapi() -> Document:
@@ -32,18 +31,18 @@ def install(app: FastAPI) -> None:
 
 
 def serve(app: FastAPI, address: str) -> None:
-    """From now on `address` tells it. Putting it together takes seconds, so a thread does it, once it is asked for."""
+    """Serves the description at `address`. It takes seconds to build, so a thread builds it at the first request."""
     encoded: bytes | None = None
-    putting_together = asyncio.Lock()
+    building = asyncio.Lock()
 
-    async def described(_request: Request) -> Response:
+    async def get(_request: Request) -> Response:
         nonlocal encoded
-        async with putting_together:
+        async with building:
             if encoded is None:
                 encoded = await run_in_threadpool(_encoded, app)
         return Response(encoded, media_type=JSON)
 
-    app.add_route(address, described, include_in_schema=False)
+    app.add_route(address, get, include_in_schema=False)
 
 
 def _encoded(app: FastAPI) -> bytes:
@@ -51,7 +50,7 @@ def _encoded(app: FastAPI) -> bytes:
 
 
 def completed(document: Document) -> Document:
-    """`document` with examples in it."""
+    """Adds examples to `document`, in place, and returns it."""
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
             _complete_operation(operation, f"{method} {path}")
@@ -67,9 +66,9 @@ def _complete_operation(operation: Document, name: str) -> None:
         elif int(status) < FIRST_ERROR or JSON in content:
             bodies.append(answer)
     for body in bodies:
-        described = body.get("content", {}).get(JSON)
-        if described is not None:
-            described["examples"] = _examples(described.get("schema", {}), operation["operationId"])
+        content = body.get("content", {}).get(JSON)
+        if content is not None:
+            content["examples"] = _examples(content.get("schema", {}), operation["operationId"])
 
 
 def _problems(status: int, operation: str) -> Document:
@@ -81,7 +80,7 @@ def _problems(status: int, operation: str) -> Document:
 
 
 def _examples(schema: Document, operation: str) -> Document:
-    """By the names of the schemas that they are of."""
+    """Examples of a body, by the name of their schema."""
     if operation in untyped() and "$ref" not in schema:
         return {operation: {"value": untyped()[operation]}}
     if schema.get("type") == "array":

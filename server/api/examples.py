@@ -1,5 +1,5 @@
-"""One example of every body that the service takes or gives, for the description of its API. Written as the models
-themselves, so that one that does not fit cannot be written down."""
+"""One example of every request and response body, for the OpenAPI description. Each is an instance of its model, so
+that an example cannot contradict its schema."""
 
 from __future__ import annotations
 
@@ -380,14 +380,14 @@ def _system() -> list[BaseModel]:
 
 @cache
 def examples() -> dict[str, Any]:
-    """Plain data by the name of its schema."""
+    """The examples as plain data, by the name of their schema."""
     every = [*_experiments(), *_robot(), *_teaching(), *_traces(), *_models(), *_system()]
     return {type(one).__name__: one.model_dump(mode="json") for one in every}
 
 
 @cache
 def untyped() -> dict[str, Any]:
-    """Of operations whose bodies have no schema of their own, by their names."""
+    """Examples of operations whose bodies have no named schema, by operation id."""
     model = base_model(load_machine("ma2000")).model_dump(mode="json")
     return {
         "get_spec_schema": {"title": "ExperimentSpec", "type": "object", "properties": {}},

@@ -1,4 +1,4 @@
-"""Experiments: submit, list, follow, cancel."""
+"""Routes of experiments: submit, list, follow, cancel."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ from server.problems import PROBLEMS, ProblemError
 from server.services import RobotServices, Services
 
 MOST_SHOWN = 5000
-"""Set points of a preview; of a longer motion every second, third, … is shown."""
+"""Most set points in a preview; of a longer motion every second, third, … is returned."""
 SHORT, FEW_POINTS = 60.0, 5000
-"""s, and set points that are given one by one, of a motion that takes a moment to work out."""
+"""Longest motion (s) and most given set points that are planned here, in a moment; others are planned by a process."""
 router = APIRouter(prefix="/robots/{robot}/experiments", tags=["experiments"], responses=PROBLEMS)
-StateFilter = Annotated[list[ExperimentState] | None, Query(description="Only those in one of these states.")]
+StateFilter = Annotated[list[ExperimentState] | None, Query(description="Only experiments in one of these states.")]
 
 
 @router.post("", status_code=201, response_model=Experiment, responses={200: {"model": Experiment}})
@@ -55,12 +55,12 @@ def submit_experiment(
     _turn: Turn,
     idempotency_key: IdempotencyKey = None,
 ) -> Experiment:
-    """Puts an experiment into the queue. It is checked now, and again when it is run: 422 names what is wrong.
+    """Puts an experiment into the queue. It is checked now and again when it runs; a 422 names what is wrong.
 
-    The same Idempotency-Key gives the same experiment (200), and never a second one.
+    The same Idempotency-Key returns the same experiment (200) and never queues a second one.
     """
     experiment, new = services.experiments.made_before(rig.robot.name, request, idempotency_key), False
-    if experiment is None:  # what was accepted once stays so, whatever the disk says by now
+    if experiment is None:  # one that was accepted stays accepted, even if the disk is full by now
         require_possible(services, rig, request.spec)
         require_room(rig.catalogue.folder)
         experiment, new = rig.queue.submit(request, caller.name, idempotency_key)
@@ -76,11 +76,11 @@ async def list_experiments(
     _: Viewer,
     state: StateFilter = None,
     schedule: Annotated[str | None, Query(max_length=64)] = None,
-    order: Annotated[ExperimentOrder, Query(description="By `ended`: only those that have ended.")] = "submitted",
+    order: Annotated[ExperimentOrder, Query(description="`ended` lists only those that have ended.")] = "submitted",
     limit: Limit = 50,
     cursor: CursorOf = None,
 ) -> Page[Experiment]:
-    """Experiments, those submitted last first, or those that ended last."""
+    """Lists experiments, the last submitted or the last ended first."""
     page = await services.experiments.page.fetch(rig.robot.name, tuple(state or ()), schedule, cursor, limit, order)
     return page.model_copy(update={"items": tuple(rig.queue.with_progress(item) for item in page.items)})
 
@@ -89,7 +89,7 @@ async def list_experiments(
 def preview_experiment(
     request: ExperimentRequest, rig: RobotDep, services: ServicesDep, _: Viewer, _turn: Turn
 ) -> MotionPreview:
-    """The motion of an experiment and everything that speaks against it. Nothing is queued, nothing moves."""
+    """Plans an experiment and returns its motion and all violations of limits. Nothing is queued, nothing moves."""
     return _preview(services, rig, request.spec, MOST_SHOWN)
 
 
@@ -97,7 +97,7 @@ def preview_experiment(
 async def get_experiment(
     experiment: Identity, rig: RobotDep, services: ServicesDep, _: Viewer, wait: Wait = 0
 ) -> Experiment:
-    """One experiment: its state, how far it is, what became of it. With `wait` the answer comes when it has ended."""
+    """Returns one experiment with its state, progress and outcome. With `wait`, answers when it has ended."""
     return await when_ended(
         rig.hub,
         {"events"},
@@ -111,7 +111,7 @@ async def get_experiment(
 def change_experiment(
     experiment: Identity, change: ExperimentChange, rig: RobotDep, services: ServicesDep, caller: Operator
 ) -> Experiment:
-    """A new priority of one that still waits."""
+    """Changes the priority of an experiment that still waits."""
     changed = services.experiments.set_priority(rig.robot.name, experiment, change.priority)
     services.record_event(
         rig.robot.name, "experiment", f"priority {change.priority}", actor=caller.name, experiment=experiment
@@ -122,13 +122,13 @@ def change_experiment(
 
 @router.post("/{experiment}/cancel")
 def cancel_experiment(experiment: Identity, rig: RobotDep, caller: Operator) -> Experiment:
-    """Takes back what waits. One that runs is stopped as by a stop: the arm is frozen and needs a reset."""
+    """Cancels an experiment. One that runs is ended by a stop: the arm is frozen and needs a reset."""
     return rig.queue.cancel(experiment, caller.name)
 
 
 def _preview(services: Services, rig: RobotServices, spec: ExperimentSpec, most_shown: int) -> MotionPreview:
-    """A short motion here, a long one by a process that holds up nobody. Raises SpecError, and a 422 for what is too
-    long to be planned."""
+    """Plans a short motion here and a long one in a worker process. Raises SpecError, and a 422 for a motion that is
+    too long to be planned."""
     length = least_length(spec)
     if length > LONGEST:
         line = f"spec: takes {length / 3600:.1f} h, allowed are {LONGEST / 3600:g} h"

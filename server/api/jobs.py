@@ -1,4 +1,4 @@
-"""Jobs: fits, validations, comparisons, diagnoses in the background; and the models they make."""
+"""Routes of jobs (fits, validations, comparisons and diagnoses in the background) and of the models they make."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ from server.services import RobotServices, Services
 
 router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
-"""A report is one page with its styles in it, and no script."""
+"""A report is a single page with inline styles and no script."""
 MOST_OF_A_LINEAGE = 500
-"""Models, and jobs."""
+"""Most models, and most jobs, in a lineage."""
 _JSON_FILE = {"application/json": {"schema": {"type": "object"}}}
 
 
@@ -60,9 +60,9 @@ def submit_job(
     _turn: Turn,
     idempotency_key: IdempotencyKey = None,
 ) -> Job:
-    """Begins a computation as soon as a worker is free. The same Idempotency-Key gives the same job (200).
+    """Queues a computation, which begins when a worker is free. The same Idempotency-Key returns the same job (200).
 
-    Comparisons and validations of few traces have a worker of their own: they wait behind no fit and no diagnosis.
+    Comparisons and validations of few traces have a worker of their own, so they never wait for a fit or a diagnosis.
     """
     job, new = rig.jobs.submit(request, caller.name, idempotency_key)
     response.status_code = 201 if new else 200
@@ -81,14 +81,14 @@ def list_jobs(
     limit: Limit = 50,
     cursor: CursorOf = None,
 ) -> Page[Job]:
-    """Jobs, the newest first; with `model` those that were given that model, and the one that made it."""
+    """Lists jobs, the newest first. `model` selects the jobs that used a model and the job that made it."""
     page = services.jobs.page(rig.robot.name, state or (), kind, cursor, limit, model)
     return page.model_copy(update={"items": rig.jobs.with_progress_all(page.items)})
 
 
 @router.get("/jobs/{job}", tags=["jobs"])
 async def get_job(job: Identity, rig: RobotDep, services: ServicesDep, _: Viewer, wait: Wait = 0) -> Job:
-    """One job: its state, how far it is, what became of it. With `wait` the answer comes when it has ended."""
+    """Returns one job with its state, progress and outcome. With `wait`, answers when it has ended."""
     return await when_ended(
         rig.hub,
         {"jobs"},
@@ -100,20 +100,20 @@ async def get_job(job: Identity, rig: RobotDep, services: ServicesDep, _: Viewer
 
 @router.post("/jobs/{job}/cancel", tags=["jobs"])
 def cancel_job(job: Identity, rig: RobotDep, caller: Operator) -> Job:
-    """Takes back what waits, and asks what runs to end, which it does within a second or so."""
+    """Cancels a job. One that runs ends within about a second."""
     return rig.jobs.cancel(job, caller.name)
 
 
 @router.delete("/jobs/{job}", tags=["jobs"], status_code=204)
 def delete_job(job: Identity, rig: RobotDep, _: Operator) -> Response:
-    """Takes an ended job and its result away; a model that it made stays."""
+    """Deletes an ended job and its result. A model that it made is kept."""
     rig.jobs.remove(job)
     return Response(status_code=204)
 
 
 @router.get("/jobs/{job}/result", tags=["jobs"], response_model=JobResult)
 def get_job_result(job: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
-    """What a job found: as `--json` of its command, with the signals that a plot needs."""
+    """Returns the result of a job: the data of its command's `--json`, and signals for plots."""
     return FileResponse(rig.jobs.result_file(job, RESULT), media_type="application/json")
 
 
@@ -124,7 +124,7 @@ def get_job_result(job: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
     responses={200: {"content": {"text/html": {}}}},
 )
 def get_job_report(job: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
-    """The job's report: one page that stands by itself."""
+    """Returns the report of a job as a self-contained HTML page."""
     path = rig.jobs.result_file(job, REPORT)
     return FileResponse(path, media_type="text/html", headers={"Content-Security-Policy": REPORT_POLICY})
 
@@ -133,7 +133,7 @@ def get_job_report(job: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
 def list_models(
     rig: RobotDep, services: ServicesDep, _: Viewer, limit: Limit = 50, cursor: CursorOf = None
 ) -> Page[ModelEntry]:
-    """Models, the newest first."""
+    """Lists models, the newest first."""
     return services.models.page(rig.robot.name, cursor, limit)
 
 
@@ -150,25 +150,25 @@ async def upload_model(
     caller: Operator,
     name: Annotated[ModelName, Query()],
 ) -> ModelEntry:
-    """Takes in a model from elsewhere: a file as `daq fit` writes it. Effects of a user's own are refused."""
+    """Imports a model file as written by `daq fit`. Models with user-defined effects are refused."""
     text = bytearray()
     async for piece in request.stream():
         text += piece
         if len(text) > LARGEST_MODEL:
             raise ProblemError(413, "too-large", f"a model may have {LARGEST_MODEL >> 20} MB", "send less")
     async with services.lanes.turn(caller.name):
-        return await run_in_threadpool(_taken_in, bytes(text), name, rig, services, caller.name)
+        return await run_in_threadpool(_import_model, bytes(text), name, rig, services, caller.name)
 
 
 @router.get("/models/machine/parameters", tags=["models"])
 def list_machine_parameters(rig: RobotDep, _: Viewer, _turn: Turn) -> tuple[ModelParameter, ...]:
-    """Parameters of the model that the machine file describes: `machine` in requests."""
+    """Lists the parameters of the machine file's model, which requests call `machine`."""
     return rig.models.machine_parameters()
 
 
 @router.get("/lineage", tags=["models"])
 def get_lineage(rig: RobotDep, services: ServicesDep, _: Viewer, _turn: Turn) -> ModelLineage:
-    """Where the models come from, and the jobs between them; of very many the newest."""
+    """Returns the models and the jobs that made or used them; at most the newest 500 of each."""
     jobs = services.jobs.page(rig.robot.name, (), None, None, MOST_OF_A_LINEAGE).items
     return ModelLineage(
         machine=rig.models.machine_identity(),
@@ -179,14 +179,14 @@ def get_lineage(rig: RobotDep, services: ServicesDep, _: Viewer, _turn: Turn) ->
 
 @router.get("/effects", tags=["models"])
 def list_effects(rig: RobotDep, _: Viewer) -> tuple[KnownEffect, ...]:
-    """Effects that a fit may add and a diagnosis looks for, family by family."""
+    """Lists the effects that a fit may add and a diagnosis considers, grouped by family."""
     del rig
     return known_effects()
 
 
 @router.get("/models/{model}", tags=["models"])
 def get_model(model: Identity, rig: RobotDep, _: Viewer, _turn: Turn) -> ModelDetails:
-    """One model: its effects, its parameters, the models that it comes from."""
+    """Returns one model with its effects, its parameters and its ancestors."""
     return rig.models.details(model)
 
 
@@ -197,26 +197,26 @@ def get_model(model: Identity, rig: RobotDep, _: Viewer, _turn: Turn) -> ModelDe
     responses={200: {"content": _JSON_FILE}},
 )
 def download_model(model: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
-    """The model's file, for `daq validate` and the like."""
+    """Downloads the model file, for example for `daq validate`."""
     path = rig.models.path_of(model)
     return FileResponse(path, media_type="application/json", filename=path.name)
 
 
 @router.patch("/models/{model}", tags=["models"])
 def change_model(model: Identity, change: ModelChange, rig: RobotDep, services: ServicesDep, _: Operator) -> ModelEntry:
-    """A new name or notes."""
+    """Changes the name or the notes of a model."""
     return services.models.change(rig.robot.name, model, change)
 
 
 @router.delete("/models/{model}", tags=["models"], status_code=204)
 def delete_model(model: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Response:
-    """Deletes a model for good. Refused while another model comes from it."""
+    """Deletes a model for good. Refused while another model was made from it."""
     rig.models.remove(model)
     services.record_event(rig.robot.name, "model", f"model {model} was deleted", actor=caller.name)
     return Response(status_code=204)
 
 
-def _taken_in(text: bytes, name: str, rig: RobotServices, services: Services, by: str) -> ModelEntry:
+def _import_model(text: bytes, name: str, rig: RobotServices, services: Services, by: str) -> ModelEntry:
     try:
         return services.models.get(rig.robot.name, rig.models.take_in_text(text, name, by))
     except RecursionError:

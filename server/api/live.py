@@ -1,4 +1,4 @@
-"""The live WebSocket, its one-time tickets, and the same once for whoever cannot hold a WebSocket."""
+"""The live WebSocket, its one-time tickets, and a single frame for clients without a WebSocket."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NOT_ALLOWED = 1008
 
 @router.websocket("/robots/{robot}/live")
 async def live(socket: WebSocket, robot: str) -> None:
-    """Frames (`LiveFrame`) of what the client has subscribed to (`LiveRequest`)."""
+    """Sends frames (`LiveFrame`) of the topics that the client subscribes to (`LiveRequest`)."""
     try:
         caller = require_viewer(socket)
         rig = services_of(socket).robot(robot)
@@ -29,7 +29,7 @@ async def live(socket: WebSocket, robot: str) -> None:
 
 @router.get("/robots/{robot}/live/frame", responses=PROBLEMS)
 def get_live_frame(rig: RobotDep, _: Viewer, history: float = 10.0) -> LiveFrame:
-    """What the WebSocket would send a client that joins now: for a look without one."""
+    """Returns what the WebSocket would send to a client that joins now."""
     clock = rig.robot.clock
     now = clock.monotonic()
     return LiveFrame(
@@ -39,5 +39,5 @@ def get_live_frame(rig: RobotDep, _: Viewer, history: float = 10.0) -> LiveFrame
 
 @router.post("/tickets", status_code=201, responses=PROBLEMS)
 def create_ticket(services: ServicesDep, caller: Viewer) -> Ticket:
-    """A ticket for one WebSocket (`?ticket=…`): browsers cannot send a token with it."""
+    """Issues a ticket for one WebSocket (`?ticket=…`), since browsers cannot send a token with it."""
     return services.tickets.give(caller)

@@ -1,4 +1,4 @@
-"""What an experiment can be: those that have a name, and the rules of a specification."""
+"""Routes of the named experiments, and of the schema of a specification."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ router = APIRouter(prefix="/robots/{robot}", tags=["experiments"], responses=PRO
 
 @router.get("/presets")
 def list_presets(rig: RobotDep, _: Viewer) -> tuple[ExperimentPreset, ...]:
-    """Experiments that have a name, for the joints that this robot has: to be run as they are, or to begin from."""
+    """Lists the named experiments for the joints of this robot: to run as they are, or to start from."""
     count = len(rig.robot.machine.joints)
     return tuple(
         ExperimentPreset(name=name, description=preset.description, spec=preset.spec)
@@ -28,5 +28,5 @@ def list_presets(rig: RobotDep, _: Viewer) -> tuple[ExperimentPreset, ...]:
 
 @router.get("/spec-schema")
 def get_spec_schema(_: RobotDep, __: Viewer) -> dict[str, Any]:
-    """JSON Schema of `ExperimentSpec`: fields, defaults and bounds, for forms and editors."""
+    """Returns the JSON Schema of `ExperimentSpec`, for forms and editors."""
     return ExperimentSpec.model_json_schema()

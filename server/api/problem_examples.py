@@ -1,4 +1,4 @@
-"""One example of every kind of problem, and the addresses at which it is met."""
+"""One example of every kind of problem, and the operations that may answer with it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Met:
 
     @property
     def details(self) -> ProblemDetails:
-        """As it is told."""
+        """The body of the answer."""
         return details_of(self.problem, request_id="0f3c9a1be4d27788")
 
 

@@ -1,4 +1,4 @@
-"""Taught programs: kept by the service until they are deleted, changed, and carried out."""
+"""Routes of taught programs, which the service keeps until they are deleted."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ router = APIRouter(prefix="/robots/{robot}/programs", tags=["teaching"], respons
 ProgramName = Annotated[str, Path(pattern=f"^{NAME}$", description="Name of the program.")]
 Revision = Annotated[
     int | None,
-    Query(ge=1, lt=2**31, description="The revision that you changed. Leave it out for a new program."),
+    Query(ge=1, lt=2**31, description="The revision that was changed. Omit it for a new program."),
 ]
 
 
 @router.get("")
 def list_programs(rig: RobotDep, services: ServicesDep, _: Viewer) -> tuple[ProgramEntry, ...]:
-    """Programs that are kept, the one changed last first."""
+    """Lists the stored programs, the last changed first."""
     return services.programs.all(rig.robot.name)
 
 
 @router.get("/{program}")
 def get_program(program: ProgramName, rig: RobotDep, services: ServicesDep, _: Viewer) -> StoredProgram:
-    """One program, with the revision that a change of it names."""
+    """Returns one program with its revision, which a change has to name."""
     return services.programs.get(rig.robot.name, program)
 
 
@@ -42,10 +42,10 @@ def put_program(
     caller: Operator,
     revision: Revision = None,
 ) -> ProgramEntry:
-    """Keeps a program, or a change of it: `revision` is the one that was changed. Moves nothing, and needs no control.
+    """Stores a program, or a change to its `revision`. Moves nothing and needs no control.
 
-    A body with another name than the address renames it. What somebody else has changed meanwhile is not overwritten:
-    409.
+    A body with another name than the address renames the program. A program that somebody else has changed meanwhile
+    is not overwritten (409).
     """
     return services.programs.put(rig.robot.name, program, request, revision, services.clock.utc(), caller.name)
 
@@ -67,7 +67,7 @@ def run_stored_program(
     arrived: Arrived,
     lease: LeaseHeader = None,
 ) -> TeachingStatus:
-    """Carries out a kept program, as POST …/teaching/program does with one that is sent."""
+    """Runs a stored program, as POST …/teaching/program runs one that is sent."""
     rig.require_motion(lease)
     rig.teaching.perform(rig.word(lease, arrived), services.programs.get(rig.robot.name, program).program)
     return rig.teaching.status()

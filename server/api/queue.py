@@ -1,4 +1,4 @@
-"""The queue, the schedules that fill it, and the control of the robot."""
+"""Routes of the queue, of its schedules, and of the control of the robot."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
 
 
 async def _seen(rig: RobotDep) -> Seen:
-    """When the request came, before it waited for a thread or for the queue."""
+    """What an operator could see when the request arrived, before it waited for a thread or for the queue."""
     return rig.queue.notices.seen
 
 
@@ -37,26 +37,26 @@ SeenDep = Annotated[Seen, Depends(_seen)]
 
 @router.get("/queue", tags=["queue"])
 async def get_queue(rig: RobotDep, _: Viewer) -> QueueStatus:
-    """Whether experiments are taken from the queue, and if not, why."""
+    """Returns whether the queue runs experiments, and if not, why."""
     return rig.queue.status()
 
 
 @router.get("/queue/experiments", tags=["queue"])
 def list_queue(rig: RobotDep, services: ServicesDep, _: Viewer) -> tuple[Experiment, ...]:
-    """What waits, in the order in which it will be run."""
+    """Lists the waiting experiments in the order in which they will run."""
     return tuple(services.experiments.in_order(rig.robot.name))
 
 
 @router.post("/queue/pause", tags=["queue"])
 def pause_queue(rig: RobotDep, caller: Operator) -> QueueStatus:
-    """Lets no other experiment begin; one that runs goes on."""
+    """Pauses the queue: no further experiment begins, and one that runs goes on."""
     rig.queue.pause(f"paused by {caller.name}", caller.name)
     return rig.queue.status()
 
 
 @router.post("/queue/resume", tags=["queue"])
 def resume_queue(request: QueueResume, rig: RobotDep, seen: SeenDep, caller: Operator) -> QueueStatus:
-    """The operator's word that the queue may move the robot. A real arm needs `moves_real_arm`."""
+    """Resumes the queue: the operator's consent that it may move the robot. A real arm needs `moves_real_arm`."""
     identity = rig.robot.identity
     if identity is not None and not identity.simulated and not request.moves_real_arm:
         line = f"{rig.robot.place.url} is a real arm: it moves only with the operator's word"
@@ -67,7 +67,7 @@ def resume_queue(request: QueueResume, rig: RobotDep, seen: SeenDep, caller: Ope
 
 @router.post("/queue/attend", tags=["queue"])
 def attend_queue(rig: RobotDep, _: Operator) -> QueueStatus:
-    """An operator says to be there, for a minute more: a real arm that may not run unattended needs it."""
+    """Confirms that an operator is present for the next 60 s, which a real arm needs unless it may run unattended."""
     rig.queue.attend()
     return rig.queue.status()
 
@@ -76,7 +76,7 @@ def attend_queue(rig: RobotDep, _: Operator) -> QueueStatus:
 def create_schedule(
     request: ScheduleRequest, rig: RobotDep, services: ServicesDep, caller: Operator, _turn: Turn
 ) -> Schedule:
-    """An experiment to be run every so often. It is checked now, and again before every run."""
+    """Creates a schedule that submits an experiment periodically. It is checked now and before every run."""
     require_possible(services, rig, request.spec)
     made = services.schedules.create(rig.robot.name, request, services.clock.utc(), caller.name)
     services.record_event(rig.robot.name, "schedule", f"schedule {made.id}: every {made.every:g} s", actor=caller.name)
@@ -88,13 +88,13 @@ def create_schedule(
 def list_schedules(
     rig: RobotDep, services: ServicesDep, _: Viewer, limit: Limit = 50, cursor: CursorOf = None
 ) -> Page[Schedule]:
-    """Schedules, the newest first."""
+    """Lists schedules, the newest first."""
     return services.schedules.page(rig.robot.name, cursor, limit)
 
 
 @router.get("/schedules/{schedule}", tags=["queue"])
 def get_schedule(schedule: Identity, rig: RobotDep, services: ServicesDep, _: Viewer) -> Schedule:
-    """One schedule."""
+    """Returns one schedule."""
     return services.schedules.get(rig.robot.name, schedule)
 
 
@@ -112,7 +112,7 @@ def change_schedule(
 
 @router.delete("/schedules/{schedule}", tags=["queue"], status_code=204)
 def delete_schedule(schedule: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Response:
-    """Takes a schedule away; the experiments that it submitted stay."""
+    """Deletes a schedule. The experiments that it has submitted are kept."""
     services.schedules.remove(rig.robot.name, schedule)
     services.record_event(rig.robot.name, "schedule", f"schedule {schedule} taken away", actor=caller.name)
     return Response(status_code=204)
@@ -120,13 +120,13 @@ def delete_schedule(schedule: Identity, rig: RobotDep, services: ServicesDep, ca
 
 @router.get("/control", tags=["control"])
 async def get_control(rig: RobotDep, _: Viewer) -> Control:
-    """Who may move the robot now."""
+    """Returns who may move the robot now."""
     return rig.control.status()
 
 
 @router.post("/control", tags=["control"], status_code=201)
 def take_control(request: ControlRequest, rig: RobotDep, services: ServicesDep, caller: Operator) -> ControlLease:
-    """The control of the robot, for one client. It lapses without a heartbeat: the arm holds, the queue is paused."""
+    """Gives one client control of the robot. Without heartbeats it lapses: the arm holds and the queue is paused."""
     identity = rig.robot.identity
     if identity is not None and not identity.simulated and not request.moves_real_arm:
         line = f"{rig.robot.place.url} is a real arm: it moves only with the operator's word"
@@ -138,15 +138,15 @@ def take_control(request: ControlRequest, rig: RobotDep, services: ServicesDep, 
 
 @router.put("/control", tags=["control"])
 def renew_control(rig: RobotDep, _: Operator, lease: LeaseHeader = None) -> ControlLease:
-    """The heartbeat of the client that has the control."""
+    """Renews the control: the heartbeat of the client that has it."""
     return rig.control.renew(lease or "")
 
 
 @router.delete("/control", tags=["control"], status_code=204)
 def give_control_back(rig: RobotDep, services: ServicesDep, caller: Operator, lease: LeaseHeader = None) -> Response:
-    """Gives the control back; what this client was moving holds. A program that still runs is stopped.
+    """Gives the control back. The arm holds its posture; a program that still runs is stopped.
 
-    Where experiments wait the queue is paused by it: what waits begins when somebody resumes the queue.
+    If experiments are waiting, the queue is paused until somebody resumes it.
     """
     rig.control.give_back(lease or "")
     rig.teaching.hold()

@@ -1,4 +1,4 @@
-"""Robots: what they are and how they are; connect, disconnect, stop, reset."""
+"""Routes of robots: description and status; connect, disconnect, stop, reset."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ router = APIRouter(prefix="/robots", tags=["robots"], responses=PROBLEMS)
 
 @router.get("")
 async def list_robots(services: ServicesDep, _: Viewer) -> tuple[RobotSummary, ...]:
-    """The robots of this service."""
+    """Lists the robots of this service."""
     return tuple(
         RobotSummary(
             robot=rig.robot.name,
@@ -32,19 +32,19 @@ async def list_robots(services: ServicesDep, _: Viewer) -> tuple[RobotSummary, .
 
 @router.get("/{robot}")
 async def get_robot(rig: RobotDep, _: Viewer) -> RobotStatus:
-    """Everything about one robot now; every value says how old it is."""
+    """Returns the status of one robot, with the age of its values."""
     return rig.status()
 
 
 @router.get("/{robot}/machine")
 async def get_machine(rig: RobotDep, _: Viewer) -> Machine:
-    """The machine file with this configuration's limits: geometry, drives, sensors, limits."""
+    """Returns the machine file (geometry, drives, sensors) with the limits of this configuration."""
     return rig.robot.machine
 
 
 @router.post("/{robot}/connect")
 def connect_robot(rig: RobotDep, services: ServicesDep, caller: Operator) -> RobotStatus:
-    """Connects, and keeps it connected. Moves nothing. 409 when another program has the port."""
+    """Connects the robot and keeps it connected. Moves nothing. 409 if another program has the port."""
     rig.keeper.connect()
     services.record_event(rig.robot.name, "connection", "connected", actor=caller.name)
     return rig.status()
@@ -52,18 +52,18 @@ def connect_robot(rig: RobotDep, services: ServicesDep, caller: Operator) -> Rob
 
 @router.post("/{robot}/disconnect")
 def disconnect_robot(rig: RobotDep, services: ServicesDep, caller: Operator, lease: LeaseHeader = None) -> Done:
-    """Gives the port back to other programs. Refused while somebody else has the control."""
+    """Disconnects, so that other programs can use the port. Refused while somebody else has control."""
     rig.control.require_free_of_others(lease)
     free = rig.keeper.disconnect()
     services.record_event(rig.robot.name, "connection", "disconnected", actor=caller.name)
     return Done(text="the port is free" if free else "the owner still closes its trace; the port is free soon")
 
 
-@router.post("/{robot}/stop", responses={200: {"description": "What became of it: read `confirmed`"}})
+@router.post("/{robot}/stop", responses={200: {"description": "The outcome of the stop: read `confirmed`"}})
 async def stop_robot(rig: RobotDep, services: ServicesDep, caller: Viewer) -> StopResult:
-    """Freezes the arm at its measured posture, at once. Anybody who may see the robot may stop it; nothing is asked.
+    """Freezes the arm at its measured posture at once. Anybody who may see the robot may stop it, without control.
 
-    Anything but `confirmed`: use the emergency stop. The freeze is ended by a reset alone.
+    Unless the answer is `confirmed`, use the emergency stop. Only a reset ends the freeze.
     """
     rig.queue.stop_asked(caller.name)  # first: nothing begins while the stop is on its way, nor after one that was lost
     result = await rig.stop.stop()
@@ -75,7 +75,7 @@ async def stop_robot(rig: RobotDep, services: ServicesDep, caller: Viewer) -> St
 def reset_robot(
     request: ResetRequest, rig: RobotDep, services: ServicesDep, caller: Operator, lease: LeaseHeader = None
 ) -> Done:
-    """Ends a stop or a fault. Nothing moves; the queue stays paused until it is resumed."""
+    """Resets the arm after a stop or a fault. Nothing moves; the queue stays paused until it is resumed."""
     rig.control.require_free_of_others(lease)
     text = str(answer_of(rig.robot, Reset, here=request.here).data["text"])
     services.record_event(rig.robot.name, "reset", text, actor=caller.name)
@@ -91,5 +91,5 @@ def list_events(
     limit: Limit = 50,
     cursor: CursorOf = None,
 ) -> Page[ServiceEvent]:
-    """What happened, and who asked for it; the newest first."""
+    """Lists events and who caused them, the newest first."""
     return services.events.page(rig.robot.name, experiment, cursor, limit)

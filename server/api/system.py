@@ -1,4 +1,4 @@
-"""The service itself: is it well, is it ready, what does it count, who calls it."""
+"""Routes of the service itself: health, readiness, metrics, and the caller's own role."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ NOT_WELL = "not well: a token is needed to be told more"
 
 @plain.get("/healthz")
 async def healthz() -> Health:
-    """200 while the service answers."""
+    """Answers 200 while the service runs."""
     return Health(status="ok", version=VERSION, checks={})
 
 
 @plain.get("/readyz", responses={503: {"model": Health}})
 async def readyz(request: Request, services: ServicesDep, response: Response) -> Health:
-    """200 while experiments can be taken: database and traces' folder can be written. A robot need not be there.
+    """Answers 200 while database and traces' folder can be written; a robot need not be connected.
 
-    What is wrong is told to whoever may see the robot. The answer is up to a second old.
+    Callers who may see the robot get the details. The answer is up to a second old.
     """
     problems = await services.readiness.check(lambda: _checks(services))
     if caller_of(request) is None:
@@ -52,19 +52,19 @@ async def readyz(request: Request, services: ServicesDep, response: Response) ->
 
 @plain.get("/metrics", response_class=Response, responses={200: {"content": {"text/plain": {}}}})
 def metrics(services: ServicesDep, _: Viewer) -> Response:
-    """For Prometheus."""
+    """Returns the metrics in the format of Prometheus."""
     return Response(generate_latest(services.metrics.registry), media_type=CONTENT_TYPE_LATEST)
 
 
 @router.get("/me")
 async def get_me(caller: Viewer) -> Me:
-    """Who the service takes the caller for."""
+    """Returns the name and the role of the caller."""
     return Me(name=caller.name, role=caller.role)
 
 
 @router.get("/system")
 def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
-    """The service: version, storage, watchers."""
+    """Returns version, uptime, storage and live clients of the service."""
     folder = services.settings.traces.folder.absolute()
     file = _database_file(services)
     with services.store.reading() as session:
@@ -111,7 +111,7 @@ def _checks(services: Services) -> dict[str, str]:
 
 
 def _require_writable(folder: Path) -> None:
-    """Raises OSError. Nobody sees the file, which has no name."""
+    """Raises OSError where nothing can be written. The probe is a file without a name, so nobody sees it."""
     with tempfile.TemporaryFile(dir=folder) as probe:
         probe.write(b"written")
 

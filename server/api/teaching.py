@@ -1,4 +1,4 @@
-"""Jogging, steps, programs, leading by hand, and calibration. All of it needs the control of the robot."""
+"""Routes for jogging, steps, programs and leading by hand, which need control of the robot; and for calibration."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ router = APIRouter(prefix="/robots/{robot}", tags=["teaching"], responses=PROBLE
 
 @router.get("/teaching")
 def get_teaching(rig: RobotDep, _: Viewer) -> TeachingStatus:
-    """What is being taught now, and how the last one ended."""
+    """Returns the teaching activity under way, and how the last one ended."""
     return rig.teaching.status()
 
 
@@ -45,7 +45,7 @@ def get_teaching(rig: RobotDep, _: Viewer) -> TeachingStatus:
 def jog_robot(
     request: JogRequest, rig: RobotDep, _: Operator, arrived: Arrived, lease: LeaseHeader = None
 ) -> TeachingStatus:
-    """Drives joints for 0.3 s at most: whoever holds the key repeats this, ten times a second or so."""
+    """Drives joints for at most 0.3 s. While a key is held, the client repeats this about ten times a second."""
     rig.require_motion(lease)
     rig.teaching.jog(dict(request.velocities), arrived)
     return rig.teaching.status()
@@ -55,7 +55,7 @@ def jog_robot(
 def step_robot(
     request: StepRequest, rig: RobotDep, _: Operator, arrived: Arrived, lease: LeaseHeader = None
 ) -> TeachingStatus:
-    """Begins one step, all joints arriving together. Checked before it moves; GET …/teaching tells its end."""
+    """Starts one step, in which all joints arrive together. It is checked first; GET …/teaching reports its end."""
     rig.require_motion(lease)
     if (request.to is None) == (request.by is None):
         raise SpecError("step: give either `to` or `by`")
@@ -76,7 +76,7 @@ def step_robot(
 def run_program(
     request: Program, rig: RobotDep, _: Operator, arrived: Arrived, lease: LeaseHeader = None
 ) -> TeachingStatus:
-    """Begins a taught program: steps, paths, waits, process signals. Checked from end to end before it moves."""
+    """Starts a taught program of steps, paths, waits and process signals. All of it is checked before it moves."""
     rig.require_motion(lease)
     rig.teaching.perform(rig.word(lease, arrived), request)
     return rig.teaching.status()
@@ -86,7 +86,7 @@ def run_program(
 def lead_robot(
     request: LeadRequest, rig: RobotDep, _: Operator, arrived: Arrived, lease: LeaseHeader = None
 ) -> TeachingStatus:
-    """Begins to record a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive and sink."""
+    """Starts recording a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive and sink."""
     rig.require_motion(lease)
     rig.teaching.lead(rig.word(lease, arrived), tuple(sorted(set(request.joints))))
     return rig.teaching.status()
@@ -94,7 +94,7 @@ def lead_robot(
 
 @router.post("/teaching/finish")
 def finish_teaching(rig: RobotDep, _: Operator, lease: LeaseHeader = None) -> TeachingStatus:
-    """Ends jogging, or leading: its path is in the answer."""
+    """Ends jogging or leading; the answer holds the recorded path."""
     rig.control.require(lease)
     rig.teaching.finish()
     return rig.teaching.status()
@@ -110,9 +110,9 @@ def calibrate_gain(
     _turn: Turn,
     idempotency_key: IdempotencyKey = None,
 ) -> Experiment:
-    """Queues the experiment that shows the actual proportional gain; GET …/traces/{trace}/gain tells it afterwards.
+    """Queues the experiment that measures the actual proportional gain. GET …/traces/{trace}/gain then returns it.
 
-    It is checked as any other, and the same Idempotency-Key gives the same experiment (200).
+    It is checked like any experiment; the same Idempotency-Key returns the same experiment (200).
     """
     spec = gain_experiment(tuple(sorted(set(request.joints))))
     return submit_experiment(ExperimentRequest(spec=spec), rig, services, caller, response, None, idempotency_key)
@@ -120,7 +120,7 @@ def calibrate_gain(
 
 @router.get("/traces/{trace}/gain")
 def get_measured_gain(trace: Identity, rig: RobotDep, _: Viewer, _turn: Turn) -> tuple[MeasuredGain, ...]:
-    """The actual proportional gains that a trace shows."""
+    """Returns the actual proportional gains measured from a trace."""
     read = read_trace(rig.catalogue.path_of(trace), rig.catalogue.limits)
     fields = MeasuredGain.model_fields
     return tuple(

@@ -1,4 +1,4 @@
-"""Traces: search, look into, download, upload, tag."""
+"""Routes of traces: search, inspect, download, upload, tag."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ router = APIRouter(prefix="/robots/{robot}/traces", tags=["traces"], responses=P
 MCAP = "application/octet-stream"
 CSV = "text/csv"
 Text = Annotated[
-    str | None, Query(max_length=100, description="Looked for in number, file, name, kind, operator, notes and tags.")
+    str | None, Query(max_length=100, description="Text to find in number, file, name, kind, operator, notes or tags.")
 ]
-Points = Annotated[int, Query(ge=2, le=20000, description="About how many points the plot has.")]
+Points = Annotated[int, Query(ge=2, le=20000, description="Approximate number of points.")]
 Seconds = Annotated[float | None, Query(ge=-1e9, le=1e9, description="s from the start of the record.")]
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
 
@@ -66,7 +66,7 @@ async def list_traces(
     limit: Limit = 50,
     cursor: CursorOf = None,
 ) -> Page[CatalogueEntry]:
-    """Traces, the newest first."""
+    """Lists traces, the newest first."""
     search = TraceSearch(q, tag, source, outcome, kind, since, until)
     if q is None:
         return await services.traces.page.fetch(rig.robot.name, search, cursor, limit)
@@ -82,13 +82,13 @@ async def list_traces(
     openapi_extra={"requestBody": {"required": True, "content": {MCAP: _BINARY, CSV: _BINARY}}},
 )
 async def upload_trace(request: Request, rig: RobotDep, services: ServicesDep, caller: Operator) -> CatalogueEntry:
-    """Takes in a trace from elsewhere: MCAP of this project (application/octet-stream) or plain CSV (text/csv)."""
+    """Imports a trace: MCAP of this project (application/octet-stream) or plain CSV (text/csv)."""
     return await store_upload(request, rig, services, caller)
 
 
 @router.get("/{trace}")
 def get_trace(trace: Identity, rig: RobotDep, services: ServicesDep, _: Viewer, _turn: Turn) -> TraceDetails:
-    """What one trace says about itself, its figures and events."""
+    """Returns one trace's record, figures and events."""
     entry = services.traces.get(rig.robot.name, trace)
     read = read_trace(rig.catalogue.path_of(trace), rig.catalogue.limits)
     return TraceDetails(
@@ -104,13 +104,13 @@ def get_trace(trace: Identity, rig: RobotDep, services: ServicesDep, _: Viewer, 
 def change_trace(
     trace: Identity, change: TraceChange, rig: RobotDep, services: ServicesDep, _: Operator
 ) -> CatalogueEntry:
-    """New tags or notes. They are the catalogue's: the file stays as it was recorded."""
+    """Changes the tags or the notes, which the catalogue keeps: the file stays as it was recorded."""
     return services.traces.change(rig.robot.name, trace, change)
 
 
 @router.delete("/{trace}", status_code=204)
 def delete_trace(trace: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Response:
-    """Deletes a trace for good. Refused while a model or a job refers to it."""
+    """Deletes a trace for good. Refused while a model or a job uses it."""
     path = rig.catalogue.remove(trace)
     services.record_event(rig.robot.name, "trace", f"trace {trace} ({path.name}) was deleted", actor=caller.name)
     return Response(status_code=204)
@@ -118,14 +118,14 @@ def delete_trace(trace: Identity, rig: RobotDep, services: ServicesDep, caller: 
 
 @router.get("/{trace}/data.mcap", response_class=FileResponse, responses={200: {"content": {MCAP: _BINARY}}})
 def download_trace(trace: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
-    """The file as it was recorded; opens in Foxglove."""
+    """Downloads the MCAP file as it was recorded; it opens in Foxglove."""
     path = rig.catalogue.path_of(trace)
     return FileResponse(path, media_type=MCAP, filename=path.name)
 
 
 @router.get("/{trace}/data.csv", response_class=FileResponse, responses={200: {"content": {CSV: _BINARY}}})
 def download_trace_as_csv(trace: Identity, rig: RobotDep, _: Viewer, _turn: Turn) -> FileResponse:
-    """Time and signals as plain CSV, in s, rad and V."""
+    """Downloads time and signals as plain CSV, in s, rad and V."""
     path = rig.catalogue.path_of(trace)
     folder = tempfile.TemporaryDirectory(prefix="daq-csv-")
     made = export_csv(read_trace(path, rig.catalogue.limits), Path(folder.name) / f"{path.stem}.csv")
@@ -142,7 +142,7 @@ def get_trace_signals(
     start: Seconds = None,
     end: Seconds = None,
 ) -> TraceSignals:
-    """Signals for a plot, thinned to about `points` between `start` and `end`; no peak is lost."""
+    """Returns signals for a plot, thinned to about `points` between `start` and `end` so that no peak is lost."""
     read = read_trace(rig.catalogue.path_of(trace), rig.catalogue.limits)
     few = thinned(read, points, start, end)
     columns = {name: None if s is None else tuple(map(tuple, s.T.tolist())) for name, s in few.signals.items()}

@@ -1,1 +1,1 @@
-"""Processes with limits of memory and time, for what others send: whatever it does to them, the service goes on."""
+"""Processes with limits of memory and time, which handle untrusted input so that it cannot harm the service."""

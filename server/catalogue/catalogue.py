@@ -1,4 +1,4 @@
-"""Brings the catalogue's table up to the folder: new files in, salvaged ones in, those that are gone marked."""
+"""Keeps the catalogue's table in step with the folder: adds new and salvaged files, and marks those that are gone."""
 
 from __future__ import annotations
 

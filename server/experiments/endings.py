@@ -1,4 +1,4 @@
-"""What the end of a run means for its experiment, and for the queue. Pure."""
+"""What the end of a run means for its experiment and for the queue. Pure."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Ending:
 
 
 def ending_of(answer: Answer) -> Ending:
-    """From the owner's answer."""
+    """The ending that the owner's answer reports."""
     if answer.finished is not None:
         return Ending(_OF_OUTCOME[answer.finished.outcome], answer.finished.reason, answer.finished.outcome)
     if answer.exit_code in EXIT_REFUSED:

@@ -1,4 +1,4 @@
-"""How long an experiment takes at least, before it is planned: what is far too long never gets there. Pure."""
+"""The least length of an experiment, by which one that is far too long is refused before it is planned. Pure."""
 
 from __future__ import annotations
 

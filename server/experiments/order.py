@@ -1,4 +1,4 @@
-"""Which experiment is next. Pure."""
+"""The order of the queue. Pure."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from datetime import datetime
 
 @dataclass(frozen=True)
 class Waiting:
-    """One that waits. `sequence` is the order of submission, which no clock can change."""
+    """A waiting experiment. `sequence` is the order of submission, which does not depend on a clock."""
 
     id: str
     sequence: int
@@ -18,6 +18,6 @@ class Waiting:
 
 
 def next_due(waiting: Iterable[Waiting], now: datetime) -> Waiting | None:
-    """The one to be run: the highest priority that is due, then the first submitted; None when none is due."""
+    """The next experiment to run: of those due, the one with the highest priority, then the first submitted."""
     due = [one for one in waiting if one.at is None or one.at <= now]
     return min(due, key=lambda one: (-one.priority, one.sequence), default=None)

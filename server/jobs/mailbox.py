@@ -24,7 +24,7 @@ REQUEST, PROGRESS, CANCEL, RESULT, REPORT, MODEL = (
 
 @dataclass(frozen=True)
 class Reported:
-    """How far a job is, and the process that does it."""
+    """The progress of a job, and the process that computes it."""
 
     fraction: float
     text: str
@@ -61,11 +61,11 @@ class Mailbox:
             return None
 
     def cancel(self) -> None:
-        """The job is to end."""
+        """Asks the job to end."""
         (self.folder / CANCEL).touch()
 
     def reported(self) -> Reported | None:
-        """How far it is; None before it has begun."""
+        """The progress of the job; None before it has begun."""
         data = self.read(PROGRESS)
         return None if data is None else Reported(data["fraction"], data["text"], data["process"])
 

@@ -1,4 +1,4 @@
-"""What jobs find, as clients get it: the data of `--json` of the command, and the signals that a plot needs."""
+"""Results of jobs as clients get them: the data of the command's `--json`, and signals for plots."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class ValidationData(_Part):
 
 
 class ComparisonData(_Part):
-    """Models beside the same traces."""
+    """Models compared on the same traces."""
 
     models: tuple[ModelAgreement, ...]
     signals: tuple[Overlay, ...]
@@ -66,20 +66,20 @@ class ComparisonData(_Part):
 
 
 class TriedEffect(Candidate):
-    """An effect that was tried."""
+    """An effect that the diagnosis tried."""
 
 
 class DiagnosisStep(Step):
-    """One turn of the workflow."""
+    """One step of the workflow."""
 
     candidates: tuple[TriedEffect, ...]
     group: tuple[TriedEffect, ...] = ()
     chance: float
-    """Significance of a cell of `where` that noise alone takes one of all cells beyond, in one record of a hundred."""
+    """Significance that noise alone exceeds in some cell of `where` in one record of a hundred."""
 
 
 class GivenWhere(_Part):
-    """Where the model that was given disagrees; `chance` as of a step."""
+    """Where the given model disagrees with the traces; `chance` as in a step."""
 
     where: Where
     chance: float
@@ -99,7 +99,7 @@ class DiagnosisData(Diagnosis):
 
 
 class FitJobResult(_Part):
-    """Of a fit."""
+    """Result of a fit."""
 
     id: str
     kind: Literal["fit"] = "fit"
@@ -107,7 +107,7 @@ class FitJobResult(_Part):
 
 
 class ValidationJobResult(_Part):
-    """Of a validation."""
+    """Result of a validation."""
 
     id: str
     kind: Literal["validate"] = "validate"
@@ -115,7 +115,7 @@ class ValidationJobResult(_Part):
 
 
 class ComparisonJobResult(_Part):
-    """Of a comparison."""
+    """Result of a comparison."""
 
     id: str
     kind: Literal["compare"] = "compare"
@@ -123,7 +123,7 @@ class ComparisonJobResult(_Part):
 
 
 class DiagnosisJobResult(_Part):
-    """Of a diagnosis."""
+    """Result of a diagnosis."""
 
     id: str
     kind: Literal["diagnose"] = "diagnose"

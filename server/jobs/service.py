@@ -44,8 +44,8 @@ def worker_processes(count: int) -> Executor:
 
 @dataclass(frozen=True)
 class JobContext:
-    """What the desk works with. `changed` is told of every job that has changed; it must not wait. `at_once`: workers
-    of the long lane."""
+    """Stores, services and callbacks of the jobs of one robot. `changed` is called with every job that has changed and
+    must not block. `at_once`: workers of the long lane."""
 
     robot: str
     machine: Machine
@@ -60,7 +60,7 @@ class JobContext:
 
 
 class JobService:
-    """Gives jobs to an executor, and follows them. Safe to use from any thread."""
+    """Hands jobs to executors and follows them. Safe to use from any thread."""
 
     def __init__(self, context: JobContext) -> None:
         self._context = context
@@ -72,11 +72,11 @@ class JobService:
         context.jobs.settle_after_restart(context.robot, context.clock.utc())
 
     def start(self) -> None:
-        """Begins to compute what waits: a job moves nothing."""
+        """Starts to compute waiting jobs; a job moves nothing."""
         self._thread.start()
 
     def submit(self, request: JobRequest, by: str, key: str | None) -> tuple[Job, bool]:
-        """Takes a job in. Raises a 404 for a trace or model that is not there, a 409 for a key used otherwise."""
+        """Queues a job. Raises a 404 for an unknown trace or model, a 409 for a key of another request."""
         context = self._context
         before = context.jobs.made_before(context.robot, request, key)
         if before is not None:  # whatever has become of its traces and models since
@@ -106,7 +106,7 @@ class JobService:
         return job, new
 
     def cancel(self, identity: str, by: str) -> Job:
-        """Takes back what waits; asks what runs to end. Raises a 404, and a 409 for what has ended."""
+        """Cancels a waiting job; asks a running one to end. Raises a 404, and a 409 for one that has ended."""
         context = self._context
         try:
             job = context.jobs.change(
@@ -122,7 +122,7 @@ class JobService:
         return job
 
     def remove(self, identity: str) -> None:
-        """Takes an ended job and its results away; a model that it made stays. Raises a 404, 409."""
+        """Deletes an ended job and its results; a model that it made is kept. Raises a 404, 409."""
         self._context.jobs.remove(self._context.robot, identity)
         shutil.rmtree(self._folder(identity), ignore_errors=True)
 
@@ -138,11 +138,11 @@ class JobService:
         return path
 
     def with_progress(self, job: Job) -> Job:
-        """With its progress while it runs, and with what it waits behind while it waits."""
+        """`job` with its progress while it runs, or with the job that it waits behind."""
         return self.with_progress_all((job,))[0]
 
     def with_progress_all(self, jobs: Iterable[Job]) -> tuple[Job, ...]:
-        """The same for several, with one look at what waits."""
+        """The same for several jobs, with one query of the waiting jobs."""
         jobs = tuple(jobs)
         waiting = self._context.jobs.waiting(self._context.robot) if any(job.state == "queued" for job in jobs) else []
         running = [job for job, _future in list(self._running.values())]
@@ -160,7 +160,7 @@ class JobService:
         return job.model_copy(update={"progress": reported.fraction, "progress_text": reported.text})
 
     def close(self, patience: float) -> None:
-        """Ends what runs: it is interrupted. What waits goes on waiting."""
+        """Interrupts running jobs; waiting jobs stay queued."""
         self._closing = True
         self._wake.set()
         if self._thread.is_alive():
@@ -202,7 +202,7 @@ class JobService:
             self._wake.wait(LOOK_EVERY if self._running or failed else None)
 
     def _begin(self) -> bool:
-        """Gives what waits to the free workers of its lane. Whether anything has begun."""
+        """Hands waiting jobs to free workers of their lanes. True if any has begun."""
         context = self._context
         places = {"short": SHORT_LANE_WORKERS, "long": context.at_once}
         free = {lane: places[lane] - self._at_work(lane) for lane in LANES}
@@ -244,7 +244,7 @@ class JobService:
         return _failed(BrokenExecutor())
 
     def _collect(self) -> bool:
-        """Ends what has been computed. One whose end cannot be written holds up no other. Whether any has ended."""
+        """Records the end of finished jobs; one whose end cannot be written delays no other. True if any has ended."""
         has_ended = False
         for identity, (job, future) in list(self._running.items()):
             if not future.done():
@@ -297,7 +297,7 @@ class JobService:
         return context.models.take_in(path, name or f"{job.request.kind} {identity}", job.submitted_by, identity)
 
     def _tell_waiting(self) -> None:
-        """What they wait behind has changed."""
+        """Publishes waiting jobs anew, since the jobs that they wait behind have changed."""
         for job in self.with_progress_all(self._context.jobs.waiting(self._context.robot)[:MOST_TOLD]):
             self._context.changed(job)
 

@@ -1,1 +1,1 @@
-"""What is happening, to whoever watches: one hub a robot, one queue a client, and a ring of the last minutes."""
+"""Live data for clients: one hub a robot, one outbox a client, and a ring buffer of the last minutes."""

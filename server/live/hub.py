@@ -1,4 +1,4 @@
-"""The hub of one robot: what happens goes in from any thread, and out to every client on the event loop."""
+"""The hub of one robot: takes reports and messages from any thread and sends them to every client on the event loop."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from server.live.outbox import Outbox
 from server.owner.messages import ArmReport, LiveSample, Opened, Report, TeachingText
 
 LOOK_EVERY = 1.0
-"""s between two looks at the status when nothing says that it has changed."""
+"""Longest time (s) between two reads of the status, when nothing has announced a change."""
 MOST_OFTEN = 0.05
-"""s between two looks at most."""
+"""Shortest time (s) between two reads of the status."""
 PROGRESS_EVERY = 0.2
 """s between two messages about progress."""
 log = logging.getLogger("server.live")
@@ -39,13 +39,13 @@ log = logging.getLogger("server.live")
 
 @dataclass(eq=False)
 class Client:
-    """One WebSocket; or an answer that waits for news, which is nobody who `watches`."""
+    """A WebSocket; or a long-polling request, which is not counted as a watcher (`watches` is False)."""
 
     outbox: Outbox
     name: str
     topics: set[Topic] = field(default_factory=set)
     every: int = 1
-    """Every how manieth sample it gets."""
+    """Send every n-th sample."""
     something: asyncio.Event = field(default_factory=asyncio.Event)
     watches: bool = True
 
@@ -60,10 +60,10 @@ class Hub:
         self.history = history
         self.dropped = 0
         self.ending = False
-        """Whether nobody is to wait for news any more: the service ends."""
+        """True once the service is ending: long-polling requests answer at once."""
         self.looking_back = asyncio.Lock()
-        """Held while a client's history is put together: many that join at once have it one after the other, so that
-        the threads that do it take turns with everything else and not with each other."""
+        """Held while a client's history is assembled. Clients that join together get it one after the other, so that
+        this work occupies one thread only."""
         self._clock = clock
         self._status = status
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -81,13 +81,13 @@ class Hub:
         self._watching = self._loop.create_task(self._watch())
 
     def end_waiting(self) -> None:
-        """Whoever waits for news answers now, whatever the state is."""
+        """Makes all long-polling requests answer now."""
         self.ending = True
         for client in self._clients:
             client.something.set()
 
     async def close(self) -> None:
-        """No more messages."""
+        """Stops sending messages."""
         self._loop = None
         if self._watching is not None:
             self._watching.cancel()
@@ -95,20 +95,20 @@ class Hub:
 
     @property
     def clients(self) -> int:
-        """How many watch."""
+        """The number of clients that watch."""
         return sum(client.watches for client in self._clients)
 
     def join(self, client: Client) -> None:
-        """From now on it hears what it has asked for."""
+        """Adds a client, which gets messages of its topics from now on."""
         self._clients.add(client)
 
     def leave(self, client: Client) -> None:
-        """It has gone."""
+        """Removes a client."""
         self._clients.discard(client)
 
     @contextmanager
     def listening(self, topics: set[Topic]) -> Iterator[asyncio.Event]:
-        """An event that is set whenever there is news of these topics: for whoever waits without a WebSocket."""
+        """An event that is set at every message of these topics, for long polling."""
         client = Client(Outbox(self._clock.monotonic()), "waiting", topics, watches=False)
         self.join(client)
         try:
@@ -117,11 +117,11 @@ class Hub:
             self.leave(client)
 
     def shown(self, topics: set[Topic]) -> list[str]:
-        """What clients of these topics see now, encoded."""
+        """The latest message of each of these topics, encoded."""
         return [message for topic, message in self._shown.items() if topic in topics]
 
     def on_report(self, report: Report) -> None:
-        """A report of the robot's owner. Must not wait."""
+        """Handles a report of the process that owns the robot's port. Must not block."""
         now = self._clock.monotonic()
         match report:
             case LiveSample():
@@ -148,11 +148,11 @@ class Hub:
                 self.look()
 
     def publish(self, topic: Topic, message: BaseModel) -> None:
-        """A message to all clients of a topic. Must not wait."""
+        """Sends a message to all clients of a topic. Must not block."""
         self._deliver(topic, message.model_dump_json(), None)
 
     def look(self) -> None:
-        """The status may have changed."""
+        """Schedules a read of the status, which may have changed."""
         self._soon(self._dirty.set)
 
     def _progress(self, report: Progress, now: float) -> None:

@@ -1,4 +1,4 @@
-"""What the parts of the owner share: the robot, its state, who listens, and how all that is told."""
+"""The robot in the process that owns its port: controller, state of the arm, and reports to the service."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class OwnedRobot:
         self.controller.listener = listen
 
     def ended(self) -> str | None:
-        """Why somebody wants the end of what runs; None while nobody does."""
+        """Why the running work is to end; None if it is not."""
         cause = self.guardian.cause
         return None if cause is None else cause.value
 
@@ -62,17 +62,17 @@ class OwnedRobot:
         return ControllerArm(self.controller, self.control, self.machine, self.ended)
 
     def read_gains(self) -> dict[int, Gain]:
-        """Of the machine's joints; remembered for `limp`."""
+        """Reads the gains of the machine's joints, and keeps them for the report of limp joints."""
         count = len(self.machine.joints)
         self.gains = {joint: gain for joint, gain in self.controller.gains().items() if joint <= count}
         return self.gains
 
     def say(self, line: str) -> None:
-        """A line for whoever teaches."""
+        """Reports a line for the operator who teaches."""
         self.speaker.say(TeachingText(text=line))
 
     def tell_arm(self, *, anew: bool = False) -> None:
-        """The arm's state, when it has changed, or nobody has been told for a second; or `anew` in any case."""
+        """Reports the arm's state if it has changed, or once a second; in any case with `anew`."""
         arm, ended = self.control.arm, self.ended()
         # Also before the board has confirmed it:
         stopping = ended is not None and arm.connected and arm.state is not State.FAULT

@@ -1,15 +1,15 @@
-"""Whether an operator says to be there: their word holds for a minute, and is said anew as long as they are."""
+"""Whether an operator has confirmed to be present: a confirmation holds for 60 s and is repeated while they are."""
 
 from __future__ import annotations
 
 from server.clock import Clock
 
 ATTENDANCE = 60.0
-"""s for which an operator's word to be there holds: an assumption."""
+"""Time (s) for which a confirmation of presence holds: an assumption."""
 
 
 class Attendance:
-    """Of one robot. No lock: each method reads or sets one value, and none waits."""
+    """The confirmed presence at one robot. Needs no lock: each method reads or sets a single value."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -18,12 +18,12 @@ class Attendance:
         has been noticed."""
 
     def say(self) -> None:
-        """An operator is there, for a minute more."""
+        """Confirms that an operator is present for the next ATTENDANCE s."""
         self._until = self._clock.elapsed() + ATTENDANCE
 
     @property
     def left(self) -> float:
-        """s for which the word still holds; 0 where it does not."""
+        """Time (s) for which the confirmation still holds; 0 if there is none."""
         until = self._until
         return 0.0 if until is None else max(0.0, until - self._clock.elapsed())
 

@@ -1,4 +1,4 @@
-"""What the queue of one robot works with."""
+"""What the queue of one robot depends on."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from server.store.schedules import ScheduleStore
 
 
 class RecordEvent(Protocol):
-    """Who is told what the queue does."""
+    """Records an event of the queue."""
 
     def __call__(self, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
-        """One thing that happened."""
+        """Records one event."""
         ...
 
 
 @dataclass(frozen=True)
 class QueueContext:
-    """What the queue works with."""
+    """Stores, services and callbacks of one queue."""
 
     robot: Robot
     control: ControlService

@@ -62,7 +62,7 @@ class QueueService:
         self._running: Running | None = None
         self._waiting_for = ""
         self.notices = Notices()
-        """Why the queue is to be held, which nobody has answered for yet. Call `wake` after adding to them."""
+        """Reasons to pause the queue that no operator has acknowledged yet. Call `wake` after adding one."""
         self._written = True
         """Whether the database knows the state."""
         self._ended: Ended | None = None
@@ -82,7 +82,7 @@ class QueueService:
         return self._running
 
     def submit(self, request: ExperimentRequest, by: str, key: str | None) -> tuple[Experiment, bool]:
-        """Takes an experiment in; False where the same key did before. Raises a 409 for a key used otherwise."""
+        """Queues an experiment; False if the same key did so before. Raises a 409 for a key of another request."""
         experiment, new = self._context.experiments.submit(
             self._context.robot.name, request, self._context.clock.utc(), by, key
         )
@@ -92,7 +92,7 @@ class QueueService:
         return experiment, new
 
     def cancel(self, identity: str, by: str) -> Experiment:
-        """Takes back what waits; stops the arm where it runs. Raises a 404, and a 409 for what has ended."""
+        """Cancels an experiment; stops the arm if it runs. Raises a 404, and a 409 for one that has ended."""
         name = self._context.robot.name
         with self._lock:
             running = self._running
@@ -106,15 +106,15 @@ class QueueService:
         return found
 
     def pause(self, reason: str, by: str | None = None) -> None:
-        """Lets no other experiment begin; one that runs goes on."""
+        """Pauses the queue: no further experiment begins, and one that runs goes on."""
         with self._lock:
             held = self._hold(reason, anew=by is not None)
         if held:
             self._context.record_event("queue", f"paused: {reason}", actor=by)
 
     def resume(self, by: str, *, moves_real_arm: bool, seen: Seen | None = None) -> None:
-        """The operator's word that the queue may move the arm, given when there was so much to be `seen`: what came
-        later holds the queue again. Raises a 409 while the arm is stopped or at fault."""
+        """Resumes the queue with the operator's consent that it may move the arm. A notice newer than what the operator
+        had `seen` pauses it again. Raises a 409 while the arm is stopped or at fault."""
         seen = seen or self.notices.seen
         with self._lock:
             self.notices.answer_for(seen)
@@ -132,53 +132,53 @@ class QueueService:
         self.wake()
 
     def attend(self) -> None:
-        """An operator says to be there, for a minute more. No lock: the event loop calls this, and may not wait."""
+        """Confirms that an operator is present for the next 60 s. Takes no lock, since the event loop calls this."""
         self._notice_absence()  # one who comes back too late does not make up for it
         self._attendance.say()
         self.wake()
 
     def on_arm_report(self, arm: ArmReport) -> None:
-        """What the arm's owner says: a stop, a fault or a lost link holds the queue, whatever waits. Must not wait."""
+        """Handles a report of the arm: a stop, a fault or a lost link pauses the queue. Must not block."""
         self.notices.arm_reported(arm)
         self.wake()
 
     def stop_asked(self, name: str) -> None:
-        """At any door: the queue is held whether or not the stop reaches an arm. Must not wait."""
+        """Pauses the queue, whether or not the stop reaches an arm. Must not block."""
         self.notices.stop_asked(name)
         self.wake()
 
     def control_lapsed(self, name: str) -> None:
-        """A client that had the control went silent: the queue is held. Must not wait."""
+        """Pauses the queue, since the client that had control went silent. Must not block."""
         self.notices.control_lapsed(name)
         self.wake()
 
     def control_given_back(self, name: str) -> None:
-        """A client gave the control back: what waits does not begin by that. Must not wait."""
+        """Pauses the queue if experiments wait, so that giving back control starts none of them. Must not block."""
         self.notices.control_given_back(name, self._count_waiting())
         self.wake()
 
     def connection_made(self) -> None:
-        """The robot is connected: what waits does not begin by that. Must not wait."""
+        """Pauses the queue if experiments wait, so that connecting starts none of them. Must not block."""
         self.notices.connection_made(self._count_waiting())
         self.wake()
 
     def connection_ended(self, why: str) -> None:
-        """The robot is not connected any more. The operator's word was for the arm that was there. Must not wait."""
+        """Ends the operator's consent, which was given for the arm that was connected. Must not block."""
         self.notices.connection_ended(why)
         self.wake()
 
     def wake(self) -> None:
-        """Something has changed that may let the next experiment begin."""
+        """Wakes the worker thread, since something has changed that may let the next experiment begin."""
         self._changed.set()  # and nothing else: whoever calls must not wait for a disk
 
     def progressed(self, fraction: float, text: str) -> None:
-        """How far the experiment that runs is."""
+        """Records the progress of the running experiment."""
         running = self._running
         if running is not None:
             running.progress, running.text = fraction, text
 
     def with_progress(self, experiment: Experiment) -> Experiment:
-        """With the progress of the one that runs."""
+        """`experiment` with its progress, if it is running."""
         running = self._running
         if running is None or running.id != experiment.id or experiment.state != "running":
             return experiment
@@ -417,7 +417,7 @@ class QueueService:
                         self._context.robot.tell(HaltRun())
 
     def _as_wished(self, ending: Ending, running: Running | None) -> Ending:
-        """Whose wish a stop was."""
+        """The ending with the reason of a stop: who cancelled the run, or the end of the service."""
         if ending.event is not Event.STOPPED:
             return ending
         if self._closing:

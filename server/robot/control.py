@@ -134,7 +134,7 @@ class ControlService:
             self._queue = None
 
     def status(self) -> Control:
-        """Who has it, without its secret."""
+        """Who has control, without the lease's secret."""
         with self._changed:
             now = self._clock.elapsed()
             if self._queue is not None:
@@ -146,7 +146,7 @@ class ControlService:
             return Control(holder="client", name=self._lease.name, expires=expires, remaining=left)
 
     def close(self) -> None:
-        """Ends the thread."""
+        """Ends the thread that watches the lease."""
         with self._changed:
             self._closing = True
             self._changed.notify_all()

@@ -16,7 +16,7 @@ log = logging.getLogger("server.robot")
 
 
 class Keeper:
-    """A thread that connects. Connecting moves nothing, and begins nothing that was interrupted."""
+    """A thread that keeps a robot connected. Connecting moves nothing and resumes nothing that was interrupted."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -27,26 +27,26 @@ class Keeper:
         robot.disconnected.append(lambda _why: self._wake())
 
     def start(self, *, connect: bool) -> None:
-        """Begins to keep."""
+        """Starts the thread."""
         self._wanted = connect
         self._thread.start()
 
     def connect(self) -> None:
-        """From now on it is to be connected. Raises ReachError when it cannot be reached now; it is tried again."""
+        """Connects, and keeps the robot connected. Raises ReachError when it cannot be reached; the thread retries."""
         with self._changed:
             self._wanted = True
         self._robot.connect(anew=True, wanted=self._is_wanted)
         self._wake()
 
     def disconnect(self) -> bool:
-        """From now on it is to be left alone; what runs is stopped. True when the port is free."""
+        """Disconnects, and stops running work first. True when the port is free."""
         with self._changed:
             self._wanted = False
             self._changed.notify_all()
         return self._robot.disconnect(PATIENCE)
 
     def close(self, patience: float) -> None:
-        """For good."""
+        """Disconnects for good and ends the thread."""
         with self._changed:
             self._wanted, self._closing = False, True
             self._changed.notify_all()

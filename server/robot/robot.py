@@ -1,4 +1,4 @@
-"""One robot: connected or not, what it says, and what it is asked. Safe to use from any thread."""
+"""One robot: its connection, its latest reports, and orders to it. Safe to use from any thread."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class RobotPlace:
-    """Which robot, and where."""
+    """A robot's name, port, machine and folder of traces."""
 
     name: str
     url: str
@@ -61,7 +61,7 @@ class RobotPlace:
 
 @dataclass(frozen=True)
 class Seen:
-    """A report and when it came (s, monotonic)."""
+    """A report and when it arrived (s, monotonic)."""
 
     report: Any
     at: float
@@ -100,7 +100,7 @@ class Robot:
 
     @property
     def machine(self) -> Machine:
-        """With the configuration's limits in it."""
+        """The machine, with the limits of the configuration."""
         return self.place.machine
 
     @property
@@ -130,7 +130,7 @@ class Robot:
 
     @property
     def connection(self) -> ConnectionState:
-        """How it is reached. Waits for nobody: the event loop asks this."""
+        """The state of the connection. Does not block, since the event loop calls this."""
         owner, identity, arm = self._owner, self._identity, self.arm
         if identity is None:
             return "disconnected" if owner is None else "connecting"
@@ -165,7 +165,7 @@ class Robot:
             raise ReachError(f"{self.place.url}: no greeting within {OPEN_WITHIN:g} s") from None
 
     def reach(self) -> Reach:
-        """Where it can be stopped now."""
+        """How the robot can be stopped now."""
         return Reach(self.name, self.place.url, self.owner_pid, self._terminal)
 
     def require_same_place(self) -> None:
@@ -270,7 +270,7 @@ class Robot:
 
 
 def _notify_each(listeners: Iterable[Callable[[T], None]], news: T) -> None:
-    """A fault of one listener is the log's, and no other's."""
+    """Calls all listeners; an error in one is logged and does not affect the others."""
     for listener in listeners:
         try:
             listener(news)

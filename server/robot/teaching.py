@@ -31,7 +31,7 @@ from server.problems import ProblemError, conflict
 from server.robot.robot import ANSWER_WITHIN, Robot
 
 LINES = 50
-"""Lines for whoever teaches that are kept."""
+"""Number of lines for the operator that are kept."""
 LEAD_ENDS_WITHIN = PATIENCE + ANSWER_WITHIN
 """s: the arm may take PATIENCE to come to rest before its gains are given back."""
 IF_A_LEAD_GOES_ON = (
@@ -49,7 +49,7 @@ class Word:
 
 
 class TeachingService:
-    """What a client with the control may have the arm do by hand. Safe to use from any thread.
+    """Teaching by a client that has control. Safe to use from any thread.
 
     notify: called with one line when a teaching has ended
     """
@@ -104,7 +104,7 @@ class TeachingService:
                 raise ProblemError(503, "not-reached", line, IF_A_LEAD_GOES_ON if leading else "stop the robot")
 
     def hold(self) -> None:
-        """Whoever had the control is gone: jogging and leading end in good order, a program by a stop. No waiting."""
+        """Ends teaching as control is gone: jogging and leading in good order, a program by a stop. Never blocks."""
         with self._changed:
             under_way = self._under_way
         if under_way is not None:

@@ -61,7 +61,7 @@ class StopDoor:
             raise StopDoorError(f"stop listener: its process did not listen within {READY_WITHIN:g} s")
 
     def set_owner(self, robot: str, process: int | None, terminal: Terminal | None) -> None:
-        """Which process owns the robot's port from now on."""
+        """Tells the listener which process owns the robot's port from now on."""
         known = None if terminal is None else (terminal.number, terminal.made, terminal.holder)
         told = Owned(robot=robot, process=process, terminal=known)
         with self._lock:
@@ -69,7 +69,7 @@ class StopDoor:
             self._send(told)
 
     def set_tokens(self, callers: Mapping[str, Caller]) -> None:
-        """The tokens as the service has read them, by digest: a process that comes after begins with them."""
+        """Passes on the tokens that the service has read, by digest; also to a process that is started again later."""
         tokens = {digest: (caller.name, caller.role) for digest, caller in callers.items()}
         with self._lock:
             self._begin = self._begin.model_copy(update={"tokens": tokens})

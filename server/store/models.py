@@ -104,9 +104,9 @@ class ModelStore:
         """Takes it away; returns the name of its file. Raises a 404, and a 409 when another model comes from it."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
-            child = session.scalar(select(ModelRow.id).filter_by(parent=identity))
+            child = session.scalar(select(ModelRow.name).filter_by(parent=identity))
             if child is not None:
-                raise conflict("model-in-use", f"model {child} was made from {identity}", "delete that one first")
+                raise conflict("model-in-use", f"model {child!r} was made from {row.name!r}", "delete that one first")
             for use in session.scalars(select(TraceUseRow).filter_by(used_by=f"model {identity}")):
                 session.delete(use)
             session.delete(row)

@@ -14,8 +14,8 @@ import httpx
 import pytest
 from sqlalchemy.exc import OperationalError
 
+from server.api import upload
 from server.bounded.messages import UploadedTrace
-from server.catalogue import upload
 from server.catalogue.catalogue import Catalogue
 from server.services import RobotServices, Services
 from server.store.events import EventStore

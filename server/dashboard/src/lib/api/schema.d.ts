@@ -13,7 +13,7 @@ export interface paths {
         };
         /**
          * List Robots
-         * @description The robots of this service.
+         * @description Lists the robots of this service.
          */
         get: operations["list_robots"];
         put?: never;
@@ -33,7 +33,7 @@ export interface paths {
         };
         /**
          * Get Robot
-         * @description Everything about one robot now; every value says how old it is.
+         * @description Returns the status of one robot, with the age of its values.
          */
         get: operations["get_robot"];
         put?: never;
@@ -53,7 +53,7 @@ export interface paths {
         };
         /**
          * Get Machine
-         * @description The machine file with this configuration's limits: geometry, drives, sensors, limits.
+         * @description Returns the machine file (geometry, drives, sensors) with the limits of this configuration.
          */
         get: operations["get_machine"];
         put?: never;
@@ -75,7 +75,7 @@ export interface paths {
         put?: never;
         /**
          * Connect Robot
-         * @description Connects, and keeps it connected. Moves nothing. 409 when another program has the port.
+         * @description Connects the robot and keeps it connected. Moves nothing. 409 if another program has the port.
          */
         post: operations["connect_robot"];
         delete?: never;
@@ -95,7 +95,7 @@ export interface paths {
         put?: never;
         /**
          * Disconnect Robot
-         * @description Gives the port back to other programs. Refused while somebody else has the control.
+         * @description Disconnects, so that other programs can use the port. Refused while somebody else has control.
          */
         post: operations["disconnect_robot"];
         delete?: never;
@@ -115,9 +115,9 @@ export interface paths {
         put?: never;
         /**
          * Stop Robot
-         * @description Freezes the arm at its measured posture, at once. Anybody who may see the robot may stop it; nothing is asked.
+         * @description Freezes the arm at its measured posture at once. Anybody who may see the robot may stop it, without control.
          *
-         *     Anything but `confirmed`: use the emergency stop. The freeze is ended by a reset alone.
+         *     Unless the answer is `confirmed`, use the emergency stop. Only a reset ends the freeze.
          */
         post: operations["stop_robot"];
         delete?: never;
@@ -137,7 +137,7 @@ export interface paths {
         put?: never;
         /**
          * Reset Robot
-         * @description Ends a stop or a fault. Nothing moves; the queue stays paused until it is resumed.
+         * @description Resets the arm after a stop or a fault. Nothing moves; the queue stays paused until it is resumed.
          */
         post: operations["reset_robot"];
         delete?: never;
@@ -155,7 +155,7 @@ export interface paths {
         };
         /**
          * List Events
-         * @description What happened, and who asked for it; the newest first.
+         * @description Lists events and who caused them, the newest first.
          */
         get: operations["list_events"];
         put?: never;
@@ -175,12 +175,12 @@ export interface paths {
         };
         /**
          * Get Gains
-         * @description P, I, D of every joint as the controller has them now.
+         * @description The gains P, I and D of every joint, read from the controller.
          */
         get: operations["get_gains"];
         /**
          * Set Gains
-         * @description Writes gains of the joints named and reads all back. Refused for a joint off its set point, which would jump.
+         * @description Writes gains of the named joints and reads all back. Refused for a joint off its set point, which would jump.
          */
         put: operations["set_gains"];
         post?: never;
@@ -199,7 +199,7 @@ export interface paths {
         };
         /**
          * Get Process
-         * @description Process inputs and outputs, and the gripper.
+         * @description The process inputs and outputs, and the gripper.
          */
         get: operations["get_process"];
         put?: never;
@@ -220,7 +220,7 @@ export interface paths {
         get?: never;
         /**
          * Set Output
-         * @description Switches one process output, 0 to 7. A stopped arm's is not switched, unless `while_stopped`.
+         * @description Switches one process output, 0 to 7. Refused while the arm is stopped, unless `while_stopped` is set.
          */
         put: operations["set_output"];
         post?: never;
@@ -240,7 +240,7 @@ export interface paths {
         get?: never;
         /**
          * Set Gripper
-         * @description Closes or opens the gripper. A stopped arm's is not moved, unless `while_stopped`: a stop lets it hold.
+         * @description Closes or opens the gripper. Refused while the arm is stopped, unless `while_stopped` is set.
          */
         put: operations["set_gripper"];
         post?: never;
@@ -259,7 +259,7 @@ export interface paths {
         };
         /**
          * Get Teaching
-         * @description What is being taught now, and how the last one ended.
+         * @description Returns the teaching activity under way, and how the last one ended.
          */
         get: operations["get_teaching"];
         put?: never;
@@ -281,7 +281,7 @@ export interface paths {
         put?: never;
         /**
          * Jog Robot
-         * @description Drives joints for 0.3 s at most: whoever holds the key repeats this, ten times a second or so.
+         * @description Drives joints for at most 0.3 s. While a key is held, the client repeats this about ten times a second.
          */
         post: operations["jog_robot"];
         delete?: never;
@@ -301,7 +301,7 @@ export interface paths {
         put?: never;
         /**
          * Step Robot
-         * @description Begins one step, all joints arriving together. Checked before it moves; GET …/teaching tells its end.
+         * @description Starts one step, in which all joints arrive together. It is checked first; GET …/teaching reports its end.
          */
         post: operations["step_robot"];
         delete?: never;
@@ -321,7 +321,7 @@ export interface paths {
         put?: never;
         /**
          * Run Program
-         * @description Begins a taught program: steps, paths, waits, process signals. Checked from end to end before it moves.
+         * @description Starts a taught program of steps, paths, waits and process signals. All of it is checked before it moves.
          */
         post: operations["run_program"];
         delete?: never;
@@ -341,7 +341,7 @@ export interface paths {
         put?: never;
         /**
          * Lead Robot
-         * @description Begins to record a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive and sink.
+         * @description Starts recording a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive and sink.
          */
         post: operations["lead_robot"];
         delete?: never;
@@ -361,7 +361,7 @@ export interface paths {
         put?: never;
         /**
          * Finish Teaching
-         * @description Ends jogging, or leading: its path is in the answer.
+         * @description Ends jogging or leading; the answer holds the recorded path.
          */
         post: operations["finish_teaching"];
         delete?: never;
@@ -381,9 +381,9 @@ export interface paths {
         put?: never;
         /**
          * Calibrate Gain
-         * @description Queues the experiment that shows the actual proportional gain; GET …/traces/{trace}/gain tells it afterwards.
+         * @description Queues the experiment that measures the actual proportional gain. GET …/traces/{trace}/gain then returns it.
          *
-         *     It is checked as any other, and the same Idempotency-Key gives the same experiment (200).
+         *     It is checked like any experiment; the same Idempotency-Key returns the same experiment (200).
          */
         post: operations["calibrate_gain"];
         delete?: never;
@@ -401,7 +401,7 @@ export interface paths {
         };
         /**
          * Get Measured Gain
-         * @description The actual proportional gains that a trace shows.
+         * @description Returns the actual proportional gains measured from a trace.
          */
         get: operations["get_measured_gain"];
         put?: never;
@@ -421,7 +421,7 @@ export interface paths {
         };
         /**
          * List Programs
-         * @description Programs that are kept, the one changed last first.
+         * @description Lists the stored programs, the last changed first.
          */
         get: operations["list_programs"];
         put?: never;
@@ -441,15 +441,15 @@ export interface paths {
         };
         /**
          * Get Program
-         * @description One program, with the revision that a change of it names.
+         * @description Returns one program with its revision, which a change has to name.
          */
         get: operations["get_program"];
         /**
          * Put Program
-         * @description Keeps a program, or a change of it: `revision` is the one that was changed. Moves nothing, and needs no control.
+         * @description Stores a program, or a change to its `revision`. Moves nothing and needs no control.
          *
-         *     A body with another name than the address renames it. What somebody else has changed meanwhile is not overwritten:
-         *     409.
+         *     A body with another name than the address renames the program. A program that somebody else has changed meanwhile
+         *     is not overwritten (409).
          */
         put: operations["put_program"];
         post?: never;
@@ -474,7 +474,7 @@ export interface paths {
         put?: never;
         /**
          * Run Stored Program
-         * @description Carries out a kept program, as POST …/teaching/program does with one that is sent.
+         * @description Runs a stored program, as POST …/teaching/program runs one that is sent.
          */
         post: operations["run_stored_program"];
         delete?: never;
@@ -492,15 +492,15 @@ export interface paths {
         };
         /**
          * List Experiments
-         * @description Experiments, those submitted last first, or those that ended last.
+         * @description Lists experiments, the last submitted or the last ended first.
          */
         get: operations["list_experiments"];
         put?: never;
         /**
          * Submit Experiment
-         * @description Puts an experiment into the queue. It is checked now, and again when it is run: 422 names what is wrong.
+         * @description Puts an experiment into the queue. It is checked now and again when it runs; a 422 names what is wrong.
          *
-         *     The same Idempotency-Key gives the same experiment (200), and never a second one.
+         *     The same Idempotency-Key returns the same experiment (200) and never queues a second one.
          */
         post: operations["submit_experiment"];
         delete?: never;
@@ -520,7 +520,7 @@ export interface paths {
         put?: never;
         /**
          * Preview Experiment
-         * @description The motion of an experiment and everything that speaks against it. Nothing is queued, nothing moves.
+         * @description Plans an experiment and returns its motion and all violations of limits. Nothing is queued, nothing moves.
          */
         post: operations["preview_experiment"];
         delete?: never;
@@ -538,7 +538,7 @@ export interface paths {
         };
         /**
          * Get Experiment
-         * @description One experiment: its state, how far it is, what became of it. With `wait` the answer comes when it has ended.
+         * @description Returns one experiment with its state, progress and outcome. With `wait`, answers when it has ended.
          */
         get: operations["get_experiment"];
         put?: never;
@@ -548,7 +548,7 @@ export interface paths {
         head?: never;
         /**
          * Change Experiment
-         * @description A new priority of one that still waits.
+         * @description Changes the priority of an experiment that still waits.
          */
         patch: operations["change_experiment"];
         trace?: never;
@@ -564,7 +564,7 @@ export interface paths {
         put?: never;
         /**
          * Cancel Experiment
-         * @description Takes back what waits. One that runs is stopped as by a stop: the arm is frozen and needs a reset.
+         * @description Cancels an experiment. One that runs is ended by a stop: the arm is frozen and needs a reset.
          */
         post: operations["cancel_experiment"];
         delete?: never;
@@ -582,7 +582,7 @@ export interface paths {
         };
         /**
          * List Presets
-         * @description Experiments that have a name, for the joints that this robot has: to be run as they are, or to begin from.
+         * @description Lists the named experiments for the joints of this robot: to run as they are, or to start from.
          */
         get: operations["list_presets"];
         put?: never;
@@ -602,7 +602,7 @@ export interface paths {
         };
         /**
          * Get Spec Schema
-         * @description JSON Schema of `ExperimentSpec`: fields, defaults and bounds, for forms and editors.
+         * @description Returns the JSON Schema of `ExperimentSpec`, for forms and editors.
          */
         get: operations["get_spec_schema"];
         put?: never;
@@ -622,7 +622,7 @@ export interface paths {
         };
         /**
          * Get Queue
-         * @description Whether experiments are taken from the queue, and if not, why.
+         * @description Returns whether the queue runs experiments, and if not, why.
          */
         get: operations["get_queue"];
         put?: never;
@@ -642,7 +642,7 @@ export interface paths {
         };
         /**
          * List Queue
-         * @description What waits, in the order in which it will be run.
+         * @description Lists the waiting experiments in the order in which they will run.
          */
         get: operations["list_queue"];
         put?: never;
@@ -664,7 +664,7 @@ export interface paths {
         put?: never;
         /**
          * Pause Queue
-         * @description Lets no other experiment begin; one that runs goes on.
+         * @description Pauses the queue: no further experiment begins, and one that runs goes on.
          */
         post: operations["pause_queue"];
         delete?: never;
@@ -684,7 +684,7 @@ export interface paths {
         put?: never;
         /**
          * Resume Queue
-         * @description The operator's word that the queue may move the robot. A real arm needs `moves_real_arm`.
+         * @description Resumes the queue: the operator's consent that it may move the robot. A real arm needs `moves_real_arm`.
          */
         post: operations["resume_queue"];
         delete?: never;
@@ -704,7 +704,7 @@ export interface paths {
         put?: never;
         /**
          * Attend Queue
-         * @description An operator says to be there, for a minute more: a real arm that may not run unattended needs it.
+         * @description Confirms that an operator is present for the next 60 s, which a real arm needs unless it may run unattended.
          */
         post: operations["attend_queue"];
         delete?: never;
@@ -722,13 +722,13 @@ export interface paths {
         };
         /**
          * List Schedules
-         * @description Schedules, the newest first.
+         * @description Lists schedules, the newest first.
          */
         get: operations["list_schedules"];
         put?: never;
         /**
          * Create Schedule
-         * @description An experiment to be run every so often. It is checked now, and again before every run.
+         * @description Creates a schedule that submits an experiment periodically. It is checked now and before every run.
          */
         post: operations["create_schedule"];
         delete?: never;
@@ -746,14 +746,14 @@ export interface paths {
         };
         /**
          * Get Schedule
-         * @description One schedule.
+         * @description Returns one schedule.
          */
         get: operations["get_schedule"];
         put?: never;
         post?: never;
         /**
          * Delete Schedule
-         * @description Takes a schedule away; the experiments that it submitted stay.
+         * @description Deletes a schedule. The experiments that it has submitted are kept.
          */
         delete: operations["delete_schedule"];
         options?: never;
@@ -774,24 +774,24 @@ export interface paths {
         };
         /**
          * Get Control
-         * @description Who may move the robot now.
+         * @description Returns who may move the robot now.
          */
         get: operations["get_control"];
         /**
          * Renew Control
-         * @description The heartbeat of the client that has the control.
+         * @description Renews the control: the heartbeat of the client that has it.
          */
         put: operations["renew_control"];
         /**
          * Take Control
-         * @description The control of the robot, for one client. It lapses without a heartbeat: the arm holds, the queue is paused.
+         * @description Gives one client control of the robot. Without heartbeats it lapses: the arm holds and the queue is paused.
          */
         post: operations["take_control"];
         /**
          * Give Control Back
-         * @description Gives the control back; what this client was moving holds. A program that still runs is stopped.
+         * @description Gives the control back. The arm holds its posture; a program that still runs is stopped.
          *
-         *     Where experiments wait the queue is paused by it: what waits begins when somebody resumes the queue.
+         *     If experiments are waiting, the queue is paused until somebody resumes it.
          */
         delete: operations["give_control_back"];
         options?: never;
@@ -808,13 +808,13 @@ export interface paths {
         };
         /**
          * List Traces
-         * @description Traces, the newest first.
+         * @description Lists traces, the newest first.
          */
         get: operations["list_traces"];
         put?: never;
         /**
          * Upload Trace
-         * @description Takes in a trace from elsewhere: MCAP of this project (application/octet-stream) or plain CSV (text/csv).
+         * @description Imports a trace: MCAP of this project (application/octet-stream) or plain CSV (text/csv).
          */
         post: operations["upload_trace"];
         delete?: never;
@@ -832,21 +832,21 @@ export interface paths {
         };
         /**
          * Get Trace
-         * @description What one trace says about itself, its figures and events.
+         * @description Returns one trace's record, figures and events.
          */
         get: operations["get_trace"];
         put?: never;
         post?: never;
         /**
          * Delete Trace
-         * @description Deletes a trace for good. Refused while a model or a job refers to it.
+         * @description Deletes a trace for good. Refused while a model or a job uses it.
          */
         delete: operations["delete_trace"];
         options?: never;
         head?: never;
         /**
          * Change Trace
-         * @description New tags or notes. They are the catalogue's: the file stays as it was recorded.
+         * @description Changes the tags or the notes, which the catalogue keeps: the file stays as it was recorded.
          */
         patch: operations["change_trace"];
         trace?: never;
@@ -860,7 +860,7 @@ export interface paths {
         };
         /**
          * Download Trace
-         * @description The file as it was recorded; opens in Foxglove.
+         * @description Downloads the MCAP file as it was recorded; it opens in Foxglove.
          */
         get: operations["download_trace"];
         put?: never;
@@ -880,7 +880,7 @@ export interface paths {
         };
         /**
          * Download Trace As Csv
-         * @description Time and signals as plain CSV, in s, rad and V.
+         * @description Downloads time and signals as plain CSV, in s, rad and V.
          */
         get: operations["download_trace_as_csv"];
         put?: never;
@@ -900,7 +900,7 @@ export interface paths {
         };
         /**
          * Get Trace Signals
-         * @description Signals for a plot, thinned to about `points` between `start` and `end`; no peak is lost.
+         * @description Returns signals for a plot, thinned to about `points` between `start` and `end` so that no peak is lost.
          */
         get: operations["get_trace_signals"];
         put?: never;
@@ -920,15 +920,15 @@ export interface paths {
         };
         /**
          * List Jobs
-         * @description Jobs, the newest first; with `model` those that were given that model, and the one that made it.
+         * @description Lists jobs, the newest first. `model` selects the jobs that used a model and the job that made it.
          */
         get: operations["list_jobs"];
         put?: never;
         /**
          * Submit Job
-         * @description Begins a computation as soon as a worker is free. The same Idempotency-Key gives the same job (200).
+         * @description Queues a computation, which begins when a worker is free. The same Idempotency-Key returns the same job (200).
          *
-         *     Comparisons and validations of few traces have a worker of their own: they wait behind no fit and no diagnosis.
+         *     Comparisons and validations of few traces have a worker of their own, so they never wait for a fit or a diagnosis.
          */
         post: operations["submit_job"];
         delete?: never;
@@ -946,14 +946,14 @@ export interface paths {
         };
         /**
          * Get Job
-         * @description One job: its state, how far it is, what became of it. With `wait` the answer comes when it has ended.
+         * @description Returns one job with its state, progress and outcome. With `wait`, answers when it has ended.
          */
         get: operations["get_job"];
         put?: never;
         post?: never;
         /**
          * Delete Job
-         * @description Takes an ended job and its result away; a model that it made stays.
+         * @description Deletes an ended job and its result. A model that it made is kept.
          */
         delete: operations["delete_job"];
         options?: never;
@@ -972,7 +972,7 @@ export interface paths {
         put?: never;
         /**
          * Cancel Job
-         * @description Takes back what waits, and asks what runs to end, which it does within a second or so.
+         * @description Cancels a job. One that runs ends within about a second.
          */
         post: operations["cancel_job"];
         delete?: never;
@@ -990,7 +990,7 @@ export interface paths {
         };
         /**
          * Get Job Result
-         * @description What a job found: as `--json` of its command, with the signals that a plot needs.
+         * @description Returns the result of a job: the data of its command's `--json`, and signals for plots.
          */
         get: operations["get_job_result"];
         put?: never;
@@ -1010,7 +1010,7 @@ export interface paths {
         };
         /**
          * Get Job Report
-         * @description The job's report: one page that stands by itself.
+         * @description Returns the report of a job as a self-contained HTML page.
          */
         get: operations["get_job_report"];
         put?: never;
@@ -1030,13 +1030,13 @@ export interface paths {
         };
         /**
          * List Models
-         * @description Models, the newest first.
+         * @description Lists models, the newest first.
          */
         get: operations["list_models"];
         put?: never;
         /**
          * Upload Model
-         * @description Takes in a model from elsewhere: a file as `daq fit` writes it. Effects of a user's own are refused.
+         * @description Imports a model file as written by `daq fit`. Models with user-defined effects are refused.
          */
         post: operations["upload_model"];
         delete?: never;
@@ -1054,7 +1054,7 @@ export interface paths {
         };
         /**
          * List Machine Parameters
-         * @description Parameters of the model that the machine file describes: `machine` in requests.
+         * @description Lists the parameters of the machine file's model, which requests call `machine`.
          */
         get: operations["list_machine_parameters"];
         put?: never;
@@ -1074,7 +1074,7 @@ export interface paths {
         };
         /**
          * Get Lineage
-         * @description Where the models come from, and the jobs between them; of very many the newest.
+         * @description Returns the models and the jobs that made or used them; at most the newest 500 of each.
          */
         get: operations["get_lineage"];
         put?: never;
@@ -1094,7 +1094,7 @@ export interface paths {
         };
         /**
          * List Effects
-         * @description Effects that a fit may add and a diagnosis looks for, family by family.
+         * @description Lists the effects that a fit may add and a diagnosis considers, grouped by family.
          */
         get: operations["list_effects"];
         put?: never;
@@ -1114,21 +1114,21 @@ export interface paths {
         };
         /**
          * Get Model
-         * @description One model: its effects, its parameters, the models that it comes from.
+         * @description Returns one model with its effects, its parameters and its ancestors.
          */
         get: operations["get_model"];
         put?: never;
         post?: never;
         /**
          * Delete Model
-         * @description Deletes a model for good. Refused while another model comes from it.
+         * @description Deletes a model for good. Refused while another model was made from it.
          */
         delete: operations["delete_model"];
         options?: never;
         head?: never;
         /**
          * Change Model
-         * @description A new name or notes.
+         * @description Changes the name or the notes of a model.
          */
         patch: operations["change_model"];
         trace?: never;
@@ -1142,7 +1142,7 @@ export interface paths {
         };
         /**
          * Download Model
-         * @description The model's file, for `daq validate` and the like.
+         * @description Downloads the model file, for example for `daq validate`.
          */
         get: operations["download_model"];
         put?: never;
@@ -1162,7 +1162,7 @@ export interface paths {
         };
         /**
          * Get Live Frame
-         * @description What the WebSocket would send a client that joins now: for a look without one.
+         * @description Returns what the WebSocket would send to a client that joins now.
          */
         get: operations["get_live_frame"];
         put?: never;
@@ -1184,7 +1184,7 @@ export interface paths {
         put?: never;
         /**
          * Create Ticket
-         * @description A ticket for one WebSocket (`?ticket=…`): browsers cannot send a token with it.
+         * @description Issues a ticket for one WebSocket (`?ticket=…`), since browsers cannot send a token with it.
          */
         post: operations["create_ticket"];
         delete?: never;
@@ -1202,7 +1202,7 @@ export interface paths {
         };
         /**
          * Get Me
-         * @description Who the service takes the caller for.
+         * @description Returns the name and the role of the caller.
          */
         get: operations["get_me"];
         put?: never;
@@ -1222,7 +1222,7 @@ export interface paths {
         };
         /**
          * Get System
-         * @description The service: version, storage, watchers.
+         * @description Returns version, uptime, storage and live clients of the service.
          */
         get: operations["get_system"];
         put?: never;
@@ -1242,7 +1242,7 @@ export interface paths {
         };
         /**
          * Healthz
-         * @description 200 while the service answers.
+         * @description Answers 200 while the service runs.
          */
         get: operations["healthz"];
         put?: never;
@@ -1262,9 +1262,9 @@ export interface paths {
         };
         /**
          * Readyz
-         * @description 200 while experiments can be taken: database and traces' folder can be written. A robot need not be there.
+         * @description Answers 200 while database and traces' folder can be written; a robot need not be connected.
          *
-         *     What is wrong is told to whoever may see the robot. The answer is up to a second old.
+         *     Callers who may see the robot get the details. The answer is up to a second old.
          */
         get: operations["readyz"];
         put?: never;
@@ -1284,7 +1284,7 @@ export interface paths {
         };
         /**
          * Metrics
-         * @description For Prometheus.
+         * @description Returns the metrics in the format of Prometheus.
          */
         get: operations["metrics"];
         put?: never;
@@ -1505,7 +1505,7 @@ export interface components {
         };
         /**
          * ComparisonData
-         * @description Models beside the same traces.
+         * @description Models compared on the same traces.
          */
         ComparisonData: {
             /** Models */
@@ -1517,7 +1517,7 @@ export interface components {
         };
         /**
          * ComparisonJobResult
-         * @description Of a comparison.
+         * @description Result of a comparison.
          */
         ComparisonJobResult: {
             /** Id */
@@ -1836,7 +1836,7 @@ export interface components {
         };
         /**
          * DiagnosisJobResult
-         * @description Of a diagnosis.
+         * @description Result of a diagnosis.
          */
         DiagnosisJobResult: {
             /** Id */
@@ -1850,7 +1850,7 @@ export interface components {
         };
         /**
          * DiagnosisStep
-         * @description One turn of the workflow.
+         * @description One step of the workflow.
          */
         DiagnosisStep: {
             /** Effect */
@@ -2242,7 +2242,7 @@ export interface components {
         };
         /**
          * FitJobResult
-         * @description Of a fit.
+         * @description Result of a fit.
          */
         FitJobResult: {
             /** Id */
@@ -2518,7 +2518,7 @@ export interface components {
         };
         /**
          * GivenWhere
-         * @description Where the model that was given disagrees; `chance` as of a step.
+         * @description Where the given model disagrees with the traces; `chance` as in a step.
          */
         GivenWhere: {
             where: components["schemas"]["Where"];
@@ -5008,7 +5008,7 @@ export interface components {
         };
         /**
          * TriedEffect
-         * @description An effect that was tried.
+         * @description An effect that the diagnosis tried.
          */
         TriedEffect: {
             /** Effect */
@@ -5070,7 +5070,7 @@ export interface components {
         };
         /**
          * ValidationJobResult
-         * @description Of a validation.
+         * @description Result of a validation.
          */
         ValidationJobResult: {
             /** Id */
@@ -5355,7 +5355,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description What became of it: read `confirmed` */
+            /** @description The outcome of the stop: read `confirmed` */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -5845,7 +5845,7 @@ export interface operations {
     put_program: {
         parameters: {
             query?: {
-                /** @description The revision that you changed. Leave it out for a new program. */
+                /** @description The revision that was changed. Omit it for a new program. */
                 revision?: number | null;
             };
             header?: never;
@@ -5928,10 +5928,10 @@ export interface operations {
     list_experiments: {
         parameters: {
             query?: {
-                /** @description Only those in one of these states. */
+                /** @description Only experiments in one of these states. */
                 state?: ("queued" | "running" | "done" | "failed" | "cancelled" | "interrupted")[] | null;
                 schedule?: string | null;
-                /** @description By `ended`: only those that have ended. */
+                /** @description `ended` lists only those that have ended. */
                 order?: "submitted" | "ended";
                 /** @description Length of this part of the list. */
                 limit?: number;
@@ -6027,7 +6027,7 @@ export interface operations {
     get_experiment: {
         parameters: {
             query?: {
-                /** @description s for which the answer may wait for the end; 0 answers at once. */
+                /** @description Longest time (s) to wait for the end; 0 answers at once. */
                 wait?: number;
             };
             header?: never;
@@ -6502,7 +6502,7 @@ export interface operations {
     list_traces: {
         parameters: {
             query?: {
-                /** @description Looked for in number, file, name, kind, operator, notes and tags. */
+                /** @description Text to find in number, file, name, kind, operator, notes or tags. */
                 q?: string | null;
                 tag?: string | null;
                 source?: ("mock" | "real" | "imported") | null;
@@ -6688,7 +6688,7 @@ export interface operations {
     get_trace_signals: {
         parameters: {
             query?: {
-                /** @description About how many points the plot has. */
+                /** @description Approximate number of points. */
                 points?: number;
                 /** @description s from the start of the record. */
                 start?: number | null;
@@ -6789,7 +6789,7 @@ export interface operations {
     get_job: {
         parameters: {
             query?: {
-                /** @description s for which the answer may wait for the end; 0 answers at once. */
+                /** @description Longest time (s) to wait for the end; 0 answers at once. */
                 wait?: number;
             };
             header?: never;

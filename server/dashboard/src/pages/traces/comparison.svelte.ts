@@ -32,6 +32,7 @@ export class Comparison {
 
   /** Follows the address: for an effect. */
   follow(): void {
+    if (router.route.page !== 'traces') return; // the page is about to be left
     const ids = (router.route.rest[0] ?? '').split(',').filter((id) => id !== '');
     untrack(() => {
       const before = this.traces;
