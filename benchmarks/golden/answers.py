@@ -28,7 +28,7 @@ def leaves(answer: Any, path: str = "") -> Iterator[tuple[str, Leaf]]:
         for number, value in enumerate(answer):
             yield from leaves(value, f"{path}[{number}]")
     elif isinstance(answer, str):
-        # Whatever has a space in it is prose: it may be put in better words.
+        # Text with a space is prose, whose wording may change.
         if " " not in answer:
             yield path, RANDOM.sub("*", answer)
     else:
@@ -59,5 +59,5 @@ def differences(recorded: dict[str, Leaf], found: dict[str, Leaf]) -> list[str]:
 
 
 def _same(one: Leaf, other: Leaf) -> bool:
-    """To the digit; not-a-number is the same as itself, and 1 is not the same as 1.0 or true."""
+    """Whether two values agree to the digit; NaN equals itself, and 1 differs from 1.0 and from true."""
     return repr(one) == repr(other)

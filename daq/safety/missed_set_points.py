@@ -10,19 +10,20 @@ from daq.safety.findings import NOTHING, Finding, Verdict, Watched
 from firmware_protocol.commands import StatusFlag
 
 LONGEST_RUN = 10
-"""Control periods in a row without a set point taken that are still borne: an assumption, 0.2 s."""
+"""Most control periods in a row in which the controller may miss its set points: an assumption, 0.2 s."""
 
 
 @dataclass
 class MissedSetPoints:
-    """Counts them. One is harmless, set points being absolute; a run of them means an arm that is not under control."""
+    """Counts missed set points. One is harmless, since set points are absolute; a run of them means a loss of
+    control."""
 
     watched: Watched
     missed: int = 0
     run: int = 0
 
     def check(self, row: SampleRow, expected: Mapping[int, int] | None) -> Verdict:
-        """`expected` are the postures (by joint) that this period should have taken; None when nobody can say."""
+        """`expected` are the postures (by joint) that this period should have taken; None when unknown."""
         line = self._difference(row, expected or {})
         if row.status & StatusFlag.SET_POINT_MISSED.value:
             line = line or f"tick {row.tick}: the controller wanted the memory while the host had it"

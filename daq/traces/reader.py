@@ -22,7 +22,7 @@ TOO_LARGE = "does not fit into the memory that is free here"
 
 
 def read_trace(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
-    """The trace in a file. The outcome of one that was never closed (`.mcap.part`) is None: nobody knows it yet.
+    """The trace in a file. The outcome of one that was never closed (`.mcap.part`) is unknown: None.
 
     Raises TraceError with one line when the file cannot be read, is no MCAP file, is damaged, exceeds a limit, is not
     a trace of this project, or was made by a newer version of it.
@@ -52,7 +52,7 @@ def _decoded(path: Path, limits: TraceLimits) -> Trace:
         data = disk.read_at_most(stream, limits.file_bytes, str(path))
     found = scan(data, str(path), limits)
     if path.name.endswith(layout.PART_SUFFIX):
-        # Even where only its name is missing: who wrote it did not live to say that all of it was written.
+        # Even where only the final name is missing: the writer never confirmed that everything was written.
         found.metadata.pop(layout.END_METADATA, None)
     elif found.damage:
         raise TraceError(f"{path}: is damaged after byte {found.good_bytes} of {len(data)}: {found.damage}")

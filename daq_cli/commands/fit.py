@@ -99,7 +99,7 @@ def fit(
     from model.comparison.compare import compare
     from model.fitting.fit import fit as run_fit
     from model.fitting.options import FitOptions
-    from model.simulation.simulate import Options
+    from model.simulation.prepared import Options
 
     if torques and (method != "least_squares" or starts > 1 or seed or open_loop):
         raise SpecError("--torques: --method, --starts, --seed and --open-loop are of a fit of motion; leave them out")

@@ -70,7 +70,7 @@ def sensitivity(
     """
     from daq_cli.app.progress import shown_progress
     from model.analysis.sensitivity import sensitivity_curves
-    from model.simulation.simulate import Options
+    from model.simulation.prepared import Options
     from model.validation.names import names_to_validate
 
     load_effects(effect_file)

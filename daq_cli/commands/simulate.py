@@ -28,7 +28,7 @@ from daq_cli.robot.access import robot_of
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
     from model.machine_model.model import Model
-    from model.simulation.simulate import Options
+    from model.simulation.prepared import Options
 
 app = typer.Typer(add_completion=False)
 
@@ -62,7 +62,7 @@ def simulate(
     from daq_cli.app.progress import shown_progress
     from daq_cli.models.agreement_table import agreement_data, print_agreement
     from model.comparison.compare import compare
-    from model.simulation.simulate import Options
+    from model.simulation.prepared import Options
 
     load_effects(effect_file)
     found = read_traces(robot_of(context), folder, traces)

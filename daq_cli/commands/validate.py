@@ -56,7 +56,7 @@ def validate(
     The time-domain form shows how every parameter would have to vary with time, and with what that correlates.
     """
     from daq_cli.app.progress import shown_progress
-    from model.simulation.simulate import Options
+    from model.simulation.prepared import Options
     from model.validation.conventions import in_convention
     from model.validation.fidelity import validate_by_distortion
     from model.validation.names import names_to_validate

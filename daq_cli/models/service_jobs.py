@@ -42,8 +42,6 @@ MOST_STARTS = 20
 MOST_MODELS = 10
 """Most models that a job compares."""
 KINDS: dict[JobKind, str] = {"fit": "fit", "validate": "validation", "compare": "comparison", "diagnose": "diagnosis"}
-PROGRAM_FAULT = "program fault"
-"""What the reason of a job begins with that failed by a fault of the program."""
 EXIT_CODES = {
     "failed": exit_codes.WRONG_INPUT,
     "cancelled": exit_codes.INTERRUPTED,
@@ -56,7 +54,7 @@ class JobEndedError(DaqError):
 
     def __init__(self, job: Job) -> None:
         super().__init__(f"job {job.id} {job.state}: {job.reason or 'no reason is known'}")
-        fault = job.reason.startswith(PROGRAM_FAULT)
+        fault = job.failure == "program-fault"
         self.exit_code = exit_codes.PROGRAM_FAULT if fault else EXIT_CODES[job.state]  # type: ignore[misc]
 
 

@@ -16,6 +16,8 @@ from model.trial.registration import Registration, parse_registration
 REGISTERED = (
     "model/discrepancy/thresholds.py",
     "model/discrepancy",
+    "model/arrays.py",
+    "model/layout.py",
     "model/effects",
     "model/simulation",
     "model/fitting",
@@ -27,7 +29,6 @@ REGISTERED = (
     "model/design",
     "model/validation",
     "model/analysis",
-    "model/identifiability",
     "model/trial",
     "mock_controller",
     "firmware_protocol",

@@ -12,7 +12,8 @@ from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-from model.simulation.simulate import Options, sensitivities
+from model.simulation.prepared import Options
+from model.simulation.simulate import sensitivities
 from model.validation.expected_deviation import expected_deviation
 
 
@@ -64,8 +65,8 @@ def sensitivity_curves(
     """
     if not names:
         raise SpecError("no parameters: name at least one")
-    found = sensitivities(model, trace, names, options)
-    curves = [_curve(model.parameter(n), derivative) for n, derivative in zip(names, found.reading, strict=True)]
+    found = sensitivities(model, trace, [model.parameter(name) for name in names], options)
+    curves = [_curve(p, derivative) for p, derivative in zip(found.parameters, found.reading, strict=True)]
     return SensitivityCurves(
         model=model.identity,
         trace=trace.record.trace_id,

@@ -14,7 +14,8 @@ from model.dynamics import recursive
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
 from model.simulation.chain_of_model import chain_of
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from model.validation import differentiation
 
 Floats = NDArray[np.float64]

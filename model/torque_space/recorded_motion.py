@@ -10,7 +10,7 @@ from scipy.signal import butter, filtfilt
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.trace import Trace
-from model.machine_model import layout as at
+from model import layout as at
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
 from model.validation.acceleration_model import MeasuredMotion

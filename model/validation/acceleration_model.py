@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from model import layout as at
 from model.drives.amplifier import motor_volts
 from model.dynamics.compilation import compiled
 from model.dynamics.dual import DUAL_STEP
-from model.machine_model import layout as at
 from model.machine_model.model import Model
+from model.machine_model.nominal import is_rod_arm
 from model.simulation.dynamics_of_run import accelerate, body_of, friction_levels_of, gravity_of
-from model.simulation.engines import is_rod_arm
 from model.simulation.joint_torques import extra_torque, motor_damping, motor_gain
 from model.simulation.own_table import own_table
 from model.simulation.own_torque import own_torque

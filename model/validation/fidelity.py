@@ -14,7 +14,7 @@ from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-from model.simulation.simulate import Options
+from model.simulation.prepared import Options
 from model.validation.criterion import (
     DAMPING_RATIO,
     Curve,

@@ -10,8 +10,8 @@ from scipy.interpolate import CubicSpline
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
+from model import layout as at
 from model.dynamics.compilation import compiled
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
 from model.validation import differentiation as d
@@ -46,7 +46,7 @@ class Observation:
 
 
 def observe(model: Model, trace: Trace, smoothing: float | None = None) -> Observation:
-    """The smoothed motion of a trace; `smoothing` is the kernel's standard deviation in s, by default chosen from noise.
+    """The smoothed motion of a trace; `smoothing`: standard deviation of the kernel in s, by default chosen from noise.
 
     Raises:
         TraceError: for a trace without recorded drive, or too short.

@@ -19,7 +19,8 @@ from daq.contracts.machine import NoController
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.measured_motion import Observation, observe
 

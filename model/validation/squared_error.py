@@ -13,7 +13,8 @@ from daq.contracts.trace import Trace
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
 from model.simulation.period import OUT_READING
-from model.simulation.simulate import Options, at_rows, parameter_vectors, simulate_many
+from model.simulation.prepared import Options
+from model.simulation.simulate import at_rows, parameter_vectors, simulate_many
 
 Floats = NDArray[np.float64]
 

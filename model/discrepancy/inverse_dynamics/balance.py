@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from model import layout as at
 from model.discrepancy.inverse_dynamics import supplied
 from model.discrepancy.inverse_dynamics.records import TorqueRecord, acts_until_next_sample
 from model.kinematics.chain import ChainArrays
-from model.machine_model import layout as at
 from model.machine_model.model import Model
+from model.machine_model.nominal import is_rod_arm
 from model.simulation.bodies import chain_body
-from model.simulation.engines import is_rod_arm
 from model.simulation.own_table import own_table
 
 Floats = NDArray[np.float64]

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.machine import BoardPid, DcMotor, NoController, SampledPid
+from model import layout as at
 from model.discrepancy.inverse_dynamics.balance import levels_along
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.records import RESOLVED, TorqueRecord
 from model.effects.effect import Effect
 from model.effects.library import library
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 

@@ -12,7 +12,8 @@ import pytest
 from daq.contracts.machine import load_machine
 from daq.traces.store import write_trace
 from model.machine_model.model import base_model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from tests.daq_cli.invoke import CommandLine
 from tests.model.simulation.records import ramp_trace
 

@@ -11,7 +11,8 @@ from model.analysis.torques import TorqueAnalysis, largest, torques_along, torqu
 from model.dynamics import recursive
 from model.machine_model.model import Model
 from model.simulation.chain_of_model import chain_of
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from tests.model.validation.synthetic import arm, ramp_trace
 
 K = 12

@@ -19,7 +19,8 @@ from model.effects.library import library, own_effects, remove_own
 from model.fitting.options import FitOptions
 from model.machine_model.model import Model, base_model
 from model.machine_model.model_file import load_model, save_model
-from model.simulation.simulate import Options, sensitivities, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import sensitivities, simulate
 from model.torque_space.fit import fit_torques
 from tests.model.simulation.records import trace_of
 from tests.model.torque_space.test_fit_torques import OPTIONS, rod, swinging
@@ -70,7 +71,7 @@ def test_it_acts_as_its_equation_says_and_has_exact_derivatives(air_drag: Effect
     model = axis(0.02)
     run = simulate(model, SWING, SMOOTH)
     assert np.abs(run.position - simulate(axis(0.0), SWING, SMOOTH).position).max() > 1e-3
-    found = sensitivities(model, SWING, [DRAG], SMOOTH).of(0)[0]
+    found = sensitivities(model, SWING, [model.parameter(DRAG)], SMOOTH).of(0)[0]
     step = 1e-6
     above, below = (simulate(axis(0.02 + s), SWING, SMOOTH).position for s in (step, -step))
     np.testing.assert_allclose(found, (above - below) / (2 * step), atol=1e-6 * np.abs(found).max())

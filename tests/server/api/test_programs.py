@@ -13,8 +13,8 @@ from sqlalchemy import text
 from daq.teaching import Program
 from daq.teaching.program import Absolute, Wait, load_program
 from server.backup.database import copy_database
+from server.database_errors import DamagedError
 from server.problems import ProblemError
-from server.store.database_errors import DamagedError
 from server.store.engine import Store
 from server.store.programs import MOST_PROGRAMS, ProgramStore
 from tests.daq_cli.invoke import CommandLine

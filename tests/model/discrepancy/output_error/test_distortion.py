@@ -8,7 +8,8 @@ import pytest
 from model.discrepancy.output_error.distortion import sum_of_contributions
 from model.fitting.records import records_of
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, sensitivities
+from model.simulation.prepared import Options
+from model.simulation.simulate import sensitivities
 from model.validation.fidelity import validate_by_distortion
 from tests.model.discrepancy.motions import trace_of
 from tests.model.fitting import imagined
@@ -19,7 +20,7 @@ NAMES = ("joint1.motor.back_emf_constant", "joint2.motor.back_emf_constant", "li
 def by_derivatives(model: Model, arm: Model) -> float:
     """Of `model` on a record of `arm`."""
     record = records_of([trace_of(arm, 8.0)], model.machine, "position")[0]
-    run = sensitivities(model, record.inputs, NAMES, Options())
+    run = sensitivities(model, record.inputs, [model.parameter(name) for name in NAMES], Options())
     residual = run.simulation.at_samples(run.simulation.reading) - record.measured
     return sum_of_contributions(model, NAMES, residual.ravel(), run.reading.reshape(len(NAMES), -1))
 
