@@ -12,6 +12,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
+from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine
 from daq.traces.reader import read_trace
 from daq_cli.models.stopping_rule import as_run, next_to_run, time_left
@@ -39,6 +40,9 @@ class Campaign:
     machine: Machine
     diagnoser: Sequence[str] = DIAGNOSER
     until: Stage = "score"
+    experiment: Callable[[str], ExperimentSpec] = trial_experiment
+    """The experiment of a name."""
+    recorder: Callable[[int, str, ExperimentSpec, Machine, Path], Recorded] = record
     _tangents: dict[int, Lock] = field(default_factory=dict)
     _counting: Lock = field(default_factory=Lock)
     _failed: int = 0
@@ -51,7 +55,7 @@ class Campaign:
         self._tangents = {seed % 10: Lock() for seed in seeds}
         seen_by = "diagnostic" if self.folder.asked.acquire else self.folder.asked.experiment
         set_points = self.folder.path / f"{seen_by}{self.folder.shard}.csv"
-        write_set_points(trial_experiment(seen_by), self.machine, set_points)
+        write_set_points(self.experiment(seen_by), self.machine, set_points)
         with ThreadPoolExecutor(processes) as pool:
             try:
                 for number, said in enumerate(
@@ -128,7 +132,7 @@ class Campaign:
         }
 
     def _run(self, seed: int, name: str) -> Recorded:
-        return record(seed, name, trial_experiment(name), self._machine(seed), self.folder.path / "traces")
+        return self.recorder(seed, name, self.experiment(name), self._machine(seed), self.folder.path / "traces")
 
     def _diagnose(self, seed: int) -> dict[str, Any]:
         """The sealed answer, the last one where further experiments were run. Its file and hash are written before
@@ -168,7 +172,7 @@ class Campaign:
 
     def _further(self, seed: int, asked: NextExperiment, number: int) -> Acquired:
         """Runs the experiment that an answer asks for on the same arm."""
-        made = record(seed, f"further {number}", asked.spec, self._machine(seed), self.folder.path / "traces")
+        made = self.recorder(seed, f"further {number}", asked.spec, self._machine(seed), self.folder.path / "traces")
         return as_run(asked, read_trace(made.file), made.file, made.outcome)
 
     def _score(self, seed: int) -> dict[str, Any]:

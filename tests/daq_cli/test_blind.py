@@ -19,7 +19,6 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.machine import load_machine
 from daq.traces.reader import read_trace
-from daq_cli.trial import campaign as campaign_module
 from daq_cli.trial.campaign import Campaign
 from daq_cli.trial.experiments import machine_with_load, trial_experiment, write_set_points
 from daq_cli.trial.folder import TrialFolder
@@ -48,7 +47,7 @@ def short(name: str) -> ExperimentSpec:
 
 def trial(path: Path, acquire: bool = False, shard: str = "", until: Any = "score") -> Campaign:
     folder = TrialFolder.open(path, "ramp", acquire, None, shard)
-    return Campaign(folder, MACHINE, FAKE, until)
+    return Campaign(folder, MACHINE, FAKE, until, experiment=short)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +55,6 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     """A trial of two arms, from the first stage to the last."""
     path = tmp_path_factory.mktemp("trial")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(campaign_module, "trial_experiment", short)
         patch.setenv("DAQ_RUNTIME_FOLDER", str(path / "run"))
         made = trial(path, acquire=True)
         said: list[str] = []
@@ -154,13 +152,11 @@ def resumed(path: Path, done: Campaign, acquire: bool) -> Campaign:
     return copy
 
 
-def test_an_incomplete_further_run_is_kept_but_not_used_and_is_the_last(
-    done: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_incomplete_further_run_is_kept_but_not_used_and_is_the_last(done: Campaign, tmp_path: Path) -> None:
     copy = resumed(tmp_path, done, acquire=True)
     first = rows(done, "record")[SECRETS[0]]
     broken = Recorded(tmp_path / "traces" / first["trace"], "stopped", "by hand", 8.0)
-    monkeypatch.setattr(campaign_module, "record", lambda *_: broken)
+    copy.recorder = lambda *_: broken
     row = copy._diagnose(SECRETS[0])
     assert [run["outcome"] for run in row["further"]] == ["stopped"]
     assert row["traces"] == [first["trace"]]
@@ -169,14 +165,15 @@ def test_an_incomplete_further_run_is_kept_but_not_used_and_is_the_last(
 
 
 def test_a_further_experiment_that_cannot_be_recorded_does_not_count_as_a_wrong_answer(
-    done: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    done: Campaign, tmp_path: Path
 ) -> None:
     def nothing(*_: object) -> Recorded:
         raise TrialStageError("nothing was recorded: no port")
 
-    monkeypatch.setattr(campaign_module, "record", nothing)
+    copy = resumed(tmp_path, done, acquire=True)
+    copy.recorder = nothing
     with pytest.raises(TrialStageError, match="nothing was recorded"):
-        resumed(tmp_path, done, acquire=True)._diagnose(SECRETS[0])
+        copy._diagnose(SECRETS[0])
 
 
 def test_without_acquire_no_experiment_may_be_asked_for(done: Campaign, tmp_path: Path) -> None:
