@@ -29,7 +29,6 @@ REGISTERED = (
     "model/design",
     "model/validation",
     "model/analysis",
-    "model/identifiability",
     "model/trial",
     "mock_controller",
     "firmware_protocol",

@@ -65,9 +65,8 @@ def sensitivity_curves(
     """
     if not names:
         raise SpecError("no parameters: name at least one")
-    parameters = [model.parameter(name) for name in names]
-    found = sensitivities(model, trace, parameters, options)
-    curves = [_curve(p, derivative) for p, derivative in zip(parameters, found.reading, strict=True)]
+    found = sensitivities(model, trace, [model.parameter(name) for name in names], options)
+    curves = [_curve(p, derivative) for p, derivative in zip(found.parameters, found.reading, strict=True)]
     return SensitivityCurves(
         model=model.identity,
         trace=trace.record.trace_id,

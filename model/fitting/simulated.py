@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from model.arrays import Floats
 from model.dynamics.dual import DUAL_STEP
 from model.fitting.problem import Evaluation
 from model.fitting.records import Record, Signal
@@ -20,8 +21,6 @@ from model.simulation.batch import BatchRun, seed
 from model.simulation.period import OUT_READING, OUT_SPEED
 from model.simulation.prepared import LONGEST_STEP, Options, Prepared, prepare
 from model.simulation.simulate import at_rows
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -163,13 +163,21 @@ def joint_scale(machine: Machine, number: int) -> JointScale:
     friction = joint.friction.viscous_motor_side or joint.friction.viscous
     controller = machine.controller
     return JointScale(
-        torque=torque, volts=volts, strongest=torque if bounded else math.inf, highest=volts if bounded else math.inf,
-        speed=speed or 1.0, resolution=range_ / counts, range=range_,
+        torque=torque,
+        volts=volts,
+        strongest=torque if bounded else math.inf,
+        highest=volts if bounded else math.inf,
+        speed=speed or 1.0,
+        resolution=range_ / counts,
+        range=range_,
         viscous=0.0 if friction is None else friction.value,
         inertia=_transmission_inertia(machine, number),
         period=0.02 if isinstance(controller, NoController) else controller.period.value,
-        length=abs(joint.geometry.a.value) or _radius(joint), mass=joint.link.mass.value, supply=supply, gear=gear,
-    )  # fmt: skip
+        length=abs(joint.geometry.a.value) or _radius(joint),
+        mass=joint.link.mass.value,
+        supply=supply,
+        gear=gear,
+    )
 
 
 def is_rod_arm(machine: Machine) -> bool:

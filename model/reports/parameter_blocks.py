@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from model.fitting.identifiability import IdentifiabilityReport
 from model.fitting.result import FittedParameter
-from model.identifiability.report import IdentifiabilityReport
 from model.reports.figures import COLOURS, QUIET, drawn, panels
 from model.reports.page import Cell, Picture, Points, Table, Text, Tone, cells
 

@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model import layout as at
+from model.arrays import Floats
 from model.dynamics import recursive
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
 from model.simulation.bodies import chain_body
-
-Floats = NDArray[np.float64]
 
 
 def chain_of(model: Model, vector: NDArray[Any] | None = None) -> ChainArrays:

@@ -9,19 +9,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
 from model import layout as at
+from model.arrays import Floats
 from model.dynamics import recursive
 from model.machine_model.model import Model
 from model.machine_model.nominal import is_rod_arm
 from model.simulation.bodies import chain_body
 from model.simulation.dynamics_of_run import chain_levels
-
-Floats = NDArray[np.float64]
 
 WINDOW = 0.2
 """s over which position is smoothed by default: 11 samples at 20 ms."""

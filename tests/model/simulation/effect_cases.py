@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.machine import load_machine
+from model.arrays import Floats
 from model.effects.library import library
 from model.machine_model.model import Model, base_model
 from model.simulation.inputs import RunInputs, inputs_of
@@ -16,7 +16,6 @@ from model.simulation.simulate import simulate
 from tests.model.simulation import continuous_time
 from tests.model.simulation.records import PERIOD, START, trace_of
 
-Floats = NDArray[np.float64]
 COUNT = 1.5 * np.pi / 4096
 """rad."""
 

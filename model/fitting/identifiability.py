@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from model.arrays import Floats
 from model.fitting.covariance import inverse
+from model.fitting.directions import NEGLIGIBLE, Direction, undetermined
 from model.fitting.unknowns import Unknown
-from model.identifiability.directions import NEGLIGIBLE, Direction, undetermined
 
-Floats = NDArray[np.float64]
 Verdict = Literal["known", "combination", "unknown"]
 
 KNOWN_SHARE = 0.5
@@ -104,9 +104,11 @@ def judged(jacobian: Floats, values: Floats, unknowns: Sequence[Unknown]) -> Ide
     prior = np.array([1.0 if u.deviation is not None else WEAKEST_PRIOR**-2 for u in unknowns])
     both = inverse(scaled.T @ scaled + np.diag(prior))
     return IdentifiabilityReport(
-        parameters=verdicts, undetermined=combinations, torque_scale_free=any(d.torque_scale for d in directions),
+        parameters=verdicts,
+        undetermined=combinations,
+        torque_scale_free=any(d.torque_scale for d in directions),
         correlated=_groups(both[np.ix_(kept, kept)], [u.name for u in own]),
-    )  # fmt: skip
+    )
 
 
 def _without_nuisances(scaled: Floats, nuisance: NDArray[np.bool_], claimed: NDArray[np.bool_]) -> Floats:
@@ -138,14 +140,18 @@ def _verdict(
         )
     else:
         verdict = "unknown"
-        reason = "it does not change these records at all" if alone is None else (
-            f"its {size} changes these records by {sensitivity:.2g} standard deviations of the noise"
-        )  # fmt: skip
+        reason = f"its {size} changes these records by {sensitivity:.2g} standard deviations of the noise"
+        if alone is None:
+            reason = "it does not change these records at all"
     return ParameterVerdict(
-        name=unknown.name, unit=unknown.unit, verdict=verdict, reason=reason,
+        name=unknown.name,
+        unit=unknown.unit,
+        verdict=verdict,
+        reason=reason,
         data_deviation=marginal * unknown.scale if marginal < LARGEST_DEVIATION else None,
-        alone=None if alone is None else alone * unknown.scale, expected_deviation=unknown.deviation,
-    )  # fmt: skip
+        alone=None if alone is None else alone * unknown.scale,
+        expected_deviation=unknown.deviation,
+    )
 
 
 def _combination(direction: Direction, unknowns: Sequence[Unknown], values: Floats) -> Combination:
@@ -159,10 +165,11 @@ def _combination(direction: Direction, unknowns: Sequence[Unknown], values: Floa
             members.append(Member(name=unknown.name, change=change / value if relative else change, relative=relative))
     members = _smallest_readable(members)
     return Combination(
-        text=_text(members, direction.torque_scale, unknowns), members=tuple(members),
+        text=_text(members, direction.torque_scale, unknowns),
+        members=tuple(members),
         torque_scale=direction.torque_scale,
         deviation=direction.deviation if np.isfinite(direction.deviation) else None,
-    )  # fmt: skip
+    )
 
 
 def _smallest_readable(members: list[Member]) -> list[Member]:

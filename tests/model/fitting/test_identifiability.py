@@ -6,13 +6,12 @@ from functools import partial
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from model.arrays import Floats
+from model.fitting.identifiability import judged
 from model.fitting.unknowns import Unknown, torque_power
-from model.identifiability.report import judged
 from model.machine_model.parameter import Kind, Parameter
 
-Floats = NDArray[np.float64]
 RANDOM = partial(np.random.default_rng, 5)
 
 

@@ -13,9 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from model.arrays import Floats
 
 UNKNOWN_DEVIATION = 1.0
 """Deviation, in natural sizes, above which the data do not determine a direction."""
