@@ -40,7 +40,7 @@ def _no_experiment_left(v: Values) -> str:
 
 
 def _not_looked_for(v: Values) -> str:
-    return "not looked for: " + "; ".join(f"{effect_name(name)} {why}" for name, why in v["effects"].items())
+    return "not looked for: " + "; ".join(f"{effect_name(name)} ({why})" for name, why in v["effects"].items())
 
 
 def _not_separable(v: Values) -> str:
