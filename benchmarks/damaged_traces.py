@@ -225,7 +225,7 @@ def _with(data: bytes, position: int, value: int, size: int) -> bytes:
 
 
 def flipped(rng: random.Random, data: bytes) -> bytes:
-    """One to eight bits the other way round."""
+    """One to eight bits flipped."""
     changed = bytearray(data)
     for _ in range(rng.choice((1, 1, 1, 2, 8))):
         changed[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
@@ -259,7 +259,7 @@ def left_out(rng: random.Random, data: bytes) -> bytes:
 
 
 def swapped(rng: random.Random, data: bytes) -> bytes:
-    """Two parts in each other's place."""
+    """Two parts exchanged."""
     a, b, c, d = sorted(rng.choices(range(len(data)), k=4))
     return data[:a] + data[c:d] + data[b:c] + data[a:b] + data[d:]
 
@@ -284,7 +284,7 @@ AT_RANDOM: dict[str, Callable[[random.Random, bytes], bytes]] = {
 
 
 def at_random(chosen: list[Original], rng: random.Random) -> Iterator[Damaged]:
-    """Without end: each way in turn, each file at random."""
+    """An endless sequence of damages: each way in turn, each file at random."""
     while True:
         for way, damage in AT_RANDOM.items():
             original = rng.choice(chosen)

@@ -89,7 +89,7 @@ class Watch:
         self.began = time.process_time(), time.perf_counter()
 
     def passed(self) -> tuple[float, float]:
-        """Seconds of both."""
+        """Elapsed seconds of both clocks."""
         return time.process_time() - self.began[0], time.perf_counter() - self.began[1]
 
 
@@ -130,7 +130,7 @@ class Arm:
     <body><joint name="3" axis="0 -1 0"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
     </body></body></body></worldbody></mujoco>"""
     THIN = 1e-9
-    """kg·m² of a thin rod about itself, which MuJoCo wants above zero."""
+    """Inertia (kg·m²) of a thin rod about itself, which MuJoCo requires to be positive."""
 
     def __init__(self, problem: SimulatedProblem) -> None:
         self.problem = problem
@@ -243,7 +243,7 @@ def sysid(problem: SimulatedProblem, begin: Floats) -> Run | str:
 
 
 def _samples(problem: SimulatedProblem) -> int:
-    """Numbers that are compared."""
+    """Number of compared values."""
     return 3 * sum(run.stop - run.start for runs in problem.runs for run in runs)
 
 
@@ -254,7 +254,7 @@ def _error(problem: SimulatedProblem, values: Floats) -> float:
 
 
 def compared(problem: SimulatedProblem, begin: Floats, limit: int) -> list[Figure]:
-    """All three, and by how much ours is quicker."""
+    """Figures of all three, with the ratio of their times to ours."""
     share = 1 + 1 / _samples(problem)  # by which an error may be larger and still count as ours
     goal = 3 * ours(problem, begin).error * share  # the simplex sums over the joints
     found = best_in_turn(

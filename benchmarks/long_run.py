@@ -40,7 +40,7 @@ FAULTS = ("--fault", f"drop:rate={RATE}", "--fault", f"flip:rate={RATE}")
 JOINTS = (1, 2, 3)
 SINE_S = 4.0
 FETCH_EVERY_S = 0.4
-"""The mock's ring keeps 1.28 s."""
+"""Time (s) between fetches; the mock's ring keeps 1.28 s."""
 
 
 @dataclass
@@ -52,7 +52,7 @@ class BoardRecord:
     _over: threading.Event = field(default_factory=threading.Event)
 
     def fetch_until_over(self) -> None:
-        """To be run by a thread of its own."""
+        """Fetches until the run is over; runs in a thread of its own."""
         last = 0
         while True:
             over = self._over.wait(FETCH_EVERY_S)

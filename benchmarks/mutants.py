@@ -1,8 +1,8 @@
 """Makes mutants of a source file: copies of it with one small fault each. Pure; `mutation` runs tests against them.
 
-A mutant turns an operator, a comparison, a sign or a condition round, changes a number, swaps True and False, removes a
-statement, or returns None instead of a value. Left alone are what no test of behaviour sees (docstrings, annotations,
-decorators, texts of errors, log lines) and `strict=` and `daemon=`, which only guard.
+A mutant replaces an operator or a comparison, removes a sign, negates a condition, changes a number, swaps True and
+False, removes a statement, or returns None instead of a value. Not changed are docstrings, annotations, decorators,
+error texts and log lines, which no test of behaviour sees, and the arguments `strict=` and `daemon=`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ OPERATORS: dict[type[ast.AST], type[ast.AST]] = {
     ast.And: ast.Or,
     ast.Or: ast.And,
 }
-"""What each operator becomes."""
+"""Replacement of each operator."""
 
 GUARDING_KEYWORDS = ("strict", "daemon")
 LOG_METHODS = ("debug", "info", "warning", "error", "exception")
@@ -58,7 +58,7 @@ class Mutant:
 
     @property
     def identity(self) -> tuple[str, str, str, str]:
-        """What stays the same while lines move."""
+        """Identifies the mutant independently of line numbers."""
         return self.file, self.function, self.was, self.now
 
     def applied(self, source: bytes) -> bytes:
@@ -108,7 +108,7 @@ class _Maker(ast.NodeVisitor):
             self.visit(node.value)
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> None:
-        """Texts are for people."""
+        """Skipped: messages are not behaviour."""
 
     def visit_keyword(self, node: ast.keyword) -> None:
         if node.arg not in GUARDING_KEYWORDS:
@@ -149,11 +149,11 @@ class _Maker(ast.NodeVisitor):
 
     def visit_If(self, node: ast.If) -> None:
         if ast.unparse(node.test) not in ("TYPE_CHECKING", "__name__ == '__main__'"):
-            self._turned_round(node.test)
+            self._negated(node.test)
             self.generic_visit(node)
 
     def visit_While(self, node: ast.While) -> None:
-        self._turned_round(node.test)
+        self._negated(node.test)
         self.generic_visit(node)
 
     def visit_Continue(self, node: ast.Continue) -> None:
@@ -165,7 +165,7 @@ class _Maker(ast.NodeVisitor):
     # ---- expressions
 
     def visit_IfExp(self, node: ast.IfExp) -> None:
-        self._turned_round(node.test)
+        self._negated(node.test)
         self.generic_visit(node)
 
     def visit_Compare(self, node: ast.Compare) -> None:
@@ -208,8 +208,8 @@ class _Maker(ast.NodeVisitor):
         for node in nodes:
             self.visit(node)
 
-    def _turned_round(self, test: ast.expr) -> None:
-        """A comparison or a `not` is turned round by its own mutant."""
+    def _negated(self, test: ast.expr) -> None:
+        """Negates a condition; a comparison or a `not` is negated by its own mutant."""
         if not isinstance(test, ast.Compare | ast.UnaryOp):
             self._replaced(test, f"(not ({ast.unparse(test)}))")
 

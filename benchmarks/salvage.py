@@ -39,7 +39,7 @@ PERIOD = 0.02
 LOSS_S = 1.2
 AT_ONCE = 10
 LONGEST_S = 4.0
-"""Kills fall at random between the first sample and this."""
+"""Latest moment (s) of a random kill after the first sample."""
 READY = b"r\n"
 ENDING_TICKS = 60
 """Length of the recordings that are killed around their end."""

@@ -61,7 +61,7 @@ class Attack:
 
 @dataclass
 class Seen:
-    """What came back. `unexpected`: what and how often."""
+    """The answers. `unexpected`: which, and how often."""
 
     requests: int = 0
     statuses: Counter[int] = field(default_factory=Counter)
@@ -69,7 +69,7 @@ class Seen:
 
 
 def attacks(random: Random, count: int) -> list[Attack]:
-    """So many, of every kind, in the seed's order. The same for the same seed."""
+    """So many attacks, of every kind, in an order that the seed determines."""
     sound = sound_trace()
     files = [_upload(name, content, MCAP) for name, content in hostile_traces(sound).items()]
     files += [_upload(name, content, CSV) for name, content in hostile_tables().items()]

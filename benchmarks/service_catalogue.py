@@ -105,7 +105,7 @@ def fill(folder: Path, count: int) -> None:
 
 
 def listed(service: RunningService, times: int) -> list[float]:
-    """ms of pages of the list, following it from the newest trace on, and beginning anew at random moments."""
+    """Times (ms) of pages of the list, following it from the newest trace on, and beginning anew at random moments."""
     random_, found, cursor = dice(1), [], None
     for number in range(times):
         query: dict[str, Any] = {"limit": 50} | ({} if cursor is None else {"cursor": cursor})
@@ -118,7 +118,7 @@ def listed(service: RunningService, times: int) -> list[float]:
 
 
 def searched(service: RunningService, times: int) -> dict[str, list[float]]:
-    """ms of searches by what they look for."""
+    """Times (ms) of searches by what they look for."""
     random_ = dice(2)
     kinds: dict[str, list[float]] = {}
     for _ in range(times):

@@ -64,12 +64,12 @@ class Measured:
     """What one run of everything gave. Times in s."""
 
     endings: list[str] = field(default_factory=list)
-    """Of experiments that were not carried out to their end."""
+    """Endings of experiments that were not completed."""
     idle: list[float] = field(default_factory=list)
     """Jitter of the samples that nobody watched."""
     loaded: list[float] = field(default_factory=list)
     lost: tuple[int, int] = (0, 0)
-    """Ticks lost, of how many, under load."""
+    """Lost ticks under load, and the number of ticks."""
     frozen: dict[str, list[float]] = field(default_factory=lambda: {OWN_DOOR: [], STOP_DOOR: []})
     used: dict[str, list[float]] = field(default_factory=lambda: {OWN_DOOR: [], STOP_DOOR: []})
     unconfirmed: int = 0
@@ -91,7 +91,7 @@ def jitter(path: Path) -> tuple[list[float], int]:
 
 
 def ready_again(service: RunningService) -> None:
-    """After a run that did not come to its end."""
+    """Makes the robot ready after a run that was not completed."""
     service.ask("POST", "/reset", json={})
     service.ask("POST", "/queue/resume", json={})
 
@@ -115,7 +115,7 @@ class ProcessorTime:
         self._before = self._now()
 
     def shares(self) -> dict[str, float]:
-        """Of one core, since the beginning."""
+        """Shares of one core since the beginning."""
         seconds = time.monotonic() - self._begun
         shares = {name: (now - self._before[name]) / seconds for name, now in self._now().items()}
         return shares | {OTHERS: max(0.0, shares[OTHERS] - sum(shares.values()) + shares[OTHERS])}
@@ -125,13 +125,13 @@ class ProcessorTime:
 
 
 def _machine_time() -> float:
-    """s that all cores of this machine were busy."""
+    """Time (s) that all cores of this machine were busy."""
     user, nice, system, _idle, _waiting, *interrupts = map(int, Path("/proc/stat").read_text("utf-8").split()[1:9])
     return (user + nice + system + sum(interrupts)) / os.sysconf("SC_CLK_TCK")
 
 
 def _processor_time(process: int) -> float:
-    """s, of all its threads."""
+    """Processor time (s) of all threads of a process."""
     fields = Path(f"/proc/{process}/stat").read_text("utf-8").rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 

@@ -58,7 +58,7 @@ JACOBIAN = (
     "joint3.viscous_friction.coefficient",
     "joint2.load_dependent_friction.arm",
 )
-"""Thirteen parameters of table 7.9's model."""
+"""The thirteen parameters of table 7.9's model that derivatives are taken for."""
 FOLDER = Path(__file__).parent
 Pointer = ctypes.POINTER(ctypes.c_double)
 

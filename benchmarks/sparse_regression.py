@@ -47,26 +47,26 @@ Place = tuple[str, int | None]
 """An effect, and the joint (from 1) it is on; None for the whole machine."""
 
 WINDOW = 0.26
-"""s of the local polynomials that give speeds and accelerations; shorter ones let noise through."""
+"""Window (s) of the local polynomials that give speeds and accelerations; shorter ones let noise through."""
 THRESHOLDS = np.geomspace(1.0, 0.01, 16)
-"""Of normalised coefficients, as shares of the target's deviation."""
+"""Thresholds of normalised coefficients, as shares of the target's deviation."""
 RIDGE = 0.05
-"""Share of a term's own square: terms that are nearly alike must share what they explain instead of cancelling."""
+"""Ridge penalty as a share of a term's own square; nearly collinear terms then share the fit instead of cancelling."""
 STRIBECK_SPEEDS = (0.05, 0.15, 0.4)
 STICTION_SPEED = 0.015
 PEAKS = 3
-"""Highest peaks of a joint's periodogram that a wave is tried at."""
+"""Number of periodogram peaks of a joint at which a wave is tried."""
 HIGHEST = 6.0
-"""Hz; beyond, the smoothing leaves little."""
+"""Highest frequency (Hz) of a wave; beyond it the smoothing leaves little."""
 SHORTEST_WAVE = 0.01
-"""Of a ripple, as a share of the joint's travel."""
+"""Shortest wavelength of a ripple, as a share of the joint's travel."""
 MOVING = 0.03
 """Share of its higher speeds from which a joint counts as moving."""
 ARM = 0.01
-"""m by which the arm of load-dependent friction is moved."""
+"""Change (m) of the arm of load-dependent friction for a finite difference."""
 LIMITS = (0.9, 0.75, 0.6, 0.45)
 LEAST_GAIN_ERROR = 0.02
-"""Relative residual of the controller's law from which it is the controller that is wrong."""
+"""Relative residual of the controller's law above which the controller itself is taken to be wrong."""
 
 
 def ranked_effects(trace: Trace, model: Model) -> list[Place]:

@@ -51,7 +51,7 @@ CREATED = datetime(2026, 11, 21, 5, 14, 42, tzinfo=UTC)
 
 @dataclass
 class Tally:
-    """What was counted; the first few of each fault are told."""
+    """Counts; the first few of each fault are printed."""
 
     cases: int = 0
     by_way: Counter[str] = field(default_factory=Counter)
@@ -61,14 +61,14 @@ class Tally:
     slowest: float = 0.0
 
     def fault(self, kind: str, damaged: Damaged, detail: str) -> None:
-        """Something that must not be."""
+        """Counts a fault."""
         self.faults[kind] += 1
         if self.faults[kind] <= 3:
             self.examples.append(f"{kind}: {damaged.original.kind}, {damaged.way}: {detail}")
 
 
 def record() -> TraceRecord:
-    """That of a run on the mock, with a machine."""
+    """The record of a run on the mock, with a machine."""
     return TraceRecord(
         trace_id="ab12cd34ef56",
         created=CREATED,

@@ -20,7 +20,7 @@ from firmware_protocol.stamp import STAMP_BYTES
 from firmware_protocol.units import GAIN_MAX, POSTURE_UNITS
 
 AFTER_NEWEST = 0xFFFFFFFF
-"""SAMPLE(after=AFTER_NEWEST) waits for the next snapshot to be made, whatever has been seen."""
+"""`Sample(after=AFTER_NEWEST)` waits for the next snapshot, whichever ones have been delivered."""
 MAX_READ = MAX_PAYLOAD
 """Most bytes that one `ReadBlock` asks for."""
 MAX_WRITE = MAX_PAYLOAD - STAMP_BYTES - 2
@@ -53,7 +53,7 @@ class Hello(Request):
 
     @classmethod
     def parse(cls, payload: bytes) -> Self:
-        """Of another version's greeting only the version is read. Raises PayloadLengthError."""
+        """Reads only the version from a `Hello` of another version. Raises PayloadLengthError."""
         if not payload:
             return cls(1, 0)
         if payload[0] != PROTOCOL_VERSION:

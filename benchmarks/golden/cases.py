@@ -65,7 +65,7 @@ OPEN_SET = (
     "potentiometer_zero_drift:joint=2,drift=0.03",
     "stuck_converter_bit:joint=1,bit=3",
 )
-"""Effects that the diagnosis does not know."""
+"""Hidden effects that the diagnosis does not know."""
 SECRET_ARMS = (110, 210, 310, 410, 510, 610, 150, 250, 160, 260, 311, 412)
 """Arms with drawn tolerances: sound ones, effects shared by joints, priors that are wrong, announced loads."""
 
@@ -233,7 +233,6 @@ def _small(place: Path) -> list[Question]:
     mock = ("--port", "mock://?lock_step=1")
     return [
         Question("small/status", (*mock, "status", "--json")),
-        Question("small/gains", (*mock, "gains", "--json")),
         Question("small/run-dry", (*mock, "run", "ramp", "--joints", "1-3", "--dry-run", "--json")),
         Question(
             "small/run",

@@ -16,12 +16,12 @@ from daq.contracts.errors import DaqError
 from daq.driver import Controller
 from daq.link import LinkState
 from daq.runner import (
-    Arrangement,
     Consent,
     MissingConsentError,
-    Outside,
     RunResult,
+    RunSetup,
     StoppedError,
+    StopRequests,
     run_experiment,
 )
 from firmware_protocol.errors import ProtocolError
@@ -73,10 +73,8 @@ def run_job(job: Job, speaker: Speaker) -> RunResult:
             # It came while there was nothing to freeze. Now there is.
             control.stop(cause)
             raise StoppedError(f"{cause} before it began; nothing moved")
-        outside = Outside(ended=session.ended, interrupted=lambda: session.guardian.cause is EndCause.ORPHANED)
-        run = Arrangement(
-            controller, control, job.spec, job.machine, job.limits, job.folder, speaker, outside, job.robot
-        )
+        requests = StopRequests(ended=session.ended, interrupted=lambda: session.guardian.cause is EndCause.ORPHANED)
+        run = RunSetup(controller, control, job.spec, job.machine, job.limits, job.folder, speaker, requests, job.robot)
         result = run_experiment(run, Consent(job.moves_real_arm))
         if controller.link.state is LinkState.LOST and controller.link.control is None:
             # A mock of our own has gone for good; anything else may come back.

@@ -1,4 +1,4 @@
-"""Everything that is asked and checked before an arm may move. Nothing here changes anything on the board."""
+"""All checks before an arm may move. Nothing here changes anything on the board."""
 
 from __future__ import annotations
 
@@ -21,19 +21,20 @@ from firmware_protocol.commands import StatusFlag
 from firmware_protocol.framing import FRAME_OVERHEAD
 
 LINE_SHARE = 0.6
-"""Share of the line that samples of all joints may take; else only the experiment's joints are recorded."""
+"""Share of the line's capacity that samples of all joints may take; beyond it only the experiment's joints are
+recorded."""
 PERIOD_TOLERANCE = 0.01
-"""By how much (relative) the controller's period may differ from the machine file's."""
+"""Largest relative difference between the controller's period and the machine file's."""
 
 
 @dataclass(frozen=True)
 class Consent:
-    """What the operator has agreed to. A controller with an arm behind it is not moved without `moves_real_arm`."""
+    """The operator's consent. A controller with an arm behind it is not moved without `moves_real_arm`."""
 
     moves_real_arm: bool = False
 
     def __post_init__(self) -> None:
-        """Raises SpecError for what only counts as true."""
+        """Raises SpecError for a value that is merely truthy."""
         require_word(self.moves_real_arm)
 
     def require(self, controller: Controller) -> None:
@@ -45,7 +46,7 @@ class Consent:
 
 
 class MissingConsentError(SafetyError):
-    """A real arm, and nobody has agreed that it may move."""
+    """A real arm would move without the operator's consent."""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
-"""What keeps a real arm from harm on the host's side. Pure: it judges, the caller acts. It never replaces the
-hardware's own emergency stop."""
+"""Safety checks on the host's side. Pure: they judge, and the caller acts. They never replace the hardware's own
+emergency stop."""
 
 from daq.safety.check_plan import check_move_to_start, check_plan, unchecked
 from daq.safety.findings import Finding, Verdict

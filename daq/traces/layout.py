@@ -26,7 +26,7 @@ PART_SUFFIX = ".mcap.part"
 JOINT_STATES_TOPIC = "/joint_states"
 EVENTS_TOPIC = "/events"
 JOINT_TOPIC = "/joint/"
-"""Followed by the joint's number, from 1."""
+"""Topic of one joint, followed by its number, from 1."""
 
 JOINT_SCHEMA = "ma2000_daq/msg/JointSample"
 JOINT_STATES_SCHEMA = "foxglove.JointStates"
@@ -40,7 +40,7 @@ END_METADATA = "daq.outcome"
 OPTIONAL_SIGNALS = ("set_point", "error", "drive", "velocity")
 """Signals a sample may lack (NaN)."""
 RECORDED_SIGNALS = ("tick", "host_time", "status", "set_point", "position", "error", "drive", "power_raw")
-"""What a record of the controller holds."""
+"""Signals that a recording of the controller has."""
 
 ALL_SIGNALS = (
     "time",

@@ -10,7 +10,7 @@ from daq.trajectories.presets import PRESETS
 GENERAL = "diagnostic"
 SINGLE = ("ramp", "diagnostic-a", "diagnostic-b", "diagnostic-c", "diagnostic-d", "diagnostic-e")
 ELSEWHERE = (40.0, 35.0, -50.0)
-"""Degrees from the rest posture: the second posture of the diagnostic set."""
+"""Second posture of the diagnostic set, in degrees from the rest posture."""
 
 
 def offered_experiments() -> tuple[OfferedExperiment, ...]:

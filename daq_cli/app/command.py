@@ -1,4 +1,4 @@
-"""The `daq` command: global options, the list of subcommands, and what every error ends with."""
+"""The `daq` command: its global options, and the exit code and message of every error."""
 
 from __future__ import annotations
 
@@ -17,16 +17,25 @@ from daq_cli.app.context import Invocation
 from daq_cli.app.lazy import HERE, LazyGroup
 from firmware_protocol.errors import ProtocolError
 
-WRONG_NAMES = frozenset({
-    errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS,
-})  # fmt: skip
-"""What the operating system says of files that were named wrongly; the rest is its own trouble."""
+WRONG_NAMES = frozenset(
+    {
+        errno.ENAMETOOLONG,
+        errno.ENOENT,
+        errno.ENOTDIR,
+        errno.EISDIR,
+        errno.ELOOP,
+        errno.EACCES,
+        errno.EPERM,
+        errno.EROFS,
+    }
+)
+"""Errors of the operating system that a wrong file name causes; every other one is a fault of the computer."""
 LONGEST_LINE = 800
-"""Characters of an error; a command line may hold a megabyte."""
+"""Most characters of an error that are printed: a command line may hold a megabyte."""
 
 SERVER_VARIABLE = "DAQ_SERVER"
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
-"""What typer raises for a command line that it does not understand; it has no public name there."""
+"""The exception of typer for a command line that it does not understand, which has no public name."""
 
 app = typer.Typer(
     name="daq",
@@ -80,7 +89,7 @@ def options(
 
 
 def main() -> None:
-    """Entry point: errors that are the user's end in one line on standard error and a documented exit code."""
+    """Entry point: a user's error ends in one line on standard error and a documented exit code."""
     _print_whatever_files_are_called()
     try:
         exit_code = app(prog_name="daq", standalone_mode=False)
@@ -117,7 +126,7 @@ def _flush() -> None:
 
 
 def _drop_output() -> None:
-    """What could not be written is not tried again at exit, where Python would complain in its own words."""
+    """Discards output that could not be written, which Python would try again at exit, with a message of its own."""
     try:
         _flush()
     except OSError:
@@ -125,13 +134,14 @@ def _drop_output() -> None:
 
 
 def _print_whatever_files_are_called() -> None:
-    """Names of files need not be UTF-8, nor terminals able to show a degree sign: neither may end a command."""
+    """Lets a command print file names that are not UTF-8, and degree signs on terminals that lack them."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="surrogateescape" if sys.stdout.encoding.lower() == "utf-8" else "replace")
 
 
 def _show_usage_error(error: Any) -> NoReturn:
-    """A command line that cannot be understood: one line, and where help is; the help itself where nothing was said."""
+    """Ends with one line on what is wrong with the command line and where help is; without any words, with the help
+    itself."""
     message = error.format_message().strip()
     if type(error).__name__ == "NoArgsIsHelpError":
         print(message, file=sys.stderr)
@@ -141,7 +151,8 @@ def _show_usage_error(error: Any) -> NoReturn:
 
 
 def fail(message: str, exit_code: int) -> NoReturn:
-    """One line on standard error, then the end. A long one is cut in its middle: what is allowed stands at the end."""
+    """Ends with one line on standard error. A long one is cut in its middle, because what is allowed stands at its
+    end."""
     line = " ".join(message.split())
     if len(line) > LONGEST_LINE:
         line = f"{line[: LONGEST_LINE // 2]} … {line[-LONGEST_LINE // 2 :]}"

@@ -1,4 +1,4 @@
-"""The control loop without rounding: what the readings of an arm would be, but for what the converter cuts off.
+"""The control loop without rounding: an arm's readings as real numbers.
 
 Positions, errors and drive are real numbers here; in place of rounding, each reading carries noise of the same size
 (the converter's own and that of a rounding error, a quantity uniform over one count), drawn from a seed. Two arms run

@@ -1,4 +1,4 @@
-"""Deviations that imitate an effect exactly or nearly, where there are any: the refit looks there, too."""
+"""Deviations that imitate an effect exactly or nearly, where they exist; the refit also starts from them."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ SHARED: tuple[type[Any], ...] = (
     *sensor.SHARED,
     *controller.SHARED,
 )
-"""Effects whose names those who diagnose know as well."""
+"""Effects whose names the diagnosis also knows."""
 
 OPEN_SET: tuple[type[Any], ...] = (
     *strange_friction.OPEN_SET,
@@ -23,6 +23,6 @@ OPEN_SET: tuple[type[Any], ...] = (
     *amplifier.OPEN_SET,
     *sensor.OPEN_SET,
 )
-"""Effects that only the mock knows: for everybody else they are unknown."""
+"""Effects that only the mock knows; to the diagnosis they are unknown."""
 
 LIBRARY: tuple[type[Any], ...] = SHARED + OPEN_SET

@@ -1,4 +1,4 @@
-"""Masses and springs that nobody told the model about."""
+"""Masses, springs and disturbances that are missing in the model."""
 
 from __future__ import annotations
 

@@ -16,7 +16,8 @@ _COPPER_PER_KELVIN = 0.0039
 
 @dataclass
 class BackEmfError:
-    """The back-EMF constant of `joint`'s motor is `factor` times what it is taken for; the torque constant is not."""
+    """The back-EMF constant of `joint`'s motor is `factor` times its nominal value; the torque constant is
+    unchanged."""
 
     name: ClassVar[str] = "back_emf_error"
     shared: ClassVar[bool] = True

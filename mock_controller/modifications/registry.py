@@ -46,7 +46,7 @@ def build_modification(name: str, values: Mapping[str, object]) -> Modification:
 
 
 def build_modifications(requests: Iterable[tuple[str, Mapping[str, object]]]) -> tuple[Modification, ...]:
-    """Several modifications, in the order given; those of no size are left out, and so cost nothing."""
+    """Several modifications, in the order given; those at their null value are left out, so that they cost nothing."""
     built = (build_modification(name, values) for name, values in requests)
     return tuple(modification for modification in built if not is_null(modification))
 

@@ -18,12 +18,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PHASE_NAMES: dict[Phase, str] = {
-    "ramp_start": "start", "steady_ramp": "steady", "reversal": "reversal", "creep": "creep", "hold": "hold",
-}  # fmt: skip
+    "ramp_start": "start",
+    "steady_ramp": "steady",
+    "reversal": "reversal",
+    "creep": "creep",
+    "hold": "hold",
+}
 SHADES = (
-    (QUIET, 0.13), (COLOURS[1], 0.2), (COLOURS[1], 0.42), (COLOURS[1], 0.7), (COLOURS[1], 1.0), (COLOURS[5], 0.62),
+    (QUIET, 0.13),
+    (COLOURS[1], 0.2),
+    (COLOURS[1], 0.42),
+    (COLOURS[1], 0.7),
+    (COLOURS[1], 1.0),
+    (COLOURS[5], 0.62),
     (COLOURS[5], 1.0),
-)  # fmt: skip
+)
 """Colour and strength of a cell of the map, from noise to the strongest."""
 NOISE = 1.25
 """Times its noise up to which a cell is drawn as noise."""
@@ -42,8 +51,14 @@ def map_picture(where: Where, residual: str, trace: int = 0, *, small: bool = Fa
             _map(place, [c for c in cells if c.joint == joint], joint, limits)
             place.set_xlim(*ends)
         axes[-1].set_xlabel("time / s")
-        figure.legend(handles=_shade_legend(limits), loc="outside upper right", ncols=len(SHADES), fontsize=6.5,
-                      handlelength=1.2, columnspacing=1.1)  # fmt: skip
+        figure.legend(
+            handles=_shade_legend(limits),
+            loc="outside upper right",
+            ncols=len(SHADES),
+            fontsize=6.5,
+            handlelength=1.2,
+            columnspacing=1.1,
+        )
 
     limit = chance_significance(len(cells))
     beyond = sum(c.significance > limit for c in cells)

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from model.discrepancy.candidates.candidate_order import in_order
-from model.discrepancy.diagnosis import Candidate, RemainingShape, SignalError
-from model.reports.effect_names import placed
+from model.discrepancy.diagnosis import Candidate, RemainingShape, SignalError, in_order
+from model.effects.names import placed
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels
 from model.reports.numbers import whole
 from model.reports.page import Picture
@@ -55,8 +54,15 @@ def evidence_picture(
         for place, c in zip(places, [*fitted, *probed], strict=True):
             _bar(axes, place, c, scale, named=(c.effect, c.joints) in named)
         if fitted and probed:
-            axes.text(0.0, places[len(fitted)] + 0.72, "promised by probes alone, not fitted", va="center",
-                      fontsize=6.8, style="italic", color=QUIET)  # fmt: skip
+            axes.text(
+                0.0,
+                places[len(fitted)] + 0.72,
+                "promised by probes alone, not fitted",
+                va="center",
+                fontsize=6.8,
+                style="italic",
+                color=QUIET,
+            )
         axes.set_yticks(places, [placed(c.effect, c.joints) for c in (*fitted, *probed)])
         axes.set_ylim((places[-1] if places else 0) - 0.6, 0.6)
         if needed is not None:
@@ -156,9 +162,11 @@ def log_ticks(low: float, high: float, most: int = MOST_TICKS) -> list[float]:
             if len(inside) <= most:
                 return inside
     step = next(
-        float(f"{s}e{d}") for d in range(decades[0] - 3, decades[-1] + 1) for s in (1, 2, 5)
+        float(f"{s}e{d}")
+        for d in range(decades[0] - 3, decades[-1] + 1)
+        for s in (1, 2, 5)
         if (high - low) / float(f"{s}e{d}") < most
-    )  # fmt: skip
+    )
     return [round(step * k, 12) for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
 
 

@@ -1,4 +1,4 @@
-"""What a report of a fit says of its parameters: a table, a picture of the intervals, and what is not known."""
+"""The parameters in a report of a fit: a table, a picture of the intervals, and what the data leave open."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from model.fitting.identifiability import IdentifiabilityReport
 from model.fitting.result import FittedParameter
+from model.machine_model.model import Model
 from model.reports.figures import COLOURS, QUIET, drawn, panels
 from model.reports.page import Cell, Picture, Points, Table, Text, Tone, cells
 
@@ -21,7 +22,7 @@ def parameter_table(parameters: Sequence[FittedParameter]) -> Table:
     return Table(
         ("parameter", "value", "95 % interval", "unit", "before", "expected", "verdict"),
         tuple(_parameter_row(p) for p in parameters),
-        "A parameter that the traces do not determine gets no number; the model goes on with what was expected of it. "
+        "A parameter that the traces do not determine gets no number; the model keeps its expected value. "
         "Intervals take the correlation of the residual into account.",
     )
 
@@ -37,8 +38,8 @@ def _parameter_row(p: FittedParameter) -> tuple[Cell, ...]:
     return (*cells(p.name, value, interval), Cell(p.unit), before, after, Cell(verdict, tone))
 
 
-def interval_picture(parameters: Sequence[FittedParameter]) -> tuple[Picture, ...]:
-    """Intervals in expected deviations from the expected value."""
+def interval_picture(model: Model, parameters: Sequence[FittedParameter]) -> tuple[Picture, ...]:
+    """Intervals of parameters of the model, in expected deviations from the expected value."""
     shown = [p for p in parameters if p.value is not None and p.expected is not None and p.expected_deviation]
     if not shown:
         return ()
@@ -53,7 +54,8 @@ def interval_picture(parameters: Sequence[FittedParameter]) -> tuple[Picture, ..
             low, value, high = (
                 ((0.0 if v is None else v) - p.expected) / p.expected_deviation for v in (p.low, p.value, p.high)
             )
-            colour = COLOURS[(_joint(p.name) - 1) % len(COLOURS)]
+            first_joint = min(model.parameter(p.name).joints, default=1)
+            colour = COLOURS[(first_joint - 1) % len(COLOURS)]
             axes.plot([low, high], [row, row], color=colour, lw=2.0, solid_capstyle="butt")
             axes.plot([value], [row], "o", color=colour, ms=4)
         axes.set_yticks(range(len(shown)), [p.name for p in reversed(shown)])
@@ -62,26 +64,20 @@ def interval_picture(parameters: Sequence[FittedParameter]) -> tuple[Picture, ..
         axes.grid(visible=False, axis="y")
 
     caption = (
-        "Values with 95 % intervals, relative to what was expected before (band: one expected deviation). "
+        "Values with 95 % intervals, relative to the expected values (band: one expected deviation). "
         "Colours are those of the joints."
     )
     return (Picture(drawn(draw, 0.6 + 0.19 * len(shown)), caption),)
 
 
-def _joint(name: str) -> int:
-    """The first joint or link that a parameter's name has, 1 where it has none."""
-    digits = [c for c in name.split(".", maxsplit=1)[0] if c.isdigit()]
-    return int(digits[0]) if digits else 1
-
-
 def undetermined_blocks(report: IdentifiabilityReport) -> tuple[Text | Points, ...]:
-    """Combinations that the data leave open, and why parameters are not known."""
+    """Combinations that the data leave open, and the reasons why parameters are not known."""
     weak = [p for p in report.parameters if p.verdict != "known"]
     if not weak and not report.undetermined:
-        return (Text("Every parameter is determined by the traces alone, without the help of what was expected."),)
+        return (Text("Every parameter is determined by the traces alone, without the help of the priors."),)
     blocks: list[Text | Points] = []
     if report.undetermined:
-        blocks.append(Text("These changes leave the records as they are, within the noise:"))
+        blocks.append(Text("These changes do not change the records beyond the noise:"))
         blocks.append(Points(tuple(c.text for c in report.undetermined)))
     if weak:
         blocks.append(Text("By parameter:"))

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 
 def torque_report(found: TorqueFit, curves: Sequence[TorqueCurves]) -> Report:
-    """The page; `curves` are of the fitted model, on the traces that are to be drawn."""
+    """The page; `curves` are those of the fitted model on the traces to draw."""
     machine = found.model.machine
     sections = (
-        Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.parameters))),
+        Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.model, found.parameters))),
         Section("What the traces cannot tell", undetermined_blocks(found.identifiability)),
         Section("What is left of the torque", (_error_table(found), *(_picture(c, found) for c in curves))),
         Section("How it was done", (_how(found),)),
@@ -54,7 +54,7 @@ def _error_table(found: TorqueFit) -> Table:
     return Table(
         ("trace", "", "joint", "rms left", "rms of the torque"),
         tuple(rows),
-        "In N·m (N on a prismatic joint): torque that the motion needs by the model less torque of the recorded drive.",
+        "In N·m (N on a prismatic joint): torque that the model needs for the motion − torque of the recorded drive.",
     )
 
 

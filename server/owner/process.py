@@ -12,9 +12,9 @@ from daq.transport import PortBusyError
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.memory_map import default_memory_map, parse_memory_map
 from server import logs
-from server.owner.desk import Desk
 from server.owner.inbox import Inbox
 from server.owner.messages import CannotOpen, Open, Opened
+from server.owner.owned_robot import OwnedRobot
 from server.owner.owner import serve
 from server.owner.watched_controller import WatchedController
 from server.steady import keep_steady
@@ -46,7 +46,7 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
         WatchedController.connect, opening.robot, opening.url, memory_map, parent=inbox.guardian_end
     ) as session:
         controller, control = session.controller, session.take_control()
-        desk = Desk(
+        robot = OwnedRobot(
             opening.robot,
             opening.machine,
             opening.limits,
@@ -57,9 +57,9 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
             inbox,
             speaker,
         )
-        if (cause := desk.ended()) is not None:
+        if (cause := robot.ended()) is not None:
             control.stop(cause)
-        desk.read_gains()
+        robot.read_gains()
         identity = controller.identity
         keep_steady()
         speaker.ended(
@@ -71,4 +71,4 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
             )
         )
         with inbox.reading():
-            serve(desk)
+            serve(robot)

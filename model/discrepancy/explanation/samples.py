@@ -93,12 +93,18 @@ def _of_record(model: Model, without: Model, record: Record, signal: Signal) -> 
         "without": record.measured - _seen(plain, signal),
         "left": record.measured - _seen(full, signal),
         "time": np.repeat((inputs.rows * inputs.period)[:, None], asked.shape[1], axis=1),
-        "asked": asked, "speed": speed, "acceleration": np.gradient(speed, inputs.period, axis=0),
-        "direction": direction, "since_turn": _since_turn(direction, inputs.period),
-        "moving": phases_of(model, record) != HOLD, "gravity": gravity_loads(model, asked),
-        "drive": inputs.drive[rows], "error": inputs.set_points[rows] - record.measured,
-        "expected_drive": at_rows(plain.drive, inputs.rows), "expected_error": at_rows(plain.error, inputs.rows),
-    }  # fmt: skip
+        "asked": asked,
+        "speed": speed,
+        "acceleration": np.gradient(speed, inputs.period, axis=0),
+        "direction": direction,
+        "since_turn": _since_turn(direction, inputs.period),
+        "moving": phases_of(model, record) != HOLD,
+        "gravity": gravity_loads(model, asked),
+        "drive": inputs.drive[rows],
+        "error": inputs.set_points[rows] - record.measured,
+        "expected_drive": at_rows(plain.drive, inputs.rows),
+        "expected_error": at_rows(plain.error, inputs.rows),
+    }
 
 
 def _seen(run: Simulation, signal: Signal) -> Floats:

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
-from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, SignalError, Step, Verdict
-from model.discrepancy.explanation.notes import on_unfinished, on_what_is_stated
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, FoundValue, SignalError, Step, Verdict
+from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
+from model.discrepancy.explanation.renderer import with_sentences
+from model.discrepancy.grounds import Note, Reason, Refusal
 from model.discrepancy.inverse_dynamics import judging
 from model.discrepancy.inverse_dynamics.balance import TorqueBalance
 from model.discrepancy.inverse_dynamics.candidates import NOT_IN_TORQUE_SPACE
@@ -23,10 +25,9 @@ from model.discrepancy.inverse_dynamics.likelihood import stretches_of
 from model.discrepancy.inverse_dynamics.locating import located, remaining_shapes
 from model.discrepancy.inverse_dynamics.noise_floor import noise_floor
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
-from model.discrepancy.inverse_dynamics.reasons import reason, with_sizes
 from model.discrepancy.inverse_dynamics.records import TorqueRecord, acts_until_next_sample, torque_records
 from model.discrepancy.inverse_dynamics.search import Fitted, Turn, evidence, look
-from model.discrepancy.inverse_dynamics.tolerances import tolerances
+from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.machine_model.model import Lineage, Model
 
@@ -92,14 +93,15 @@ class _Workflow:
     added: frozenset[str] = frozenset()
     steps: list[Step] = field(default_factory=list)
     tried: tuple[Candidate, ...] = ()
-    notes: list[str] = field(default_factory=list)
+    notes: list[Note] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.data = Data(stretches_of(self.records), np.maximum(FLOOR_SHARE * self.floor, 1e-12))
         self.begin = self.model
         self.now = self._fit(self.model)
         self.first = self.now.values
-        self.notes.append(tolerances(self.model)[1])
+        source = {"source": tolerances(self.model)[1], "share": FITTED_SHARE}
+        self.notes.append(Note(kind="tolerance-source", values=source))
 
     def run(self) -> None:
         """Turn after turn, until nothing more is significant or holds."""
@@ -199,9 +201,8 @@ class _Workflow:
             rmse_holdout=judging.signal_errors(self.model, before, after, self.floor) if self.held else (),
             excess_removed_holdout=lost if self.held else None,
             where=located(self.model, self.records, self.now.residual, self.data.stretches, self.floor),
-            reason=reason(chosen.effect, chosen.joints, values, removed, slides=self._slides(chosen.joints)),
-            adopted=holds,
-            rejected_because=None if holds else f"on records not fitted to the mean square falls by only {removed:.1%}",
+            reason=UNWRITTEN, reason_data=Reason(removed=removed, slides=self._slides(chosen.joints)),
+            adopted=holds, refusal=None if holds else Refusal(kind="falls-too-little", numbers={"share": removed}),
         )  # fmt: skip
 
     def _slides(self, joints: tuple[int, ...]) -> bool:
@@ -242,11 +243,9 @@ class _Workflow:
             if lost < 0:
                 self.model, self.now = without.with_values(smaller.values), smaller
                 self.added -= set(step.parameters)
-                names = step.effect.replace("_", " ")
-                self.steps[index] = step.model_copy(
-                    update={"adopted": False, "rejected_because": "superfluous once a later effect was in"}
-                )
-                self.notes.append(f"{names}, step {index + 1}, was taken out again: a later effect explains it")
+                gone = {"adopted": False, "refusal": Refusal(kind="superfluous")}
+                self.steps[index] = step.model_copy(update=gone)
+                self.notes.append(Note(kind="taken-out-again", values={"effect": step.effect, "step": index + 1}))
 
     def _as_last_fitted(self) -> tuple[Step, ...]:
         """Steps with the last fit's parameters: what was still missing at their turn has bent them."""
@@ -257,17 +256,16 @@ class _Workflow:
             if not own:
                 steps.append(step)
                 continue
-            slides = self._slides(step.joints)
-            told = with_sizes(step.reason, step.joints, step.parameters, last, slides=slides)
-            steps.append(step.model_copy(update={"parameters": last, "reason": told}))
+            steps.append(step.model_copy(update={"parameters": last}))
         return tuple(steps)
 
-    def _shares(self) -> str:
+    def _shares(self) -> Note:
         """Residual as a share of the recorded torque, before and after, a figure that other work gives too."""
-        records, where = (self.held, "held-out traces") if self.held else (self.records, "the traces fitted to")
+        records = self.held or self.records
         before = judging.relative_torque_error(self.begin.with_values(self.first), records)
         after = judging.relative_torque_error(self.model.with_values(self.now.values), records)
-        return f"torque left unexplained on {where}: {before:.1%} of the recorded before, {after:.1%} after"
+        values = {"held_out": bool(self.held), "before": before, "after": after}
+        return Note(kind="torque-left", values=values)
 
     def _errors(self, records: tuple[TorqueRecord, ...]) -> tuple[SignalError, ...]:
         """Of every joint on these records, from the model as it was given to the one that comes out."""
@@ -291,52 +289,35 @@ class _Workflow:
             verdict = "named"
         elif shapes:
             verdict = "unknown-effect"
-        stated = on_what_is_stated((p for p in self.now.adjustables if p.name not in self.added), self.now.values)
+        stated = on_stated_numbers((p for p in self.now.adjustables if p.name not in self.added), self.now.values)
         lineage = Lineage(
             parent=before.identity, traces=tuple(traces), fit={"fitted": [p.name for p in self.now.adjustables]},
-            note="; ".join(s.reason for s in adopted),
+            note="diagnosis",
         )  # fmt: skip
         after = self.model.with_values(self.now.values).with_lineage(lineage)
         left = located(self.model, self.records, self.now.residual, self.data.stretches, self.floor)
-        return Diagnosis(
-            verdict=verdict, summary=_summary(adopted, bool(shapes)), steps=steps,
+        return with_sentences(Diagnosis(
+            verdict=verdict, summary=UNWRITTEN, method="inverse-dynamics", steps=steps,
             rmse_fit=self._errors(self.records), rmse_holdout=self._errors(self.held), where=left,
             candidates=self.tried, remaining=shapes, model_before=before, model_after=after, traces=tuple(traces),
             holdout=tuple(holdout), seconds=seconds, robot_seconds=robot, significant=self.options.least_evidence,
-            notes=(*stated, self._shares(), *_assumptions(cutoff), *self.notes),
-        )  # fmt: skip
+            notes_data=(*stated, self._shares(), *_assumptions(cutoff), *self.notes),
+        ))  # fmt: skip
 
 
 def _delays(found: Fitted) -> list[float]:
     return [found.fit.values[p.name] for p in found.parameters]
 
 
-def _timing_note(found: Fitted, records: Sequence[TorqueRecord]) -> str:
-    times = ", ".join(f"{1e3 * t:.2g} ms" for t in _delays(found))
-    least = 1e3 * min(record.sampled for record in records)
+def _timing_note(found: Fitted, records: Sequence[TorqueRecord]) -> Note:
+    period = min(record.sampled for record in records)
+    return Note(kind="drive-timing", values={"delays": _delays(found), "period": period})
+
+
+def _assumptions(cutoff: float) -> tuple[Note, ...]:
     return (
-        f"the drive acts {times} after its sample, less than the {least:.2g} ms between samples: taken for how it is "
-        "held between them, and for no effect"
-    )
-
-
-def _summary(adopted: Sequence[Step], more: bool) -> str:
-    rest = "something that none of the known effects explains is left" if more else ""
-    if not adopted:
-        return rest or "nothing significant: the torques are what the model expects, within its tolerances and noise"
-    named = []
-    for step in adopted:
-        where = f" on joint {', '.join(map(str, step.joints))}" if step.joints else ""
-        names = " or ".join(c.effect for c in step.group) if step.group else str(step.effect)
-        named.append(names.replace("_", " ") + where)
-    return "; ".join([*named, *([rest] if rest else [])])
-
-
-def _assumptions(cutoff: float) -> tuple[str, ...]:
-    unseen = "; ".join(f"{n.replace('_', ' ')} {why}" for n, why in NOT_IN_TORQUE_SPACE.items())
-    return (
-        f"compared as torques below {cutoff:g} Hz; faster effects are not seen",
-        "samples at which a joint rests are left out: friction holds it with whatever torque it takes",
-        f"not looked for: {unseen}",
-        "positions are taken to be those of the links, behind the transmission",
+        Note(kind="cutoff", values={"cutoff": cutoff}),
+        Note(kind="resting-left-out"),
+        Note(kind="not-looked-for", values={"effects": NOT_IN_TORQUE_SPACE}),
+        Note(kind="positions-of-links"),
     )

@@ -8,8 +8,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from model.discrepancy.diagnosis import AgainstWhat, Dependence, Phase, PhaseCell, RemainingShape, Where
-from model.discrepancy.explanation.numbers import plain
+from model.discrepancy.diagnosis import (
+    UNWRITTEN,
+    AgainstWhat,
+    Dependence,
+    Phase,
+    PhaseCell,
+    RemainingShape,
+    Where,
+    WorstPlace,
+)
 from model.discrepancy.inverse_dynamics.judging import torque_unit
 from model.discrepancy.inverse_dynamics.likelihood import Stretches
 from model.discrepancy.inverse_dynamics.records import TorqueRecord
@@ -32,10 +40,6 @@ SHAPE_SHARE = 0.15
 """What a shape of the remaining torque must have to be shown: standard deviations, and a share of the variance."""
 BEYOND_NOISE = 1.5
 """Times the noise that a remaining torque must be."""
-SPOKEN = {
-    "ramp_start": "as it speeds up", "steady_ramp": "in steady motion", "reversal": "at reversals",
-    "creep": "in slow motion", "hold": "at rest",
-}  # fmt: skip
 
 
 def phases(record: TorqueRecord, joint: int) -> list[Phase]:
@@ -88,12 +92,14 @@ def located(
         if worst is None or relative > worst[0]:
             worst = relative, joint, phase
     if worst is None:
-        return Where(joint=None, phase=None, summary="no joint moves", cells=(), dependences=())
+        return Where(joint=None, phase=None, summary=UNWRITTEN, cells=(), dependences=())
     ratio, joint, where = worst
     unit = torque_unit(model, joint)
     rms = ratio * floor[model.machine.modelled_joints.index(joint)]
-    summary = f"joint {joint}, mostly {SPOKEN[where]}: {plain(rms, 3)} {unit} rms, {plain(ratio)} times its noise"
-    return Where(joint=joint, phase=where, summary=summary, cells=tuple(cells), dependences=tuple(dependences))
+    place = WorstPlace(joint=joint, phase=where, ratio=ratio, rms=rms, unit=unit, whole_record=True)
+    return Where(
+        joint=joint, phase=where, summary=UNWRITTEN, cells=tuple(cells), dependences=tuple(dependences), worst=place
+    )
 
 
 def remaining_shapes(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +40,12 @@ class Adjustable:
     scale: float
 
 
-def tolerances(model: Model, added: frozenset[str] = frozenset()) -> tuple[tuple[Adjustable, ...], str]:
-    """Parameters that may be off, and a line for people on where their deviations come from.
+DeviationSource = Literal["stated", "fitted-before", "free"]
+"""Where deviations come from: the machine file; an assumption after an earlier fit; nowhere (nearly free)."""
+
+
+def tolerances(model: Model, added: frozenset[str] = frozenset()) -> tuple[tuple[Adjustable, ...], DeviationSource]:
+    """Parameters that may be off, and where their deviations come from.
 
     Args:
         added: effects' parameters (full names) that the diagnosis itself put in; they have no prior.
@@ -48,18 +53,19 @@ def tolerances(model: Model, added: frozenset[str] = frozenset()) -> tuple[tuple
     own = [p for p in model.parameters if p.name not in added]
     stated = [p for p in own if p.deviation is not None and p.effect is None and not _held(p)]
     machine: list[tuple[Parameter, float | None]]
+    source: DeviationSource
     if stated:
         machine = [(p, p.deviation) for p in stated]
-        line = "parameters may be off by what the machine file states"
+        source = "stated"
     elif model.lineage.traces:
         machine = [(p, FITTED_SHARE * _size(p)) for p in own if _inertial(p) and p.value != 0.0]
-        line = f"the machine file states no deviations; fitted bodies are taken to be known to {FITTED_SHARE:.0%}"
+        source = "fitted-before"
     else:
         machine = [(p, FREE_SHARE * _size(p)) for p in own if _inertial(p) and p.value != 0.0]
-        line = "the machine file states no deviations; masses, centres and inertias are free"
+        source = "free"
     effects = [(p, p.deviation) for p in own if p.effect is not None]
     found = [(p, None) for p in model.parameters if p.name in added]
-    return tuple(_adjustable(p, d) for p, d in (*machine, *effects, *found)), line
+    return tuple(_adjustable(p, d) for p, d in (*machine, *effects, *found)), source
 
 
 def _held(p: Parameter) -> bool:

@@ -204,7 +204,7 @@ def test_a_trace_is_found_by_the_beginning_of_its_number_or_name() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "arm.lab:8300", "ftp://arm.lab", "http://", "http://a:b@arm.lab", "http://x?y=1"])
-def test_addresses_of_no_service(text: str) -> None:
+def test_an_address_that_can_be_no_services_is_refused(text: str) -> None:
     with pytest.raises(SpecError, match="server"):
         parse_url(text)
 

@@ -96,11 +96,11 @@ class StandIn:
             self.postures[joint - 1] = posture
         self.log.append("set points")
 
-    def stopped(self, cause: str) -> StoppedError:
+    def freeze_for_stop(self, cause: str) -> StoppedError:
         self._freeze()
         return StoppedError(cause)
 
-    def tripped(self, cause: str) -> TeachingError:
+    def freeze_for_fault(self, cause: str) -> TeachingError:
         self._freeze()
         return TeachingError(cause)
 

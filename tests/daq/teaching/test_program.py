@@ -165,7 +165,7 @@ def test_a_program_comes_back_from_its_file_to_the_bit(parts: list[dict[str, obj
     assert parse_program(program_text(made)) == made
 
 
-def test_files(tmp_path: Path) -> None:
+def test_a_saved_program_loads_as_it_was(tmp_path: Path) -> None:
     made = Program.model_validate(EVERYTHING)
     save_program(made, tmp_path / "pick.json")
     assert load_program(tmp_path / "pick.json") == made

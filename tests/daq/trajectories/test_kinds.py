@@ -33,7 +33,7 @@ def test_staircase_goes_up_and_down_in_equal_steps_and_dwells_on_each() -> None:
     assert marked(planned, "reversal") == [6]
 
 
-def test_staircase_of_one_step_and_back() -> None:
+def test_a_staircase_of_one_step_goes_up_and_back() -> None:
     planned = motion(joints=(1,), trajectory={"kind": "staircase", "amplitude": 0.1, "steps": 1, "dwell": 0.02})
     assert offsets(planned) == pytest.approx([0, 0.1, 0])
 

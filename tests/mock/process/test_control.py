@@ -124,7 +124,7 @@ def test_the_guide_lists_every_command(desk: Desk) -> None:
     assert set(re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)) - {"do"} == set(desk.say("help")["commands"])
 
 
-def test_help_and_modifications(desk: Desk) -> None:
+def test_commands_and_modifications_are_listed(desk: Desk) -> None:
     assert "state" in desk.say("help")["commands"]
     assert all(desk.say("help")["commands"].values())
     assert desk.say("modifications") == {"ok": True, "modifications": []}

@@ -33,7 +33,7 @@ def test_an_effect_that_no_law_of_the_library_describes_is_not_given_a_name(
     answer = diagnosed(tmp_path, COUPLED, experiment=experiment, options=options)
     assert answer.verdict == "unknown-effect", answer.summary
     assert not [s for s in answer.steps if s.adopted]
-    assert answer.summary.startswith("joint 2")
+    assert answer.summary.startswith("Joint 2")
 
 
 @pytest.mark.parametrize("experiment", [SLOW_REVERSALS, pytest.param(WHOLE, marks=pytest.mark.slow)])

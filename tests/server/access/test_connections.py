@@ -11,7 +11,7 @@ import uvicorn
 from starlette.types import Receive, Scope, Send
 from uvicorn.server import ServerState
 
-from server.connections import MOST_HEADERS, Connection
+from server.access.connections import MOST_HEADERS, Connection
 
 MOST = 4
 
@@ -22,7 +22,7 @@ async def _answer(scope: Scope, receive: Receive, send: Send) -> None:
 
 
 def test_a_crowd_that_asks_for_nothing_keeps_nobody_out_and_does_not_grow(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.connections.MOST_CONNECTIONS", MOST)
+    monkeypatch.setattr("server.access.connections.MOST_CONNECTIONS", MOST)
 
     async def asked(listener: socket.socket) -> tuple[int, int]:
         config, state = uvicorn.Config(_answer, lifespan="off", log_config=None), ServerState()

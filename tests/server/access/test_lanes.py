@@ -12,7 +12,7 @@ from daq.contracts.service.experiments import MotionPreview
 from server.access import lanes
 from server.access.lanes import AT_ONCE, MOST_WAITING, Lanes
 from server.bounded.messages import Limits, WorkOutMotion
-from server.bounded.motion import worked_out
+from server.bounded.motion import preview_of
 from server.bounded.workers import Workers
 from server.problems import ProblemError
 
@@ -64,5 +64,5 @@ def test_a_long_motion_is_the_same_wherever_it_is_worked_out() -> None:
     answer = workers.ask(order)
     wrong = workers.ask(order.model_copy(update={"spec": spec.model_copy(update={"repeats": 1000})}))
     workers.close()
-    assert MotionPreview.model_validate(answer.data) == worked_out(order)
+    assert MotionPreview.model_validate(answer.data) == preview_of(order)
     assert "longer than" in wrong.problem or "allowed" in wrong.problem

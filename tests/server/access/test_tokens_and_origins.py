@@ -23,7 +23,7 @@ from server.access.limits import Bucket, Buckets
 from server.access.origin import is_from_elsewhere, is_known_name, is_loopback, is_this_computers_user
 from server.access.tickets import GOOD_FOR, Tickets
 from server.access.tokens import REMEMBERED_FOR, UNKNOWN_FOR, KnownTokens, TokenStore, digest_of
-from server.store.database_errors import DamagedError
+from server.database_errors import DamagedError
 from server.store.engine import Store
 from server.store.tables import TokenRow
 from tests.daq_cli.invoke import CommandLine

@@ -63,9 +63,13 @@ def test_what_the_guide_says_to_type_works(block: str, service: Service, at_the_
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_its_programs_run(program: str, service: Service, tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", _here(program, service)], cwd=tmp_path, capture_output=True, text=True, timeout=100,
+        [sys.executable, "-c", _here(program, service)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=100,
         check=False,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[0].split() == ["done"]
@@ -76,9 +80,13 @@ def test_its_programs_run(program: str, service: Service, tmp_path: Path) -> Non
 def test_the_study_runs(service: Service, tmp_path: Path) -> None:
     script = ROOT / "examples" / "repeatability.py"
     done = subprocess.run(
-        [sys.executable, str(script), service.url, "--runs", "2", "--folder", "kept"], cwd=tmp_path,
-        capture_output=True, text=True, timeout=100, check=False,
-    )  # fmt: skip
+        [sys.executable, str(script), service.url, "--runs", "2", "--folder", "kept"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     assert len(list((tmp_path / "kept").glob("*.mcap"))) == 2
     assert [line.split(":")[0] for line in done.stdout.splitlines()[2:]] == ["joint 1", "joint 2", "joint 3"]

@@ -130,8 +130,23 @@ def _tried(url: str, folder: Path, *options: str) -> subprocess.CompletedProcess
     description = folder / "openapi.json"
     told = httpx.get(f"{url}/api/v1/openapi.json", timeout=100).json()
     description.write_text(json.dumps(_without_prefix_items(told)), "utf-8")
-    command = [str(schemathesis), "run", str(description), "--url", url, "--checks", CHECKS, "--seed", "1",
-               "--request-timeout", "60", "--generation-database", "none", "--no-color", *options]  # fmt: skip
+    command = [
+        str(schemathesis),
+        "run",
+        str(description),
+        "--url",
+        url,
+        "--checks",
+        CHECKS,
+        "--seed",
+        "1",
+        "--request-timeout",
+        "60",
+        "--generation-database",
+        "none",
+        "--no-color",
+        *options,
+    ]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 

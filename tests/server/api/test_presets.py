@@ -21,8 +21,12 @@ def test_the_rules_of_a_specification_name_bounds_and_defaults(service: Service)
     schema = service.robot.get("/spec-schema").json()
     ramp = schema["$defs"]["Ramp"]["properties"]
     assert ramp["duration"] == {
-        "default": 0.65, "exclusiveMinimum": 0, "maximum": 3600, "title": "Duration", "type": "number",
-    }  # fmt: skip
+        "default": 0.65,
+        "exclusiveMinimum": 0,
+        "maximum": 3600,
+        "title": "Duration",
+        "type": "number",
+    }
     assert schema["properties"]["repeats"]["maximum"] == 1000
     assert set(schema["properties"]["trajectory"]["discriminator"]["mapping"]) >= {"ramp", "sine", "sequence"}
 

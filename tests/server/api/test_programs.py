@@ -13,8 +13,8 @@ from sqlalchemy import text
 from daq.teaching import Program
 from daq.teaching.program import Absolute, Wait, load_program
 from server.backup.database import copy_database
+from server.database_errors import DamagedError
 from server.problems import ProblemError
-from server.store.database_errors import DamagedError
 from server.store.engine import Store
 from server.store.programs import MOST_PROGRAMS, ProgramStore
 from tests.daq_cli.invoke import CommandLine
@@ -200,4 +200,4 @@ def test_the_command_line_keeps_lists_fetches_runs_and_deletes(
     assert daq(*at, "programs", "delete", "waits").code == 0
     daq(*at, "program", "waits").complains(2, "there is no program 'waits'")
     daq(*at, "program", "no such").complains(2, "there is no such file")
-    daq("teach", "programs", "ls").complains(2, "a service keeps them")
+    daq("teach", "programs", "ls").complains(2, "a service has")

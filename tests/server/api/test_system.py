@@ -17,7 +17,7 @@ import pytest
 from sqlalchemy.exc import OperationalError
 
 from server.clock import SystemClock
-from server.readiness import KEPT_FOR, Readiness
+from server.monitoring.readiness import KEPT_FOR, Readiness
 from server.store.engine import Store
 from tests.server.clocks import HandClock
 from tests.server.inside import service_inside
@@ -39,7 +39,7 @@ def _read_only(**_: object) -> NoReturn:
 def test_a_disk_that_cannot_be_written_is_not_ready_and_only_who_may_see_the_robot_is_told_why(
     api: httpx.Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.readiness.KEPT_FOR", 0.0)
+    monkeypatch.setattr("server.monitoring.readiness.KEPT_FOR", 0.0)
     address = api.base_url.join("/readyz")
     assert api.get(address).json()["checks"] == {"database": "", "traces": "", "robot ma2000": ""}
     assert sorted(path.suffix for path in (tmp_path / "traces").iterdir()) == []
@@ -66,10 +66,10 @@ def test_readiness_is_looked_at_once_for_all_who_ask_and_again_after_a_second() 
 
     async def ask() -> None:
         for _ in range(2):
-            told = await asyncio.gather(*(readiness.told(look) for _ in range(20)))
+            told = await asyncio.gather(*(readiness.check(look) for _ in range(20)))
             assert {one["looks"] for one in told} == {"1"}
         clock.turn(KEPT_FOR)
-        assert (await readiness.told(look))["looks"] == "2"
+        assert (await readiness.check(look))["looks"] == "2"
 
     asyncio.run(ask())
 

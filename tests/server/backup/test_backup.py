@@ -49,9 +49,22 @@ def add_trace(store: Store, places: Places, number: str) -> None:
     part.write_bytes(f"trace {number} ".encode() * 1000)
     part.replace(places.traces / f"{number}.mcap")
     new = NewTrace(
-        id=number, robot="ma2000", file=f"{number}.mcap", created=NOW, source="mock", kind="ramp", name=None,
-        joints=(1,), outcome="complete", samples=1, duration=0.0, size=1, operator=None, experiment=None, notes="",
-    )  # fmt: skip
+        id=number,
+        robot="ma2000",
+        file=f"{number}.mcap",
+        created=NOW,
+        source="mock",
+        kind="ramp",
+        name=None,
+        joints=(1,),
+        outcome="complete",
+        samples=1,
+        duration=0.0,
+        size=1,
+        operator=None,
+        experiment=None,
+        notes="",
+    )
     TraceStore(store).insert(new)
 
 
@@ -220,9 +233,18 @@ def _changed(archive: Path, change: str) -> None:
 
 @pytest.mark.parametrize(
     "change",
-    ["a file is missing", "a file has other bytes", "a file too many", "another robot's", "a newer format",
-     "newer tables", "a path out of it", "no list", "no database"],
-)  # fmt: skip
+    [
+        "a file is missing",
+        "a file has other bytes",
+        "a file too many",
+        "another robot's",
+        "a newer format",
+        "newer tables",
+        "a path out of it",
+        "no list",
+        "no database",
+    ],
+)
 def test_what_is_not_a_whole_backup_of_this_robot_is_refused_before_anything_is_touched(
     archive: Path, tmp_path: Path, change: str
 ) -> None:

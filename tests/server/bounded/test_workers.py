@@ -9,11 +9,11 @@ import sys
 
 import pytest
 
-from server.jobs.desk import worker_processes
+from server.jobs.service import worker_processes
 
 FOREVER = """
 import os, sys
-from server.jobs.desk import worker_processes
+from server.jobs.service import worker_processes
 
 if __name__ == "__main__":
     workers = worker_processes(1)

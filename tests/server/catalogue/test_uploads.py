@@ -14,7 +14,7 @@ import pytest
 
 from benchmarks.hostile_files import bomb, hostile_tables, hostile_traces, sound_trace, table
 from server.bounded.messages import Limits, ReadUpload
-from server.bounded.process import answered
+from server.bounded.process import answer_order
 from server.bounded.workers import ExhaustedError, Workers
 from server.problems import ProblemError
 from tests.server.service import Service
@@ -105,7 +105,7 @@ def test_nobody_waits_for_a_reader_once_the_service_ends(tmp_path: Path) -> None
 
 
 def test_an_error_that_nobody_has_foreseen_is_a_line_and_a_traceback_for_the_log() -> None:
-    answer = answered('{"kind": "nonsense"}', LIMITS)
+    answer = answer_order('{"kind": "nonsense"}', LIMITS)
     assert answer.problem.startswith("cannot be read: ValidationError")
     assert "Traceback" in answer.fault
     assert answer.spent

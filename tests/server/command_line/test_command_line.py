@@ -63,9 +63,14 @@ def test_its_result_as_json_and_a_dry_run_are_the_same_too(
 def test_ctrl_c_stops_the_arm_and_the_partial_trace_is_fetched(service: Service, tmp_path: Path) -> None:
     command = [*DAQ, "--server", service.url, *RAMP, "--hold", "600"]
     running = subprocess.Popen(
-        command, cwd=tmp_path, env=environment_in(tmp_path), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        command,
+        cwd=tmp_path,
+        env=environment_in(tmp_path),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     assert running.stderr is not None
     for line in running.stderr:
         if "ramp end" in line:
@@ -83,9 +88,14 @@ def test_ctrl_c_takes_back_what_waits_and_stops_nobody_else(service: Service, tm
     others = service.robot.post("/experiments", json={"spec": spec}).json()["id"]
     service.until_recording(others)
     running = subprocess.Popen(
-        [*DAQ, "--server", service.url, *RAMP], cwd=tmp_path, env=environment_in(tmp_path), stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        [*DAQ, "--server", service.url, *RAMP],
+        cwd=tmp_path,
+        env=environment_in(tmp_path),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     try:
         while not service.robot.get("/queue/experiments").json():
             assert running.poll() is None
@@ -187,7 +197,7 @@ def test_wrong_addresses_are_one_line(here: CommandLine) -> None:
         (["--server", "arm.lab", "status"], 2, "write http://host:port"),
         (["--server", "http://127.0.0.1:1", "status"], 3, "not reached"),
         (["--server", "http://x", "--port", "mock://", "status"], 2, "give one of them"),
-        (["queue", "show"], 2, "a service has it"),
+        (["queue", "show"], 2, "a service has"),
     ):
         here(*words).complains(code, told)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from daq.contracts.service.jobs import DiagnoseRequest, FitRequest, Job, WaitsBehind
-from daq_cli.robot.remote.jobs import standing_of
+from daq_cli.models.service_jobs import standing_of
 from model.machine_model.model_file import load_model
 from tests.daq_cli.invoke import CommandLine, Said
 from tests.server.desk import anothers_desk

@@ -16,12 +16,12 @@ from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.robot import RobotIdentity
 from daq.trajectories import plan, start_angles
+from server.experiments.length import LONGEST, least_length, points_of
+from server.experiments.order import Waiting, next_due
+from server.experiments.schedule import Plan, following, is_due
+from server.experiments.states import Event, IllegalEventError, advance, after_restart
 from server.owner.messages import ArmReport
-from server.queue.length import LONGEST, least_length, points_of
-from server.queue.order import Waiting, next_due
 from server.queue.readiness import Circumstances, what_is_missing
-from server.queue.schedule import Plan, following, is_due
-from server.queue.states import Event, IllegalEventError, advance, after_restart
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 moments = st.datetimes(datetime(2026, 1, 1), datetime(2027, 1, 1)).map(lambda moment: moment.replace(tzinfo=UTC))

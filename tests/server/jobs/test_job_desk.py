@@ -18,13 +18,13 @@ from daq.contracts.trace_limits import TraceLimits
 from model.machine_model.model import base_model
 from server.api.traces import delete_trace
 from server.catalogue.catalogue import Catalogue
-from server.jobs.desk import JobDesk, JobParts
+from server.experiments.states import Event
 from server.jobs.lanes import lane_of
 from server.jobs.mailbox import CANCEL, MODEL, Mailbox
 from server.jobs.models import Models
+from server.jobs.service import JobContext, JobService
 from server.jobs.work import Ended, carry_out
 from server.problems import ProblemError
-from server.queue.states import Event
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
@@ -76,13 +76,20 @@ class Bench:
         self.make_executor: Callable[[int], Executor] = lambda _count: self.executor
         self.changed = threading.Condition()
         self.told: list[Job] = []
-        self.desk = JobDesk(
-            JobParts(
-                robot="ma2000", machine=MACHINE, folder=self.folder, jobs=self.jobs, catalogue=self.catalogue,
-                models=self.models, clock=self.clock, changed=self._hear, at_once=1,
+        self.desk = JobService(
+            JobContext(
+                robot="ma2000",
+                machine=MACHINE,
+                folder=self.folder,
+                jobs=self.jobs,
+                catalogue=self.catalogue,
+                models=self.models,
+                clock=self.clock,
+                changed=self._hear,
+                at_once=1,
                 make_executor=self._make_executor,
             )
-        )  # fmt: skip
+        )
 
     def _carry_out(self, folder: Path) -> Ended:
         return self.carry_out(folder)  # as it is then
@@ -194,7 +201,8 @@ def test_a_worker_that_cannot_be_had_ends_its_job_and_no_other(bench: Bench) -> 
     first, second = _submitted(bench), _submitted(bench)
     bench.desk.start()
     assert bench.end_of(second).state == "done"
-    assert bench.end_of(first).reason == "program fault: OSError: no process any more"
+    failed = bench.end_of(first)
+    assert (failed.failure, failed.reason) == ("program-fault", "program fault: OSError: no process any more")
 
 
 def test_a_job_whose_executor_is_broken_is_given_to_a_new_one(bench: Bench) -> None:
@@ -253,7 +261,8 @@ def test_a_model_that_can_never_be_kept_holds_up_no_other_job(
     bench.desk.start()
     assert bench.end_of(second).state == "done"
     if isinstance(error, ValueError):  # nothing that another look could mend
-        assert bench.end_of(first).reason == "program fault: ValueError: no model"
+        failed = bench.end_of(first)
+        assert (failed.failure, failed.reason) == ("program-fault", "program fault: ValueError: no model")
 
 
 def test_what_could_not_be_begun_is_begun_at_the_next_look(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -362,11 +371,13 @@ def test_a_short_job_waits_behind_no_diagnosis_and_the_next_one_says_behind_what
     _until(bench, lambda: {diagnosis.id, short.id} <= {job.id for job in bench.told if job.state == "running"})
     assert set(held.futures) == {diagnosis.id, short.id}
 
-    told = {job.id: job for job in bench.desk.all_as_told(bench.jobs.waiting("ma2000"))}
+    told = {job.id: job for job in bench.desk.with_progress_all(bench.jobs.waiting("ma2000"))}
     behind = [told[job.id].waits_behind for job in (fit, other_fit, next_short)]
     assert [(one.job, one.request.kind, one.others) for one in behind if one] == [
-        (diagnosis.id, "diagnose", 0), (diagnosis.id, "diagnose", 1), (short.id, "compare", 0),
-    ]  # fmt: skip
+        (diagnosis.id, "diagnose", 0),
+        (diagnosis.id, "diagnose", 1),
+        (short.id, "compare", 0),
+    ]
     assert all(one and one.started == bench.clock.utc() for one in behind)
 
     held.futures[diagnosis.id].set_result(Ended())

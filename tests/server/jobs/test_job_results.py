@@ -75,12 +75,12 @@ def test_headlines_name_what_was_found() -> None:
     answer, comparison = an_answer(4.0)
     step = answer.steps[0]
     told = headlines.of_diagnosis
-    assert told(answer) == "named: coulomb friction, joint 2"
+    assert told(answer) == "named: Coulomb friction, joint 2"
     undecided = answer.model_copy(
         update={"verdict": "ambiguous", "steps": (step.model_copy(update={"group": step.candidates[:5]}),)}
     )
     assert told(undecided) == (
-        "one of: coulomb friction, joint 2 or stiction, joint 2 or stribeck friction, joint 2 or 2 more"
+        "one of: Coulomb friction, joint 2 or stiction, joint 2 or Stribeck friction, joint 2 or 2 more"
     )
     assert told(answer.model_copy(update={"verdict": "nothing-significant"})) == "nothing significant"
     assert headlines.of_comparison(comparison).startswith("error before ")
@@ -117,9 +117,13 @@ def test_a_sound_arm_is_called_sound_and_the_queue_takes_what_the_diagnosis_asks
     sound_service: Service, ramps: tuple[str, str]
 ) -> None:
     request = {
-        "kind": "diagnose", "traces": [ramps[0]], "held_out": [ramps[1]], "joints": [2], "most_steps": 1,
+        "kind": "diagnose",
+        "traces": [ramps[0]],
+        "held_out": [ramps[1]],
+        "joints": [2],
+        "most_steps": 1,
         "effects": ["coulomb_friction", "stribeck_friction"],
-    }  # fmt: skip
+    }
     job, found = result_of(sound_service, request)
     assert (found.verdict, job["headline"]) == ("nothing-significant", "nothing significant"), found.summary
     assert found.significant == THRESHOLDS.significant

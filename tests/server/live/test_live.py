@@ -17,10 +17,10 @@ from websockets.typing import Origin
 
 from server.access.caller import LOCAL
 from server.access.gate import MOST_SOCKETS
+from server.api.stream import stream
 from server.live.history import History
 from server.live.hub import Hub
 from server.live.outbox import DROP_AFTER, THIN_AFTER, THIN_BEYOND, Outbox
-from server.live.stream import stream
 from server.owner.messages import LiveSample
 from tests.server.clocks import HandClock
 from tests.server.live.watching import frames, messages, watching
@@ -186,7 +186,7 @@ def test_a_client_that_takes_nothing_is_hopeless_and_one_that_waits_for_news_is_
 def test_a_client_that_does_not_take_its_dismissal_either_is_dropped_without_a_fault(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("server.live.stream.LOOK_EVERY", 0.001)
+    monkeypatch.setattr("server.api.stream.LOOK_EVERY", 0.001)
     clock = HandClock()
 
     async def never(*_: object) -> None:
@@ -211,9 +211,16 @@ def test_a_client_that_does_not_take_its_dismissal_either_is_dropped_without_a_f
 def _sample(tick: int, value: float) -> LiveSample:
     six = (value,) * 6
     return LiveSample(
-        tick=tick, host_time=tick * 0.02, joints=(1, 2, 3, 4, 5, 6), set_point=six, position=six, error=six, drive=six,
-        status=0, lateness=0.0,
-    )  # fmt: skip
+        tick=tick,
+        host_time=tick * 0.02,
+        joints=(1, 2, 3, 4, 5, 6),
+        set_point=six,
+        position=six,
+        error=six,
+        drive=six,
+        status=0,
+        lateness=0.0,
+    )
 
 
 @given(st.integers(1, 150), st.integers(10, 40))

@@ -10,17 +10,31 @@ from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
 from daq.contracts.service.jobs import CompareRequest, Job
-from server.metrics import Metrics
+from server.monitoring.metrics import Metrics
 from tests.server.service import Service
 
 NOON = datetime(2026, 3, 2, 12, 0, tzinfo=UTC)
 GAUGES = (
-    "daq_connected", "daq_stopped", "daq_queued", "daq_queue_paused", "daq_running", "daq_live_clients",
-    "daq_jobs_now", "daq_disk_free_bytes", "daq_disk_reserve_bytes", "daq_link_seconds",
-)  # fmt: skip
+    "daq_connected",
+    "daq_stopped",
+    "daq_queued",
+    "daq_queue_paused",
+    "daq_running",
+    "daq_live_clients",
+    "daq_jobs_now",
+    "daq_disk_free_bytes",
+    "daq_disk_reserve_bytes",
+    "daq_link_seconds",
+)
 COUNTERS = (
-    "daq_link", "daq_samples", "daq_experiments", "daq_jobs", "daq_stops", "daq_refused_requests", "daq_live_dropped",
-)  # fmt: skip
+    "daq_link",
+    "daq_samples",
+    "daq_experiments",
+    "daq_jobs",
+    "daq_stops",
+    "daq_refused_requests",
+    "daq_live_dropped",
+)
 
 
 class Scraped:
@@ -93,9 +107,9 @@ def test_a_job_is_counted_once_when_it_has_ended() -> None:
     metrics = Metrics()
     begun = {"started": NOON}
     for job in (_job("queued"), _job("running", **begun), _job("running", **begun)):
-        metrics.job(job)
-    metrics.job(_job("done", started=NOON, ended=NOON + timedelta(seconds=4)))
-    metrics.job(_job("cancelled", ended=NOON))
+        metrics.count_job(job)
+    metrics.count_job(_job("done", started=NOON, ended=NOON + timedelta(seconds=4)))
+    metrics.count_job(_job("cancelled", ended=NOON))
     found = Scraped(generate_latest(metrics.registry).decode())
     labels = {"robot": "ma2000", "kind": "compare"}
     assert found.value("daq_jobs_total", {**labels, "state": "done"}) == 1

@@ -62,16 +62,21 @@ def served(
             anew.append(len(answers))
         states.append(str(control.arm.state))
         if activities is not None:
-            activities.append(desk.activity)
+            activities.append(robot.activity)
         if len(states) >= turns:
             closing.set()
 
-    desk = SimpleNamespace(
-        controller=controller, control=control, tell_arm=tell_arm, read_gains=dict, activity="none",
-        guardian=SimpleNamespace(cause=None), speaker=SimpleNamespace(ended=answers.append),
+    robot = SimpleNamespace(
+        controller=controller,
+        control=control,
+        tell_arm=tell_arm,
+        read_gains=dict,
+        activity="none",
+        guardian=SimpleNamespace(cause=None),
+        speaker=SimpleNamespace(ended=answers.append),
         inbox=SimpleNamespace(take=take, closing=closing, done=lambda: None),
-    )  # fmt: skip
-    serve(cast(Any, desk))
+    )
+    serve(cast(Any, robot))
     return states, answers
 
 
@@ -92,7 +97,7 @@ def test_a_reset_is_told_before_its_answer_though_the_stop_before_it_never_was(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The service has noted the stop by then, and lets nobody resume the queue until it is told of another state."""
-    monkeypatch.setattr(long_orders, "answered_quickly", lambda _desk, order: Answer(number=order.number))
+    monkeypatch.setattr(long_orders, "answered_quickly", lambda _robot, order: Answer(number=order.number))
     told: list[int] = []
     _, answers = served({0: Reset(number=7, asked=time.monotonic(), here=False)}, anew=told)
     assert [answer.number for answer in answers] == [7]
@@ -116,7 +121,7 @@ def test_what_is_carried_out_is_told_before_it_begins_and_by_its_own_name(
     order = cast(Any, RunProgram).model_construct(number=7, asked=time.monotonic(), activity=activity)
     activities: list[str] = []
 
-    def perform(_desk: Any, order: RunProgram) -> Answer:
+    def perform(_robot: Any, order: RunProgram) -> Answer:
         assert activities[-1] == activity
         return Answer(number=order.number)
 

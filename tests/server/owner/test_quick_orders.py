@@ -39,7 +39,7 @@ class Asked:
     def does(self, activity: Activity) -> None:
         """The owner's report of it."""
         report = ArmReport(arm="idle", cause="", activity=activity, limp=(), link="connected", counters={})
-        self.robot._heard(report)
+        self.robot._on_report(report)
 
     def _ask(self, kind: Any, **fields: object) -> Future[Answer]:
         self.orders.append(kind(number=1, **fields))
@@ -95,7 +95,7 @@ def _gripper_of(moved: list[bool]) -> SimpleNamespace:
     )
 
 
-def _desk(moved: list[bool], ended: str | None = None, halted: str | None = None) -> SimpleNamespace:
+def _robot(moved: list[bool], ended: str | None = None, halted: str | None = None) -> SimpleNamespace:
     control = SimpleNamespace(halted=halted)
     return SimpleNamespace(activity="none", controller=_gripper_of(moved), control=control, ended=lambda: ended)
 
@@ -103,21 +103,21 @@ def _desk(moved: list[bool], ended: str | None = None, halted: str | None = None
 @pytest.mark.parametrize(("ended", "halted"), [("daq stop", None), (None, "following error")])
 def test_a_stopped_arms_gripper_is_moved_only_for_who_knows_of_the_stop(ended: str | None, halted: str | None) -> None:
     moved: list[bool] = []
-    desk = cast(Any, _desk(moved, ended, halted))
+    robot = cast(Any, _robot(moved, ended, halted))
     order = MoveGripper(number=1, asked=time.monotonic(), closed=False)
-    refused = long_orders.answered_quickly(desk, order)
+    refused = long_orders.answered_quickly(robot, order)
     assert (refused.exit_code, moved) == (StoppedError.exit_code, [])
     assert f"the arm has been stopped ({ended or halted}): nothing was switched" in refused.problem
-    assert long_orders.answered_quickly(desk, order.model_copy(update={"while_stopped": True})).problem == ""
+    assert long_orders.answered_quickly(robot, order.model_copy(update={"while_stopped": True})).problem == ""
     assert moved == [False]
 
 
 def test_an_order_that_waited_too_long_is_never_carried_out() -> None:
     moved: list[bool] = []
-    desk = cast(Any, _desk(moved))
+    robot = cast(Any, _robot(moved))
     stale = MoveGripper(number=1, asked=time.monotonic() - WAITS_AT_MOST - 0.1, closed=True)
-    refused = long_orders.answered_quickly(desk, stale)
+    refused = long_orders.answered_quickly(robot, stale)
     assert (refused.exit_code, moved) == (ReachError.exit_code, [])
     assert "nothing was done" in refused.problem
-    assert long_orders.answered_quickly(desk, stale.model_copy(update={"asked": time.monotonic()})).problem == ""
+    assert long_orders.answered_quickly(robot, stale.model_copy(update={"asked": time.monotonic()})).problem == ""
     assert moved == [True]

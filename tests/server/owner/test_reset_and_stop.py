@@ -47,12 +47,12 @@ class Interrupted(Bridge):
 
 @dataclass
 class Scene:
-    """An owner's desk, and a bridge that hears stops of others."""
+    """An owner's robot, and a bridge that hears stops of others."""
 
     endpoint: InProcess
     guardian: Guardian
     control: ArmControl
-    desk: Any
+    robot: Any
 
     def press_stop(self) -> None:
         """On this computer: through the guardian."""
@@ -66,7 +66,7 @@ class Scene:
 
     def reset(self, *, here: bool, asked: float | None = None) -> None:
         order = Reset(number=1, asked=time.monotonic() if asked is None else asked, here=here)
-        carry_out(self.desk, order)
+        carry_out(self.robot, order)
 
     def is_stopped(self) -> bool:
         return bool(self.endpoint.board.frozen) and self.control.arm.state is State.STOPPED
@@ -83,11 +83,15 @@ def owner_at(endpoint: InProcess) -> Iterator[Scene]:
         return StopAnswer(robot="arm", delivered=True, confirmed=True, tick=7)
 
     with stop_listener("arm") as listener, Guardian(listener, None, freeze) as guardian:
-        desk = SimpleNamespace(
-            activity="none", controller=controller, control=control, guardian=guardian, read_gains=controller.gains,
+        robot = SimpleNamespace(
+            activity="none",
+            controller=controller,
+            control=control,
+            guardian=guardian,
+            read_gains=controller.gains,
             ended=lambda: guardian.cause and guardian.cause.value,
-        )  # fmt: skip
-        yield Scene(endpoint, guardian, control, desk)
+        )
+        yield Scene(endpoint, guardian, control, robot)
 
 
 @pytest.fixture

@@ -16,9 +16,9 @@ from daq.contracts.service.experiments import Experiment, ExperimentRequest, Sch
 from daq.contracts.service.robot import RobotIdentity
 from daq.contracts.trace import Outcome
 from server.owner.messages import Answer, ArmReport, Finished
-from server.queue.desk import QueueDesk
-from server.queue.parts import QueueParts
-from server.robot.control import ControlDesk
+from server.queue.context import QueueContext
+from server.queue.service import QueueService
+from server.robot.control import ControlService
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.queues import QueueStore
@@ -54,13 +54,19 @@ class Bench:
         self.orders: list[object] = []
         self._heard = threading.Condition()
         self.events: list[str] = []
-        self.control = ControlDesk(
+        self.control = ControlService(
             self.clock, lambda who: self._end("lapsed", who), lambda who: self._end("given_back", who)
         )
         self.robot: Any = SimpleNamespace(
-            name="ma2000", identity=MOCK, arm=CALM, problem="", experiment=None,
-            place=SimpleNamespace(folder=folder), ask=self._ask, tell=self.orders.append,
-        )  # fmt: skip
+            name="ma2000",
+            identity=MOCK,
+            arm=CALM,
+            problem="",
+            experiment=None,
+            place=SimpleNamespace(folder=folder),
+            ask=self._ask,
+            tell=self.orders.append,
+        )
         self.queues = QueueStore(self.store)
         self.queue = self.begun_anew()
 
@@ -72,14 +78,21 @@ class Bench:
         self.control.close()
         self.store.close()
 
-    def begun_anew(self) -> QueueDesk:
+    def begun_anew(self) -> QueueService:
         """The queue as a service that begins now has it."""
-        parts = QueueParts(
-            robot=self.robot, control=self.control, experiments=self.experiments, schedules=self.schedules,
-            queues=self.queues, clock=self.clock, told=self._hear, recorded=self._record,
-            unfinished=self._look_for_traces, unattended=False,
-        )  # fmt: skip
-        return QueueDesk(parts)
+        context = QueueContext(
+            robot=self.robot,
+            control=self.control,
+            experiments=self.experiments,
+            schedules=self.schedules,
+            queues=self.queues,
+            clock=self.clock,
+            record_event=self._record_event,
+            recorded=self._record,
+            unfinished=self._look_for_traces,
+            unattended=False,
+        )
+        return QueueService(context)
 
     def _end(self, how: str, who: str) -> None:
         """The queue is made after the control, and anew by some tests."""
@@ -99,7 +112,7 @@ class Bench:
     def _look_for_traces(self) -> None:
         self.looked_for_traces += 1
 
-    def _hear(self, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
+    def _record_event(self, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
         del actor, experiment
         with self._heard:
             self.events.append(f"{kind}: {text}")

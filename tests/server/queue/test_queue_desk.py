@@ -194,8 +194,8 @@ def test_a_pause_lets_the_one_that_runs_go_on_where_an_operator_must_be_there(be
 @pytest.mark.parametrize("state", ["stopped", "fault"])
 def test_a_stop_holds_the_queue_though_nothing_waits_and_whatever_is_reset_meanwhile(bench: Bench, state: str) -> None:
     stopped = CALM.model_copy(update={"arm": state, "cause": "somebody"})
-    bench.queue.hear(stopped)
-    bench.queue.hear(CALM)  # reset, before the queue's thread has looked
+    bench.queue.on_arm_report(stopped)
+    bench.queue.on_arm_report(CALM)  # reset, before the queue's thread has looked
     bench.queue.start()
     line = f"the arm is {state} (somebody): look at it, reset it, then resume the queue"
     bench.until(lambda event: event == f"queue: paused: {line}")
@@ -208,7 +208,7 @@ def test_a_stop_holds_the_queue_though_nothing_waits_and_whatever_is_reset_meanw
 
 def test_a_stop_is_remembered_by_whoever_wants_to_resume_too_early(bench: Bench) -> None:
     bench.robot.arm = CALM.model_copy(update={"arm": "stopped", "cause": "somebody"})
-    bench.queue.hear(bench.robot.arm)
+    bench.queue.on_arm_report(bench.robot.arm)
     with pytest.raises(ProblemError, match="the arm is stopped: somebody"):
         bench.queue.resume("anna", moves_real_arm=False)
     bench.robot.arm = CALM
@@ -247,7 +247,7 @@ def test_switching_a_schedule_on_submits_nothing_that_was_due_while_it_was_off(b
 def test_runs_that_are_left_out_are_told_once(bench: Bench) -> None:
     schedule = bench.schedule(every=10)
     bench.queue.pause("paused by anna", "anna")
-    runs = DueRuns(bench.queue._parts)
+    runs = DueRuns(bench.queue._context)
     for _ in range(5):
         runs.submit()
         bench.clock.turn(10)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from server.problems import ProblemError
-from server.robot.control import LEASE_TIME, ControlDesk
+from server.robot.control import LEASE_TIME, ControlService
 from tests.server.clocks import HandClock
 
 WITHIN = 60.0
@@ -28,14 +28,14 @@ def clock() -> HandClock:
 
 
 @pytest.fixture
-def desk(clock: HandClock, lapsed: queue.Queue[str]) -> Iterator[ControlDesk]:
+def desk(clock: HandClock, lapsed: queue.Queue[str]) -> Iterator[ControlService]:
     """Nobody has the control."""
-    made = ControlDesk(clock, lapsed.put)
+    made = ControlService(clock, lapsed.put)
     yield made
     made.close()
 
 
-def test_a_heartbeat_keeps_the_control_and_silence_ends_it(desk: ControlDesk, clock: HandClock) -> None:
+def test_a_heartbeat_keeps_the_control_and_silence_ends_it(desk: ControlService, clock: HandClock) -> None:
     lease = desk.take("anna", moves_real_arm=False).lease
     for _ in range(5):
         clock.turn(LEASE_TIME - 1)
@@ -47,13 +47,13 @@ def test_a_heartbeat_keeps_the_control_and_silence_ends_it(desk: ControlDesk, cl
     assert desk.take("bert", moves_real_arm=False).lease != lease
 
 
-def test_a_wall_clock_that_is_set_forward_ends_no_lease(desk: ControlDesk, clock: HandClock) -> None:
+def test_a_wall_clock_that_is_set_forward_ends_no_lease(desk: ControlService, clock: HandClock) -> None:
     lease = desk.take("anna", moves_real_arm=False).lease
     clock.wall = clock.wall.replace(year=2030)
     assert desk.require(lease).name == "anna"
 
 
-def test_the_queue_and_a_client_never_have_it_together(desk: ControlDesk) -> None:
+def test_the_queue_and_a_client_never_have_it_together(desk: ControlService) -> None:
     lease = desk.take("anna", moves_real_arm=False).lease
     assert not desk.take_for_queue("an experiment")
     desk.give_back(lease)
@@ -64,7 +64,7 @@ def test_the_queue_and_a_client_never_have_it_together(desk: ControlDesk) -> Non
     assert desk.take("anna", moves_real_arm=False)
 
 
-def test_silence_is_told_once(clock: HandClock, desk: ControlDesk, lapsed: queue.Queue[str]) -> None:
+def test_silence_is_told_once(clock: HandClock, desk: ControlService, lapsed: queue.Queue[str]) -> None:
     desk.take("anna", moves_real_arm=False)
     clock.turn(LEASE_TIME)
     bert = desk.take("bert", moves_real_arm=False)
@@ -82,7 +82,7 @@ def test_a_listener_that_fails_ends_neither_the_watch_nor_the_next_lease(clock: 
         heard.put(holder)
         raise OSError("database or disk is full")
 
-    desk = ControlDesk(clock, fails)
+    desk = ControlService(clock, fails)
     for name in ("anna", "bert"):
         desk.take(name, moves_real_arm=False)
         clock.turn(LEASE_TIME)
@@ -97,7 +97,7 @@ def test_a_listener_that_fails_ends_neither_the_watch_nor_the_next_lease(clock: 
 
 
 def test_the_queue_has_the_control_only_after_it_was_told_that_a_client_went_silent(
-    desk: ControlDesk, clock: HandClock, lapsed: queue.Queue[str]
+    desk: ControlService, clock: HandClock, lapsed: queue.Queue[str]
 ) -> None:
     desk.take("anna", moves_real_arm=False)
     clock.turn(LEASE_TIME)

@@ -14,10 +14,10 @@ import httpx
 from daq.contracts.service.teaching import TeachingStatus
 from server.access.caller import LOCAL
 from server.access.gate import Gate
+from server.api.stream import WAITING_MESSAGES, _carry_out, _receive
 from server.app import bare_app
 from server.live.hub import Client
 from server.live.outbox import Outbox
-from server.live.stream import WAITING_MESSAGES, _carry_out, _receive
 from tests.server.clocks import HandClock
 
 JOG = '{"jog": {"lease": "mine", "velocities": {"1": 0.1}}}'
@@ -62,10 +62,15 @@ class Socket:
 
 def test_over_the_socket_it_is_not_that_at_which_the_command_before_it_was_done() -> None:
     clock, teaching = HandClock(), Teaching()
-    one = cast(Any, SimpleNamespace(
-        robot=SimpleNamespace(clock=clock), teaching=teaching, require_motion=lambda _lease: None,
-        hub=SimpleNamespace(shown=lambda _topics: []),
-    ))  # fmt: skip
+    one = cast(
+        Any,
+        SimpleNamespace(
+            robot=SimpleNamespace(clock=clock),
+            teaching=teaching,
+            require_motion=lambda _lease: None,
+            hub=SimpleNamespace(shown=lambda _topics: []),
+        ),
+    )
 
     async def first() -> str:
         return JOG

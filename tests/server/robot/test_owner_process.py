@@ -15,7 +15,7 @@ import pytest
 from daq.contracts.errors import ReachError
 from daq.contracts.machine import load_machine
 from daq.transport import ReconnectDelay
-from server.owner.messages import Open, ReadGains, Report, Told
+from server.owner.messages import Open, ReadGains, Report, TeachingText
 from server.robot.keeper import Keeper
 from server.robot.owner_process import OwnerGoneError, OwnerProcess
 from server.robot.robot import Robot, RobotPlace
@@ -67,7 +67,7 @@ def test_a_listener_at_fault_costs_nobody_else_a_report(owners_are: Start) -> No
     robot.disconnected += [at_fault, ends.put]
     connecting = threading.Thread(target=_refused, args=(robot,))
     connecting.start()
-    assert [heard.get(timeout=60) for _ in range(2)] == [Told(text="first"), Told(text="second")]
+    assert [heard.get(timeout=60) for _ in range(2)] == [TeachingText(text="first"), TeachingText(text="second")]
     assert ends.get(timeout=60) == "signal 9"
     connecting.join()
     assert robot.connection == "disconnected"

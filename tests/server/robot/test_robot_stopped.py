@@ -16,8 +16,8 @@ from daq.contracts.service.robot import ArmState
 from server.owner.messages import Answer, ArmReport
 from server.problems import ProblemError
 from server.robot.robot import Robot, RobotPlace
-from server.robot.stop import StopDesk
-from server.robot.teaching import TeachingDesk
+from server.robot.stop import StopService
+from server.robot.teaching import TeachingService
 from tests.server.clocks import HandClock
 
 JOG = {2: 0.1}
@@ -28,16 +28,16 @@ def robot(monkeypatch: pytest.MonkeyPatch) -> Robot:
     """Connected, idle; what it is asked goes on."""
     robot = Robot(RobotPlace("ma2000", "mock://", load_machine("ma2000"), Path()), HandClock())
     monkeypatch.setattr(robot, "ask", lambda *_, **__: Future[Answer]())
-    robot._heard(_report("idle"))
+    robot._on_report(_report("idle"))
     return robot
 
 
 @pytest.fixture
-def desk(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> Iterator[StopDesk]:
+def desk(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> Iterator[StopService]:
     """Whose stops are confirmed."""
     answer = StopAnswer(robot="ma2000", port="mock://", delivered=True, confirmed=True, tick=7, text="")
     monkeypatch.setattr("server.stopping.arm.request_stop", lambda *_: [SimpleNamespace(answer=answer)])
-    desk = StopDesk(robot)
+    desk = StopService(robot)
     yield desk
     desk.close()
 
@@ -47,18 +47,18 @@ def _report(arm: ArmState) -> ArmReport:
 
 
 @pytest.mark.parametrize("jogging", [True, False])
-def test_nothing_is_jogged_after_a_confirmed_stop(robot: Robot, desk: StopDesk, jogging: bool) -> None:
-    teaching = TeachingDesk(robot, lambda _line: None)
+def test_nothing_is_jogged_after_a_confirmed_stop(robot: Robot, desk: StopService, jogging: bool) -> None:
+    teaching = TeachingService(robot, lambda _line: None)
     if jogging:
         teaching.jog(JOG, robot.clock.monotonic())
     assert desk.stop_now().confirmed
     with pytest.raises(ProblemError) as refused:
         teaching.jog(JOG, robot.clock.monotonic())
     assert (refused.value.status, refused.value.kind) == (409, "arm-stopped")
-    robot._heard(_report("stopped"))
+    robot._on_report(_report("stopped"))
     with pytest.raises(ProblemError):
         teaching.jog(JOG, robot.clock.monotonic())
-    robot._heard(_report("idle"))  # after a reset
+    robot._on_report(_report("idle"))  # after a reset
     teaching.jog(JOG, robot.clock.monotonic())
     assert teaching.status().activity == "jog"
 
@@ -70,7 +70,7 @@ def test_a_stop_that_finds_no_file_for_its_socket_says_that_it_was_not_delivered
         raise OSError(24, "Too many open files")
 
     monkeypatch.setattr("server.stopping.arm.request_stop", no_socket)
-    desk = StopDesk(robot)
+    desk = StopService(robot)
     told = desk.stop_now()
     desk.close()
     assert (told.delivered, told.confirmed) == (False, False)
@@ -78,8 +78,8 @@ def test_a_stop_that_finds_no_file_for_its_socket_says_that_it_was_not_delivered
     assert told.text.endswith("Too many open files. Use the emergency stop.")
 
 
-def test_a_fault_keeps_its_cause_when_it_is_stopped_too(robot: Robot, desk: StopDesk) -> None:
+def test_a_fault_keeps_its_cause_when_it_is_stopped_too(robot: Robot, desk: StopService) -> None:
     fault = _report("fault").model_copy(update={"cause": "joint 2 moved"})
-    robot._heard(fault)
+    robot._on_report(fault)
     assert desk.stop_now().confirmed
     assert robot.arm == fault

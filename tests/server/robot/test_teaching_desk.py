@@ -18,7 +18,7 @@ from server.owner.messages import Answer, Finish, JogBegin, JogDrive, RunProgram
 from server.problems import ProblemError, conflict
 from server.robot import teaching
 from server.robot.robot import Robot, RobotPlace
-from server.robot.teaching import LEAD_ENDS_WITHIN, TeachingDesk, Word
+from server.robot.teaching import LEAD_ENDS_WITHIN, TeachingService, Word
 from tests.server.clocks import HandClock
 
 JOG = {2: 0.1}
@@ -54,31 +54,31 @@ def robot() -> Asked:
 
 
 @pytest.fixture
-def desk(robot: Asked) -> TeachingDesk:
+def desk(robot: Asked) -> TeachingService:
     """Its teaching."""
-    return TeachingDesk(robot, lambda _line: None)
+    return TeachingService(robot, lambda _line: None)
 
 
-def test_a_command_goes_on_with_the_moment_at_which_it_arrived(robot: Asked, desk: TeachingDesk) -> None:
+def test_a_command_goes_on_with_the_moment_at_which_it_arrived(robot: Asked, desk: TeachingService) -> None:
     said = robot.clock.monotonic()
     robot.clock.turn(DEAD_MAN / 2)  # type: ignore[attr-defined]
     desk.jog(JOG, said)
     assert robot.orders == [JogBegin(number=0, asked=robot.clock.monotonic()), JogDrive(velocities=JOG, said=said)]
 
 
-def test_a_command_that_was_held_up_begins_nothing(robot: Asked, desk: TeachingDesk) -> None:
+def test_a_command_that_was_held_up_begins_nothing(robot: Asked, desk: TeachingService) -> None:
     desk.jog(JOG, robot.clock.monotonic() - DEAD_MAN - 0.1)
     assert (robot.orders, desk.status().activity) == ([], "none")
 
 
-def test_a_step_is_asked_for_as_one(robot: Asked, desk: TeachingDesk) -> None:
+def test_a_step_is_asked_for_as_one(robot: Asked, desk: TeachingService) -> None:
     program = Program(name="step", machine="ma2000", instructions=(Relative(angles={1: 0.1}),))
     desk.perform(Word(robot.clock.monotonic()), program, "step")
     assert robot.orders == [RunProgram(number=0, asked=robot.clock.monotonic(), program=program, activity="step")]
 
 
 def test_nothing_begins_once_the_control_has_lapsed_while_a_jog_came_to_its_end(
-    robot: Asked, desk: TeachingDesk
+    robot: Asked, desk: TeachingService
 ) -> None:
     lapsed: list[str] = []
 
@@ -107,14 +107,14 @@ def test_nothing_begins_once_the_control_has_lapsed_while_a_jog_came_to_its_end(
     assert not any(isinstance(order, RunProgram) for order in robot.orders)
 
 
-def test_a_program_goes_on_with_the_moment_at_which_it_was_asked_for(robot: Asked, desk: TeachingDesk) -> None:
+def test_a_program_goes_on_with_the_moment_at_which_it_was_asked_for(robot: Asked, desk: TeachingService) -> None:
     said = robot.clock.monotonic()
     robot.clock.turn(4.0)  # type: ignore[attr-defined]
     desk.perform(Word(said), Program(name="p", machine="ma2000", instructions=(Relative(angles={1: 0.1}),)))
     assert robot.orders[0].asked == said
 
 
-def test_a_lead_without_a_path_does_not_have_that_of_the_one_before(robot: Asked, desk: TeachingDesk) -> None:
+def test_a_lead_without_a_path_does_not_have_that_of_the_one_before(robot: Asked, desk: TeachingService) -> None:
     desk.lead(Word(0.0), (1,))
     robot.answers[0].set_result(Answer(number=0, data={"path": PATH}))
     assert desk.status().path is not None
@@ -125,7 +125,7 @@ def test_a_lead_without_a_path_does_not_have_that_of_the_one_before(robot: Asked
 
 
 def test_the_end_of_a_lead_is_waited_for_as_long_as_the_arm_may_take_to_come_to_rest(
-    robot: Asked, desk: TeachingDesk, monkeypatch: pytest.MonkeyPatch
+    robot: Asked, desk: TeachingService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert LEAD_ENDS_WITHIN > PATIENCE
     monkeypatch.setattr(teaching, "ANSWER_WITHIN", 0.0)
@@ -139,7 +139,7 @@ def test_the_end_of_a_lead_is_waited_for_as_long_as_the_arm_may_take_to_come_to_
 
 
 def test_a_lead_that_does_not_end_says_that_a_stop_holds_nothing(
-    desk: TeachingDesk, monkeypatch: pytest.MonkeyPatch
+    desk: TeachingService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(teaching, "LEAD_ENDS_WITHIN", 0.0)
     desk.lead(Word(0.0), (1,))
@@ -149,7 +149,7 @@ def test_a_lead_that_does_not_end_says_that_a_stop_holds_nothing(
 
 
 def test_a_jog_that_does_not_end_is_to_be_stopped(
-    robot: Asked, desk: TeachingDesk, monkeypatch: pytest.MonkeyPatch
+    robot: Asked, desk: TeachingService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(teaching, "ANSWER_WITHIN", 0.0)
     desk.jog(JOG, robot.clock.monotonic())

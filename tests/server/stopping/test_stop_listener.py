@@ -352,7 +352,7 @@ def test_no_stop_with_a_known_token_waits_for_a_database_that_does_not_answer() 
     never = StopTokens(hangs, clock=clock.monotonic)
     with pytest.raises(TokensCannotBeReadError, match="not answered"):
         never.look_up("daq_anna")
-    never.told({digest_of("daq_anna"): anna})
+    never.update({digest_of("daq_anna"): anna})
     assert never.look_up("daq_anna") == anna
     answered.set()
     found.close()
@@ -382,7 +382,7 @@ def test_a_listener_that_is_killed_is_started_again_and_whoever_asks_meanwhile_w
         os.kill(door.pid, signal.SIGKILL)
         unread = httpx.post(stop, headers={"Authorization": "Bearer daq_x"}, timeout=60)
         assert (unread.status_code, unread.json()["type"]) == (503, "docs/service.md#database")
-        door.knows({digest_of("daq_x"): Caller("anna", "viewer", digest_of("daq_x"))})
+        door.set_tokens({digest_of("daq_x"): Caller("anna", "viewer", digest_of("daq_x"))})
         os.kill(door.pid, signal.SIGKILL)
         known = httpx.post(stop, headers={"Authorization": "Bearer daq_x"}, timeout=60)
         assert "no robot is connected" in known.json()["text"]

@@ -13,8 +13,8 @@ from sqlalchemy.engine import make_url
 
 from daq.contracts.errors import DaqError
 from server.clock import SystemClock
+from server.database_errors import DamagedError, advice_of
 from server.store.address import masked
-from server.store.database_errors import DamagedError, advice_of
 from server.store.engine import Store
 from server.store.tables import QueueRow
 from tests.daq_cli.invoke import CommandLine

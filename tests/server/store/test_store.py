@@ -16,8 +16,8 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import ExperimentRequest
 from daq.contracts.service.traces import TraceChange
+from server.experiments.states import Event
 from server.problems import ProblemError
-from server.queue.states import Event
 from server.store.engine import Store, StoreError, migrations
 from server.store.experiments import ExperimentStore
 from server.store.pages import Cursor

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from model.discrepancy.diagnosis import AgainstWhat, RemainingShape
-from model.discrepancy.localisation.clear_shape import CLEAR_SHAPE, clear_shape
+from model.discrepancy.diagnosis import CLEAR_SHAPE, AgainstWhat, RemainingShape, clear_shape
 from model.discrepancy.localisation.phases import asked_motion
-from model.discrepancy.localisation.unexplained_torque import shapes, torque_of
+from model.discrepancy.localisation.residuals import Residuals
+from model.discrepancy.localisation.unexplained_torque import remaining_shapes, torque_of
 from model.fitting.records import Record, noise_floor, records_of
 from model.machine_model.model import Model
 from model.simulation.prepared import Options
@@ -35,15 +35,15 @@ def test_a_spring_that_the_model_lacks_comes_out_as_a_torque_against_position(ar
     sprung = arm.with_effect("spring_torque", (JOINT,), {"stiffness": STIFFNESS, "rest": -0.4})
     records = records_of([trace_of(sprung)], arm.machine, "position")
     deviations = noise_floor(records, arm.machine, "position")
-    residual = left(arm, records[0], following)
-    found = shapes(arm, records, [residual], deviations, following=following)
+    residuals = Residuals(arm, records, [left(arm, records[0], following)], deviations)
+    found = remaining_shapes(residuals, feedback_share=following)
     first = found[0]
     assert (first.joint, first.against, first.torque_unit) == (JOINT, "position", "N·m")
     assert first.explained > 0.5
     pairs = [(x, t) for x, t in zip(first.centres, first.torque, strict=True) if t is not None]
     slope = np.polyfit(*np.array(pairs).T, 1)[0]
     assert slope == pytest.approx(-STIFFNESS, rel=0.25)
-    torque = torque_of(arm, records[0], residual, deviations, following=following)[records[0].runs[0], JOINT - 1]
+    torque = torque_of(residuals, feedback_share=following)[0][records[0].runs[0], JOINT - 1]
     true = -STIFFNESS * (asked_motion(arm, records[0])[records[0].runs[0], JOINT - 1] + 0.4)
     assert np.corrcoef(torque, true)[0, 1] > 0.85
 
@@ -51,7 +51,7 @@ def test_a_spring_that_the_model_lacks_comes_out_as_a_torque_against_position(ar
 def test_nothing_remains_of_an_arm_that_is_the_model(arm: Model) -> None:
     records = records_of([trace_of(arm)], arm.machine, "position")
     deviations = 1.3 * noise_floor(records, arm.machine, "position")
-    assert shapes(arm, records, [left(arm, records[0])], deviations) == ()
+    assert remaining_shapes(Residuals(arm, records, [left(arm, records[0])], deviations)) == ()
 
 
 @pytest.mark.parametrize(

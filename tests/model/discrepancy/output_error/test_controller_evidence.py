@@ -11,7 +11,7 @@ from daq.contracts.quantity import Quantity
 from daq.contracts.trace import Trace
 from model.discrepancy.output_error.controller_evidence import (
     check_controller,
-    judged_by_records,
+    settled_by_records,
     with_findings,
     with_used_set_points,
 )
@@ -105,40 +105,40 @@ def sampled() -> Machine:
 
 
 def test_a_record_with_all_numbers_tells_of_gains_and_of_set_points(sound: Trace) -> None:
-    assert judged_by_records([sound], imagined.machine()) == BOTH
-    assert judged_by_records([sound, sound], imagined.machine()) == BOTH
-    assert judged_by_records([], imagined.machine()) == ()
+    assert settled_by_records([sound], imagined.machine()) == BOTH
+    assert settled_by_records([sound, sound], imagined.machine()) == BOTH
+    assert settled_by_records([], imagined.machine()) == ()
 
 
 @pytest.mark.parametrize("gains", [(2, 1, 0), (2, 0, 3), (2, 1, 3)])
 def test_a_gain_is_not_judged_where_more_than_p_acts(sound: Trace, gains: tuple[int, int, int]) -> None:
     other = with_gains(sound, gains)
-    assert judged_by_records([other], imagined.machine()) == ("lost_set_points",)
-    assert judged_by_records([sound, other], imagined.machine()) == ("lost_set_points",)
+    assert settled_by_records([other], imagined.machine()) == ("lost_set_points",)
+    assert settled_by_records([sound, other], imagined.machine()) == ("lost_set_points",)
     assert check_controller([other], imagined.machine()) == ()
 
 
 def test_a_gain_is_not_judged_by_a_few_samples(sound: Trace) -> None:
     short = shortened(sound, 19)
-    assert "wrong_gain" not in judged_by_records([short], imagined.machine())
-    assert "wrong_gain" in judged_by_records([sound, short], imagined.machine())
+    assert "wrong_gain" not in settled_by_records([short], imagined.machine())
+    assert "wrong_gain" in settled_by_records([sound, short], imagined.machine())
 
 
 def test_a_gain_is_judged_on_every_joint_or_not_at_all(sound: Trace) -> None:
     still = at_rest(sound, 3)
-    assert judged_by_records([still], imagined.machine()) == ("lost_set_points",)
-    assert "wrong_gain" in judged_by_records([still, sound], imagined.machine())
+    assert settled_by_records([still], imagined.machine()) == ("lost_set_points",)
+    assert "wrong_gain" in settled_by_records([still, sound], imagined.machine())
 
 
-def test_nothing_is_judged_by_records_without_the_numbers(sound: Trace) -> None:
-    assert judged_by_records([imagined.changed(sound, error=None)], imagined.machine()) == ()
+def test_nothing_is_settled_by_records_without_the_numbers(sound: Trace) -> None:
+    assert settled_by_records([imagined.changed(sound, error=None)], imagined.machine()) == ()
     no_power = imagined.changed(sound, power_raw=None)
-    assert judged_by_records([no_power], imagined.machine()) == ("lost_set_points",)
-    assert judged_by_records([sound, no_power], imagined.machine()) == ("lost_set_points",)
+    assert settled_by_records([no_power], imagined.machine()) == ("lost_set_points",)
+    assert settled_by_records([sound, no_power], imagined.machine()) == ("lost_set_points",)
 
 
 def test_another_controller_is_not_judged(sound: Trace) -> None:
-    assert judged_by_records([sound], sampled()) == ()
+    assert settled_by_records([sound], sampled()) == ()
     assert check_controller([sound], sampled()) == ()
 
 
@@ -147,7 +147,7 @@ def test_errors_that_are_wrong_without_a_set_point_that_moved_leave_lost_ones_op
     assert still.error is not None
     error = still.error.copy()
     error[:, 1] += 10 * UNIT
-    judged = judged_by_records([with_power(still, error, 1.0)], imagined.machine())
+    judged = settled_by_records([with_power(still, error, 1.0)], imagined.machine())
     assert "lost_set_points" not in judged
     assert not any(f.effect == "lost_set_points" for f in check_controller([still], imagined.machine()))
 
