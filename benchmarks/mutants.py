@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 OPERATORS: dict[type[ast.AST], type[ast.AST]] = {
@@ -204,7 +205,7 @@ class _Maker(ast.NodeVisitor):
 
     # ---- how a mutant is written down
 
-    def _visit_all(self, nodes: list[ast.expr] | list[ast.stmt] | list[ast.expr | ast.stmt]) -> None:
+    def _visit_all(self, nodes: Sequence[ast.AST]) -> None:
         for node in nodes:
             self.visit(node)
 

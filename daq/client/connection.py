@@ -63,7 +63,7 @@ class Connection:
         transport: httpx.BaseTransport | None = None,
         pause: Callable[[float], None] = time.sleep,
     ) -> None:
-        """`transport` and `pause` are for whoever stands in for the network and its time. Raises SpecError."""
+        """`transport` and `pause` can replace the network and its time in tests. Raises SpecError."""
         self.url = parse_url(url)
         if token is not None and TOKEN.fullmatch(token) is None:
             raise SpecError("token: only ASCII characters without spaces are allowed; `daq token add` shows one")

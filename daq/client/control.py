@@ -44,7 +44,7 @@ class HeldControl:
         self._thread = threading.Thread(target=self._renew, name="control-heartbeat", daemon=True)
 
     def __enter__(self) -> Self:
-        """Takes it. Raises ServiceError when somebody else has it, or a real arm's word is missing."""
+        """Takes the control. Raises ServiceError when another client has it, or a real arm's consent is missing."""
         body = ControlRequest(moves_real_arm=self._moves_real_arm)
         self._lease = self._connection.ask(ControlLease, Request("POST", f"{self._path}/control", body))
         self._thread.start()
@@ -53,7 +53,7 @@ class HeldControl:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Gives it back; one that is lost needs no giving back."""
+        """Gives the control back, unless it has been lost."""
         self._ended.set()
         self._thread.join(JOIN_WITHIN)
         if self._lost:
@@ -74,7 +74,7 @@ class HeldControl:
         return self._lease
 
     def jog(self, velocities: Mapping[int, float]) -> TeachingStatus:
-        """Drives joints (rad/s) for 0.3 s at most; whoever holds the key repeats it."""
+        """Drives joints (rad/s) for at most 0.3 s; to be repeated while the key is held."""
         return self._teaching("jog", JogRequest(velocities=dict(velocities)))
 
     def step(

@@ -1,4 +1,4 @@
-"""How large a trace file may be, so that reading one that somebody else made cannot fill memory or take for ever."""
+"""Limits of trace files, so that reading a foreign one can neither fill the memory nor take forever."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class PendingReplies:
         return transaction
 
     def match(self, sequence: int, reply: Reply, now: float) -> Transaction | None:
-        """The transaction that `reply` ends; None for a reply that nobody waits for, which is counted."""
+        """The transaction that `reply` ends; None for a reply that no request waits for, which is counted."""
         transaction = self._waiting.get(sequence)
         if transaction is None or not _answers(reply, transaction.request):
             asked = reply.opcode if isinstance(reply, Refused) else reply.OPCODE & 0x7F

@@ -38,7 +38,7 @@ class Consent:
         require_word(self.moves_real_arm)
 
     def require(self, controller: Controller) -> None:
-        """Raises MissingConsentError when the controller has a real arm that nobody has agreed to move."""
+        """Raises MissingConsentError when a real arm would move without the operator's consent."""
         if not controller.identity.simulated and not self.moves_real_arm:
             raise MissingConsentError(
                 f"{controller.link.url} is a real arm: it moves only with the operator's consent (--yes)"

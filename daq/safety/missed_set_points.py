@@ -23,7 +23,7 @@ class MissedSetPoints:
     run: int = 0
 
     def check(self, row: SampleRow, expected: Mapping[int, int] | None) -> Verdict:
-        """`expected` are the postures (by joint) that this period should have taken; None when nobody can say."""
+        """`expected` are the postures (by joint) that this period should have taken; None when unknown."""
         line = self._difference(row, expected or {})
         if row.status & StatusFlag.SET_POINT_MISSED.value:
             line = line or f"tick {row.tick}: the controller wanted the memory while the host had it"

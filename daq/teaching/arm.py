@@ -19,7 +19,7 @@ class TeachingError(DaqError):
 
 
 class TeachableArm(Protocol):
-    """An arm, one control period at a time. Every method may raise StoppedError (somebody has stopped it) and
+    """An arm, one control period at a time. Every method may raise StoppedError (the arm was stopped) and
     TeachingError (a fault, a lost link): it is frozen then."""
 
     @property

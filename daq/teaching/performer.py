@@ -72,7 +72,7 @@ class FollowingPerformer:
         self._step(Event.FINISHED)
 
     def observe(self, periods: int) -> None:
-        """Lets so many control periods pass, watched. Raises StoppedError when somebody wants the end, also in between,
+        """Lets so many control periods pass, watched. Raises StoppedError on a request to end, also in between,
         and TeachingError for a fault, a restart or a lost link; the arm is frozen then."""
         for _ in range(periods):
             verdict = self._guards.check(self._arm.next_sample(), {})

@@ -22,7 +22,7 @@ TOO_LARGE = "does not fit into the memory that is free here"
 
 
 def read_trace(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
-    """The trace in a file. The outcome of one that was never closed (`.mcap.part`) is None: nobody knows it yet.
+    """The trace in a file. The outcome of one that was never closed (`.mcap.part`) is unknown: None.
 
     Raises TraceError with one line when the file cannot be read, is no MCAP file, is damaged, exceeds a limit, is not
     a trace of this project, or was made by a newer version of it.

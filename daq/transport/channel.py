@@ -101,7 +101,7 @@ class DescriptorChannel:
                     raise ChannelError(f"{self._description}: connection lost ({error.strerror})") from error
 
     def close(self) -> None:
-        """Ends the connection, after whoever reads or writes has left the descriptor."""
+        """Ends the connection, once no thread reads or writes the descriptor any more."""
         self._closed = True
         if not self._released:
             with contextlib.suppress(OSError):

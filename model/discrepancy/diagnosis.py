@@ -44,10 +44,10 @@ class FoundValue(_Part):
 class Candidate(_Part):
     """An effect that was tried.
 
-    `evidence` is what it takes off −2 log posterior, its own parameters paid for (BIC; a tone's frequency by the number
-    of tones tried); above 0 it explains more than it costs. `misfit` is the weighted residual
-    that it leaves, per sample: near 1 for the right effect. `refitted` says whether all tolerance parameters were
-    fitted again with it, or it was only probed.
+    `evidence` is the fall of −2 log posterior less the cost of its own parameters (BIC; for a tone's frequency the
+    number of tones tried); above 0 it explains more than it costs. `misfit` is the mean square of the weighted residual
+    that it leaves: near 1 for the right effect. `refitted` says whether all tolerance parameters were fitted again with
+    it, or it was only probed.
     """
 
     effect: str

@@ -52,7 +52,7 @@ NoteKind = Literal[
     "torque-left",
     "unfinished-record",
 ]
-RefusalKind = Literal["error-grows", "error-rises", "falls-too-little", "only-resembles", "superfluous"]
+RefusalKind = Literal["diverges", "error-grows", "error-rises", "falls-too-little", "only-resembles", "superfluous"]
 
 
 class _Part(BaseModel):

@@ -28,7 +28,7 @@ VERDICTS = {
     "unknown-effect": "an effect that is not among the known ones",
 }
 LABELS = ("before", "after")
-"""Of the models that a comparison for this report is made with."""
+"""Labels of the models in the comparison that this report shows."""
 
 
 def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> Report:
@@ -76,7 +76,7 @@ def diagnosis_page(found: Diagnosis, comparison: Comparison | None = None) -> st
 
 
 def _nothing_added(found: Diagnosis, of: Compared) -> list[Section]:
-    """What proves an answer in which no effect was added: the map, what was tried, and errors beside the noise."""
+    """The ground of an answer in which no effect was added: the map, what was tried, and errors beside the noise."""
     sections = []
     if not found.steps:
         if found.where is not None:

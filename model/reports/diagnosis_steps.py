@@ -14,7 +14,7 @@ from model.reports.page import Block, Cell, Section, Table, Text, cells
 from model.reports.units import shown_unit, with_unit
 
 WITHOUT_AND_WITH = "without the effect", "with it"
-"""Errors of a step; the tolerance parameters are fitted both times."""
+"""Names of a step's two errors; the tolerance parameters are fitted for both."""
 
 
 def step_sections(number: int, steps: Sequence[Step], of: Compared) -> list[Section]:
@@ -58,10 +58,10 @@ def _moving(where: Where) -> Table:
     rows = tuple(
         (
             Cell(m.parameter),
-            Cell(told, number=True),
+            Cell(shown, number=True),
             Cell("–" if m.moves_with is None else f"{m.moves_with} ({m.correlation:+.2f})"),
         )
-        for m, told in zip(where.moving, ranges, strict=True)
+        for m, shown in zip(where.moving, ranges, strict=True)
     )
     return Table(
         ("parameter", "would have to range over", "and moves with"),
@@ -112,20 +112,20 @@ def _parameters(parameters: dict[str, FoundValue], caption: str) -> Table:
     rows = []
     for name, v in parameters.items():
         value, interval = estimate(v.value, v.low, v.high)
-        told = "not bounded by these traces" if interval is None else interval
-        rows.append((Cell(name), Cell(value, number=True), Cell(told, number=True), Cell(v.unit)))
+        shown = "not bounded by these traces" if interval is None else interval
+        rows.append((Cell(name), Cell(value, number=True), Cell(shown, number=True), Cell(v.unit)))
     return Table(("parameter", "value", "95 % interval", "unit"), tuple(rows), caption)
 
 
 def error_blocks(
     fit: Sequence[SignalError], held: Sequence[SignalError], of: Compared, before: str, after: str
 ) -> tuple[Block, ...]:
-    """Picture and table of errors before and after; what these two are, in words."""
+    """Picture and table of errors. before, after: names of the two states that are compared."""
     if not fit and not held:
         return ()
-    told = [("fitted to", e) for e in fit] + [("held out", e) for e in held]
-    sizes = _sizes([e for _, e in told])
-    rows = tuple((Cell(kind), *cells(str(e.joint), *own, gone(e))) for (kind, e), own in zip(told, sizes, strict=True))
+    kinds = [("fitted to", e) for e in fit] + [("held out", e) for e in held]
+    sizes = _sizes([e for _, e in kinds])
+    rows = tuple((Cell(kind), *cells(str(e.joint), *own, gone(e))) for (kind, e), own in zip(kinds, sizes, strict=True))
     caption = (
         f"Root mean square of {of.residual}, {before} and {after}. "
         f"{of.errors} Gone: share of the variance beyond noise that was taken off; a dash where there was hardly any. "

@@ -54,7 +54,7 @@ def compared(found: Diagnosis) -> Compared:
 
 
 def headline(found: Diagnosis) -> str:
-    """What was found, where, and its size; or that nothing was, or nothing known."""
+    """The effects found, with joints and sizes; or that none was found, or none that is known."""
     if found.verdict == "nothing-significant":
         return "Nothing that the held-out traces confirm" if found.steps else "Nothing significant"
     findings = [_finding(s) for s in found.steps if s.adopted]
@@ -77,12 +77,12 @@ def _size(v: FoundValue) -> str:
     factor, unit = shown_unit("" if v.unit == "1" else v.unit)
     low, high = (None if bound is None else factor * bound for bound in (v.low, v.high))
     value, interval = estimate(factor * v.value, low, high, digits=1)
-    told = with_unit(value, unit) if unit else value
-    return told if interval is None else f"{told} ({interval})"
+    shown = with_unit(value, unit) if unit else value
+    return shown if interval is None else f"{shown} ({interval})"
 
 
 def gap(step: Step) -> str:
-    """What a step that was taken does on traces it was not fitted to."""
+    """What an adopted step does on traces that it was not fitted to."""
     if step.proof is not None:
         return "Taken into the model: the recorded numbers of the controller prove it, and nothing was fitted for it."
     if step.excess_removed_holdout is None:

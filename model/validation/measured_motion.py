@@ -46,7 +46,7 @@ class Observation:
 
 
 def observe(model: Model, trace: Trace, smoothing: float | None = None) -> Observation:
-    """The smoothed motion of a trace; `smoothing`: the kernel's standard deviation in s, by default chosen from noise.
+    """The smoothed motion of a trace; `smoothing`: standard deviation of the kernel in s, by default chosen from noise.
 
     Raises:
         TraceError: for a trace without recorded drive, or too short.

@@ -124,9 +124,13 @@ def _variants(model: Model, name: str, joints: tuple[int, ...]) -> list[Hypothes
 
 
 def _sized(
-    model: Model, name: str, law: str, joints: tuple[int, ...], shapes: Sequence[dict[str, float]],
+    model: Model,
+    name: str,
+    law: str,
+    joints: tuple[int, ...],
+    shapes: Sequence[dict[str, float]],
     bounds: dict[str, tuple[float, float]],
-) -> Hypothesis | None:  # fmt: skip
+) -> Hypothesis | None:
     """A hypothesis with trials of every main parameter, in every direction that its bounds allow, for every shape."""
     plain = _hypothesis(model, name, law, joints, ({},), proportional=law not in TRIALS, bounds=bounds)
     if plain is None:
@@ -145,9 +149,14 @@ def _sized(
 
 
 def _hypothesis(
-    model: Model, name: str, law: str, joints: tuple[int, ...], trials: tuple[dict[str, float], ...],
-    proportional: bool, bounds: Mapping[str, tuple[float, float]] | None = None,
-) -> Hypothesis | None:  # fmt: skip
+    model: Model,
+    name: str,
+    law: str,
+    joints: tuple[int, ...],
+    trials: tuple[dict[str, float], ...],
+    proportional: bool,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+) -> Hypothesis | None:
     """The model with the effect; where it has the effect already, with a prior, the prior is lifted."""
     present = [u for u in model.effects if u.name == law and (not joints or set(joints) & set(u.joints))]
     if present:

@@ -108,6 +108,8 @@ def refusal_words(refusal: Refusal) -> str:
     """Why an effect was not taken into the model, as a clause."""
     n = refusal.numbers
     match refusal.kind:
+        case "diverges":
+            return "with it, the simulation of the held-out traces does not stay finite"
         case "error-grows":
             return f"the error on the held-out traces grows, by {n['share']:.0%} of what is beyond noise there"
         case "error-rises":

@@ -1,4 +1,4 @@
-"""What a reason is read from: the disagreement without an effect, and with it, beside what the joint did."""
+"""The samples in which patterns are looked for: residuals without and with an effect, and the joint's motion."""
 
 from __future__ import annotations
 
@@ -61,13 +61,13 @@ class Motions:
 
 
 Left = Callable[[Model], Sequence[Floats]]
-"""Measured − simulated (m, n) a record, for a model: a simulation without noise unless the caller has a better one."""
+"""Measured − simulated of a model, (m, n) per record; a caller may have a better simulation than one without noise."""
 
 
 def motions(
     model: Model, without: Model, records: Sequence[Record], signal: Signal = "position", left: Left | None = None
 ) -> Motions:
-    """Records beside what a model with an effect and one without it make of them."""
+    """Records beside simulations with an effect (`model`) and without it."""
     parts = [_of_record(model, without, record, signal) for record in records]
     if left is not None:
         for part, plain, full in zip(parts, left(without), left(model), strict=True):

@@ -1,4 +1,4 @@
-"""Where simulation and measurement disagree: by joint, time, phase of motion, and what the residual goes with."""
+"""Where simulation and measurement disagree: by joint, time, phase of motion, and what the residual depends on."""
 
 from __future__ import annotations
 

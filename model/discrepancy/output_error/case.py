@@ -89,6 +89,8 @@ class Case:
         share = self.held.observation.samples / self.scoring.samples
         fall = self._square(current) - self._square(found.fit.point)
         if rises_too_much(rise, deviation, fall * share, found.evidence, lines):
+            if not np.isfinite(rise):
+                return Refusal(kind="diverges")
             return Refusal(kind="error-rises", numbers={"rise": rise, "deviation": deviation})
         return None
 

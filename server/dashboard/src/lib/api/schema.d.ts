@@ -2378,7 +2378,7 @@ export interface components {
         };
         /**
          * FitRequest
-         * @description Finds the parameters with which a model best repeats traces. Fields as those of `daq fit`.
+         * @description Estimates the parameters with which a model best reproduces traces. The fields are the options of `daq fit`.
          */
         FitRequest: {
             /**
@@ -2669,7 +2669,7 @@ export interface components {
         };
         /**
          * JobMessage
-         * @description A job that has changed, or gone on.
+         * @description A job whose state or progress has changed.
          */
         JobMessage: {
             /**
@@ -2681,7 +2681,8 @@ export interface components {
         };
         /**
          * JogRequest
-         * @description Velocities (rad/s) of joints, kept up for 0.3 s at most: whoever holds the key repeats it. Empty: hold.
+         * @description Velocities (rad/s) of joints, applied for at most 0.3 s: the client repeats the request while the key is held.
+         *     Empty: hold.
          */
         JogRequest: {
             /** Velocities */
@@ -2809,7 +2810,7 @@ export interface components {
         };
         /**
          * JointResidual
-         * @description Measured less expected acceleration of a joint (rad/s²; None where it does not move) and what it goes with.
+         * @description Measured − expected acceleration of a joint (rad/s²; None where it does not move) and what it depends on.
          *
          *     `noise` is its noise floor: the root mean square that is left of records which the model itself has made.
          */
@@ -2998,7 +2999,7 @@ export interface components {
         };
         /**
          * Me
-         * @description Who the service takes the caller for.
+         * @description The caller as the service identified it.
          */
         Me: {
             /** Name */
@@ -3184,7 +3185,8 @@ export interface components {
         };
         /**
          * ModelParameter
-         * @description A parameter of a model, in its unit. `deviation`: of what is expected; None where nothing is claimed.
+         * @description A parameter of a model, in its unit. `deviation` is the standard deviation of the expected value; None where
+         *     nothing is claimed.
          */
         ModelParameter: {
             /** Name */
@@ -3494,11 +3496,11 @@ export interface components {
         };
         /**
          * ParameterDistortion
-         * @description What one parameter alone would have to do.
+         * @description How one parameter alone would have to vary to explain the residual.
          *
          *     `change_down` and `change_up` (magnitudes, in `unit`) double the total mean squared error; None where no change
-         *     within the bounds does. `required` is σ, the standard deviation that would explain the residual: None is a very
-         *     large one, an insensitive parameter. `expected` is τ′, `contribution` is λ² = τ′²/σ².
+         *     within the bounds does. `required` is σ, the standard deviation that would explain the residual; None for an
+         *     insensitive parameter, whose σ is very large. `expected` is τ′, `contribution` is λ² = τ′²/σ².
          */
         ParameterDistortion: {
             /** Name */
@@ -3804,7 +3806,7 @@ export interface components {
         };
         /**
          * ProgressMessage
-         * @description How far the experiment is that runs.
+         * @description Progress of the running experiment.
          */
         ProgressMessage: {
             /**
@@ -3859,7 +3861,7 @@ export interface components {
         };
         /**
          * QueueResume
-         * @description The operator's word that the queue may move the arm. A real arm needs `moves_real_arm`.
+         * @description The operator's consent that the queue may move the arm. A real arm needs `moves_real_arm`.
          */
         QueueResume: {
             /**
@@ -4021,7 +4023,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "error-grows" | "error-rises" | "falls-too-little" | "only-resembles" | "superfluous";
+            kind: "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "only-resembles" | "superfluous";
             /**
              * Numbers
              * @default {}
@@ -4126,7 +4128,7 @@ export interface components {
         };
         /**
          * RobotMessage
-         * @description How the robot is, and who may move it; sent when it changes.
+         * @description State of the robot, and who may move it; sent when it changes.
          */
         RobotMessage: {
             /**
@@ -4480,7 +4482,7 @@ export interface components {
         };
         /**
          * SetOutput
-         * @description Process output `line` (0–7) on or off.
+         * @description Switches process output `line` (0–7) on or off.
          */
         SetOutput: {
             /**
@@ -4643,7 +4645,7 @@ export interface components {
         };
         /**
          * StopResult
-         * @description What became of a stop. Anything but `confirmed`: use the emergency stop.
+         * @description Result of a stop. Unless it is `confirmed`, use the emergency stop.
          */
         StopResult: {
             /** Delivered */
@@ -4726,7 +4728,7 @@ export interface components {
         };
         /**
          * TeachingLine
-         * @description A line for whoever teaches: a joint that is refused, an instruction that begins.
+         * @description A line for the operator who teaches: a joint that is refused, an instruction that begins.
          */
         TeachingLine: {
             /** Number */
@@ -4741,7 +4743,7 @@ export interface components {
         };
         /**
          * TeachingMessage
-         * @description A line for whoever teaches.
+         * @description A line for the operator who teaches.
          */
         TeachingMessage: {
             /**
@@ -5032,7 +5034,8 @@ export interface components {
         };
         /**
          * ValidateRequest
-         * @description What would have to move, when, and against what, for a model to explain traces. Fields as of `daq validate`.
+         * @description Validates a model against traces: which parameters would have to change, and when. The fields are the options of
+         *     `daq validate`.
          */
         ValidateRequest: {
             /**
@@ -5081,7 +5084,7 @@ export interface components {
         };
         /**
          * Variation
-         * @description α(t) of one parameter, all parameters moving together as little as explains the motion.
+         * @description α(t) of one parameter, where all parameters together vary as little as explains the motion.
          *
          *     `values` and `noise` (the standard deviation that the noise floor gives α) are in `unit` at the result's
          *     times; None where no joint that the parameter acts on moves. `deviation` is the rms of α (4.23), corrected for
@@ -5137,7 +5140,7 @@ export interface components {
         };
         /**
          * Wait
-         * @description `duration` s without motion.
+         * @description Waits for `duration` s without motion.
          */
         Wait: {
             /**
