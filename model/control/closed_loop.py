@@ -15,7 +15,7 @@ from model.dynamics.compilation import compiled
 from model.dynamics.linear_solve import solve_3
 
 LONGEST_STEP = 2e-4
-"""s; half of it changes no position of chapter 8's runs by more than 1e-5 rad (tests)."""
+"""Longest step of integration, s; half of it changes no position of chapter 8's runs by more than 1e-5 rad (tests)."""
 
 PARTITIONED_GAINS = (11.0, 5.0, 7.0)
 """K_P, K_I, K_D of every joint, (8.17) to (8.19): poles at −1, −1 and −5 on a unit inertia."""
@@ -24,7 +24,7 @@ PID_GAINS = ((25.4, 5.2, 21.9), (29.2, 3.8, 23.6), (22.8, 4.8, 21.7))
 """K_P, K_I, K_D of joints 1 to 3 of the classical PID (section 8.3), volts at the amplifier's input a rad."""
 
 AMPLIFIER_GAIN = 28.0
-"""Between the controller's output and the motor (section 6.2); by (8.5) and (8.7) it belongs to the PID's loop too."""
+"""Gain between the controller's output and the motor (section 6.2); by (8.5) and (8.7) it is part of the PID's loop."""
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,13 @@ from model.fitting.unknowns import Unknown
 Verdict = Literal["known", "combination", "unknown"]
 
 KNOWN_SHARE = 0.5
-"""The data alone must narrow a parameter to this share of its natural size for it to be known."""
+"""Largest deviation, as a share of the natural size, that the data alone may leave of a parameter that is known."""
 LARGEST_DEVIATION = 30.0
-"""Natural sizes; a deviation above it is not a number that means anything, since the model is not linear so far."""
+"""Largest deviation, in natural sizes, that is reported: over a larger distance the model is not linear."""
 STRONG_CORRELATION = 0.95
-"""Parameters whose estimates are correlated beyond this belong to one group."""
+"""Correlation of estimates beyond which parameters belong to one group."""
 WEAKEST_PRIOR = 1e3
-"""Natural sizes; so wide a prior keeps the arithmetic finite where the data say nothing, and decides nothing."""
+"""Deviation, in natural sizes, of a prior so wide that it only keeps the arithmetic finite where data say nothing."""
 
 
 class _Part(BaseModel):
@@ -61,7 +61,7 @@ class Combination(_Part):
     members: tuple[Member, ...]
     torque_scale: bool
     deviation: float | None
-    """With which the data alone know it, in natural sizes of its largest member; None where they say nothing."""
+    """Its deviation by the data alone, in natural sizes of its largest member; None where they say nothing."""
 
 
 class IdentifiabilityReport(_Part):
@@ -74,7 +74,7 @@ class IdentifiabilityReport(_Part):
     torque_scale_free: bool
 
     def verdict(self, name: str) -> ParameterVerdict:
-        """Of one parameter. Raises KeyError when it was not among the unknowns."""
+        """The verdict on one parameter. Raises KeyError when it was not among the unknowns."""
         return {p.name: p for p in self.parameters}[name]
 
     @property

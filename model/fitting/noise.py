@@ -1,11 +1,11 @@
-"""What the sensor's noise does to the arm on average.
+"""The mean effect of the sensor's noise on the arm.
 
-The controller acts on readings with noise and rounding, and that keeps an arm creeping where a simulation without noise
-would stick: Coulomb friction would come out too small (by 8 % of its arm at 0.3 counts). The model itself, with noise
-drawn and readings rounded, therefore takes the arm's place in several replicas, and the mean difference between them
-and the simulation without noise is what a residual is expected to be (indirect inference, Gouriéroux, Monfort and
-Renault 1993). Feeding the noise that the record itself shows into the simulation would do the same in part, but makes
-the derivatives correlate with the residual, and inertia and delay come out wrong by several of their deviations.
+The controller acts on readings with noise and rounding, which keeps an arm creeping where a simulation without noise
+would stick: Coulomb friction would be estimated too small (by 8 % of its arm at 0.3 counts). The model itself, with
+noise drawn and readings rounded, therefore takes the arm's place in several replicas. Their mean difference from the
+simulation without noise is the expected residual (indirect inference, Gouriéroux, Monfort and Renault 1993). Feeding
+the record's own noise into the simulation would do the same in part, but makes the derivatives correlate with the
+residual, and the estimates of inertia and delay are then wrong by several of their deviations.
 """
 
 from __future__ import annotations

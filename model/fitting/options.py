@@ -54,15 +54,15 @@ class FitOptions(BaseModel):
     replicas: Annotated[int, Field(ge=0, le=1000)] = 16
     """Simulations with drawn noise that tell what the noise does on average; 0 for none."""
     longest_memory: Annotated[int, Field(ge=0, le=100)] = 12
-    """Samples that the whitening looks back, at most."""
+    """Most samples that the whitening looks back."""
     rounds: Annotated[int, Field(ge=1, le=20)] = 6
-    """Of noise, whitening and search, at most."""
+    """Most rounds of noise, whitening and search."""
     tolerance: Annotated[FiniteFloat, Field(gt=0)] = 1e-5
     most_evaluations: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
-    """Of one search; None: 60 for least squares, 400 a parameter for Nelder and Mead."""
+    """Most evaluations of one search; None: 60 for least squares, 400 for each parameter for Nelder and Mead."""
     loop: Literal["closed", "open"] | None = None
     """None: closed where the machine has a controller."""
     signal: Literal["position", "velocity"] | None = None
-    """What is compared; None: what the machine's sensors measure."""
+    """The signal that is compared; None: what the machine's sensors measure."""
     step: Annotated[FiniteFloat, Field(gt=0, le=0.01)] = 4e-3
     """Longest step of integration, s. Readings are right to 0.003 counts (root mean square; 0.04 with backlash)."""

@@ -18,14 +18,14 @@ from model.simulation.inputs import RunInputs, inputs_of
 Signal = Literal["position", "velocity"]
 
 LEAST_SAMPLES = 10
-"""A trace shorter than this says nothing about motion."""
+"""Least number of samples of a trace; fewer say nothing about motion."""
 SETTLING = 0.4
-"""s at the start of a record that are simulated but not compared: how friction holds the arm there is not known, and
-the little jump of a simulation that finds its own balance would pass for inertia."""
+"""Time at the start of a record, s, that is simulated but not compared: how friction holds the arm there is not known,
+and the small jump of a simulation that finds its own balance would be taken for inertia."""
 LEAST_MOTION_COUNTS = 4.0
-"""Counts of the sensor that at least one joint of at least one trace must move: less is rounding and noise."""
+"""Least motion, in counts of the sensor, of at least one joint in at least one trace: less is rounding and noise."""
 WILD_COUNTS = 400.0
-"""Distance between set point and position (counts) that no controller within ±127 leaves for a whole record."""
+"""Distance between set point and position, in counts, that no controller within ±127 leaves for a whole record."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,8 @@ def records_of(traces: Sequence[Trace], machine: Machine, signal: Signal) -> tup
 
 
 def noise_floor(records: Sequence[Record], machine: Machine, signal: Signal) -> Floats:
-    """(n,) standard deviation of a measurement: rounding (1/12 count²) and the sensor's noise; from the record where
-    the machine says nothing, by the median second difference (a straight line has none)."""
+    """(n,) standard deviation of a measurement: rounding (1/12 count²) and the sensor's noise. Where the machine states
+    no sensor it is estimated from the record by the median second difference, which is zero on a straight line."""
     floor = []
     for column, joint in enumerate(machine.modelled_joints):
         sensor = machine.joint(joint).sensor
@@ -117,7 +117,7 @@ def _record(trace: Trace, machine: Machine, signal: Signal) -> Record:
 
 
 def _calm_start(inputs: RunInputs, trace: Trace, columns: list[int]) -> RunInputs:
-    """The drive before the record as the mean over the rest at its start: one sample of it is mostly noise."""
+    """Takes the mean drive over the rest at the start as the drive before the record: one sample is mostly noise."""
     if trace.set_point is None or trace.drive is None:
         return inputs
     changed = np.abs(trace.set_point[:, columns] - trace.set_point[0, columns]).max(axis=1) > 1e-9
@@ -127,7 +127,7 @@ def _calm_start(inputs: RunInputs, trace: Trace, columns: list[int]) -> RunInput
 
 
 def _check_same_unit(trace: Trace, machine: Machine) -> None:
-    """Set points and positions that differ by a factor or an offset throughout are in different units."""
+    """Refuses set points and positions in different units: they differ by a factor or an offset throughout."""
     if trace.set_point is None:
         return
     for joint in machine.modelled_joints:
@@ -145,7 +145,7 @@ def _check_same_unit(trace: Trace, machine: Machine) -> None:
 
 
 def _moves(record: Record, machine: Machine, signal: Signal) -> bool:
-    """Whether some joint was asked to move, and did; an arm that sags to its first set point does not count."""
+    """Whether some joint was asked to move and did. An arm that only sags to its first set point does not count."""
     for column, joint in enumerate(machine.modelled_joints):
         sensor = machine.joint(joint).sensor
         least = LEAST_MOTION_COUNTS * resolution(sensor) if sensor is not None and signal == "position" else 0.0

@@ -79,7 +79,7 @@ class FitResult(_Part):
     message: str
 
     def parameter(self, name: str) -> FittedParameter:
-        """Of that name. Raises SpecError when it was not fitted."""
+        """The parameter of that name. Raises SpecError when it was not fitted."""
         for parameter in self.parameters:
             if parameter.name == name:
                 return parameter

@@ -1,4 +1,4 @@
-"""Huber's loss: quadratic for ordinary residuals, linear for outliers, so that a crackling sensor decides nothing."""
+"""Huber's loss: quadratic for ordinary residuals, linear for outliers, so that a sensor's spikes have little weight."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import numpy as np
 from model.arrays import Floats
 
 THRESHOLD = 4.0
-"""Standard deviations beyond which a residual counts as an outlier; Gaussian noise reaches it once in 16 000
-samples."""
+"""Residual, in standard deviations, beyond which a sample counts as an outlier. Gaussian noise reaches it once in
+16 000 samples."""
 
 
 def huber(squares: Floats, samples: int, threshold: float = THRESHOLD) -> Floats:
-    """ρ, ρ′, ρ″ (3, m) of squared residuals for `scipy.optimize.least_squares`.
+    """ρ, ρ′, ρ″ (3, m) of squared residuals, as `scipy.optimize.least_squares` takes a loss.
 
     The first `samples` are data; the rest (priors) stay quadratic.
     """

@@ -1,4 +1,4 @@
-"""The residuals of a model: recorded set points in, simulated readings out, with exact derivatives, on all cores."""
+"""The residuals of a simulated model on recorded set points, with exact derivatives, on all cores."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from model.simulation.simulate import at_rows
 
 @dataclass(frozen=True)
 class _Simulated:
-    """What one record should show, (m, n), and its derivatives (p, m, n)."""
+    """Simulated signal (m, n) of one record, and its derivatives (p, m, n)."""
 
     signal: Floats
     jacobian: Floats | None
@@ -65,7 +65,7 @@ class SimulatedProblem:
         return replace(self, records=tuple(replace(r, measured=m) for r, m in zip(self.records, readings, strict=True)))
 
     def noisy_readings(self, values: Floats, rng: np.random.Generator) -> list[Floats]:
-        """What the records would show if the model with these values were the arm: noise drawn, readings rounded."""
+        """Readings (m, n) of each record if the model with these values were the arm: noise drawn, readings rounded."""
         machine = self.model.machine
         sensors = [machine.joint(j).sensor for j in machine.modelled_joints]
         deviations = np.array([0.0 if s is None or s.noise is None else s.noise.value for s in sensors])

@@ -18,11 +18,11 @@ from model.effects.transmission import contact_compliance
 from model.machine_model.parameter import Kind, Parameter
 
 NO_LIMIT = 1e9
-"""Stands in the vector for a limit that is not set."""
+"""Number that stands in the vector for a limit that is not set."""
 SENSOR_COUNTS = 4096
 DAC_COUNTS = 127
 PRESLIDING_COUNTS = 0.5
-"""Counts of the sensor over which friction builds up: an assumption, below what the sensor sees."""
+"""Distance, in counts of the sensor, over which friction builds up: an assumption, below what the sensor resolves."""
 
 
 def parameter(place: str, kind: Kind, part: str, quantity: Quantity, slot: int, low: float = -math.inf) -> Parameter:

@@ -12,7 +12,7 @@ from model.reports.parameter_blocks import interval_picture, parameter_table, un
 def fit_report(found: FitResult, comparison: Comparison) -> Report:
     """The page of a fit; `comparison` is of the model before and after, on the traces fitted to and held out."""
     sections = [
-        Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.parameters))),
+        Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.model, found.parameters))),
         Section("What the traces cannot tell", undetermined_blocks(found.identifiability)),
         Section("How large the error is", (agreement_table(comparison.models), *_floor_remark(comparison))),
         motion_section(comparison.signals, [m.label for m in comparison.models]),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from model.fitting.identifiability import IdentifiabilityReport
 from model.fitting.result import FittedParameter
+from model.machine_model.model import Model
 from model.reports.figures import COLOURS, QUIET, drawn, panels
 from model.reports.page import Cell, Picture, Points, Table, Text, Tone, cells
 
@@ -37,8 +38,8 @@ def _parameter_row(p: FittedParameter) -> tuple[Cell, ...]:
     return (*cells(p.name, value, interval), Cell(p.unit), before, after, Cell(verdict, tone))
 
 
-def interval_picture(parameters: Sequence[FittedParameter]) -> tuple[Picture, ...]:
-    """Intervals in expected deviations from the expected value."""
+def interval_picture(model: Model, parameters: Sequence[FittedParameter]) -> tuple[Picture, ...]:
+    """Intervals of parameters of the model, in expected deviations from the expected value."""
     shown = [p for p in parameters if p.value is not None and p.expected is not None and p.expected_deviation]
     if not shown:
         return ()
@@ -53,7 +54,8 @@ def interval_picture(parameters: Sequence[FittedParameter]) -> tuple[Picture, ..
             low, value, high = (
                 ((0.0 if v is None else v) - p.expected) / p.expected_deviation for v in (p.low, p.value, p.high)
             )
-            colour = COLOURS[(_joint(p.name) - 1) % len(COLOURS)]
+            first_joint = min(model.parameter(p.name).joints, default=1)
+            colour = COLOURS[(first_joint - 1) % len(COLOURS)]
             axes.plot([low, high], [row, row], color=colour, lw=2.0, solid_capstyle="butt")
             axes.plot([value], [row], "o", color=colour, ms=4)
         axes.set_yticks(range(len(shown)), [p.name for p in reversed(shown)])
@@ -66,12 +68,6 @@ def interval_picture(parameters: Sequence[FittedParameter]) -> tuple[Picture, ..
         "Colours are those of the joints."
     )
     return (Picture(drawn(draw, 0.6 + 0.19 * len(shown)), caption),)
-
-
-def _joint(name: str) -> int:
-    """The first joint or link that a parameter's name has, 1 where it has none."""
-    digits = [c for c in name.split(".", maxsplit=1)[0] if c.isdigit()]
-    return int(digits[0]) if digits else 1
 
 
 def undetermined_blocks(report: IdentifiabilityReport) -> tuple[Text | Points, ...]:

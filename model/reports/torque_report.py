@@ -19,7 +19,7 @@ def torque_report(found: TorqueFit, curves: Sequence[TorqueCurves]) -> Report:
     """The page; `curves` are those of the fitted model on the traces to draw."""
     machine = found.model.machine
     sections = (
-        Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.parameters))),
+        Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.model, found.parameters))),
         Section("What the traces cannot tell", undetermined_blocks(found.identifiability)),
         Section("What is left of the torque", (_error_table(found), *(_picture(c, found) for c in curves))),
         Section("How it was done", (_how(found),)),

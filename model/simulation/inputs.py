@@ -13,13 +13,15 @@ from model.arrays import Floats
 from model.drives import controller as pid
 
 REST_COUNTS = 2.0
-"""Counts of the sensor within which the readings before the first new set point count as one posture."""
+"""Largest difference, in counts of the sensor, of readings that count as one posture before the first new set point."""
 REST_PERIODS = 25
-"""At most so many of them are averaged."""
-NEIGHBOURS, NEARLY = 1.5, 1e-6
-"""Periods: samples further apart than the one have a gap between them; the other is rounding."""
+"""Most readings that are averaged to the posture at rest."""
+NEIGHBOURS = 1.5
+"""Largest distance, in periods, of samples without a gap between them."""
+NEARLY = 1e-6
+"""Distance, in periods, that is only rounding."""
 LARGEST_ANGLE = 20.0
-"""rad; more than three turns of a joint are taken for degrees."""
+"""Largest angle, rad, that is taken as such; more than three turns of a joint are taken for degrees."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ MOTION = len(ARGUMENTS)
 
 TRIALS = 40
 AGREEING = 0.85
-"""Share of trials in which derivatives must be right; a few may fall on a corner."""
+"""Least share of trials in which derivatives must be right; a few may fall on a corner."""
 STEP = 1e-6
 TOLERANCE = 1e-4
 SPANS = (2.0, 3.0, 20.0, 20.0, 5.0)

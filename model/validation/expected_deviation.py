@@ -6,7 +6,7 @@ import math
 from typing import Literal
 
 from daq.contracts.errors import SpecError
-from model.machine_model.parameter import Parameter
+from model.machine_model.parameter import Kind, Parameter
 
 LENGTH_SHARE = 0.03
 """Expected standard deviation of a length or radius, as a share of its value."""
@@ -35,10 +35,9 @@ def deviation_share(basis: Basis, convention: Convention) -> float:
 
 def basis_of(parameter: Parameter) -> Basis:
     """Which rule gives a model parameter's expected deviation."""
-    last = parameter.name.split(".")[-1]
     if parameter.effect is None and parameter.unit == "kg":
         return "mass"
-    if parameter.effect is None and parameter.unit == "m" and last in ("length", "radius", "offset"):
+    if parameter.kind is Kind.GEOMETRY:
         return "length"
     if parameter.value > 0 and parameter.low >= 0:
         return "gaussian"

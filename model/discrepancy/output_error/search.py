@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from model.discrepancy.output_error.observation import Observation, Signals
+from model.fitting.bounded_step import bounded_step
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 
@@ -195,25 +196,12 @@ def _step(point: Point) -> tuple[Point, bool]:
 
 
 def _gauss_newton(point: Point, least: Floats, most: Floats, damping: float) -> Floats:
-    """The damped step (p,) to the minimum of the linearised problem, between `least` and `most` (p,).
-
-    An unknown that would leave its bounds goes to the nearer one, and the others take that into account: clipping the
-    step instead would spoil the descent in all others.
-    """
+    """The damped step (p,) to the minimum of the linearised problem, between `least` and `most` (p,)."""
     information = point.information
     diagonal = np.diag(information)
     information[np.diag_indices_from(information)] += (1e-9 + damping) * np.maximum(diagonal, 1e-12 * diagonal.max())
-    gradient = point.tangents @ point.weighted - point.precision * (point.values - point.expected)
-    step, free = np.zeros_like(gradient), np.ones(len(gradient), dtype=bool)
-    while free.any():
-        pull = gradient[free] - information[np.ix_(free, ~free)] @ step[~free]
-        step[free] = np.linalg.solve(information[np.ix_(free, free)], pull)
-        beyond = free & ((step < least) | (step > most))
-        if not beyond.any():
-            break
-        step[beyond] = np.clip(step[beyond], least[beyond], most[beyond])
-        free &= ~beyond
-    return step
+    descent = point.tangents @ point.weighted - point.precision * (point.values - point.expected)
+    return bounded_step(information, descent, least, most)
 
 
 def _corrected(point: Point, tried: Point) -> Floats:

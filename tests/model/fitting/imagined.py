@@ -45,16 +45,25 @@ def set_points(number: int, seconds: float) -> NDArray[np.float64]:
 
 
 def trace(
-    model: Model, number: int = 0, seconds: float = 6.0, seed: int = 0, gains: tuple[int, int, int] = (2, 0, 0),
-    points: NDArray[np.float64] | None = None, noise: float = 0.3,
-) -> Trace:  # fmt: skip
+    model: Model,
+    number: int = 0,
+    seconds: float = 6.0,
+    seed: int = 0,
+    gains: tuple[int, int, int] = (2, 0, 0),
+    points: NDArray[np.float64] | None = None,
+    noise: float = 0.3,
+) -> Trace:
     """One record of `model` as the arm."""
     wanted = set_points(number, seconds) if points is None else points
     joints = model.machine.modelled_joints
     record = TraceRecord(
-        trace_id=f"imagined-{number}-{seed}", created=datetime(2026, 1, 1, tzinfo=UTC), software="test",
-        source="imported", period=PERIOD, gains=dict.fromkeys(joints, gains),
-    )  # fmt: skip
+        trace_id=f"imagined-{number}-{seed}",
+        created=datetime(2026, 1, 1, tzinfo=UTC),
+        software="test",
+        source="imported",
+        period=PERIOD,
+        gains=dict.fromkeys(joints, gains),
+    )
     time = PERIOD * np.arange(len(wanted))
     asked = Trace(
         record, joints, time, wanted, set_point=wanted, drive=np.zeros_like(wanted), tick=np.arange(len(wanted))
@@ -62,9 +71,15 @@ def trace(
     drawn = noise * np.random.default_rng([seed, number]).standard_normal(wanted.shape)
     answer = simulate(model, asked, Options(noise=drawn))
     return Trace(
-        record, joints, time, answer.reading, set_point=wanted, error=answer.error, drive=answer.drive,
+        record,
+        joints,
+        time,
+        answer.reading,
+        set_point=wanted,
+        error=answer.error,
+        drive=answer.drive,
         tick=np.arange(len(wanted)),
-    )  # fmt: skip
+    )
 
 
 def traces(model: Model, count: int = 2, seconds: float = 6.0, seed: int = 0) -> list[Trace]:

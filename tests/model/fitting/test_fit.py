@@ -136,9 +136,12 @@ def test_nelder_and_mead_find_two_parameters_too() -> None:
 
 def test_a_strong_prior_holds_and_the_parameter_is_not_called_known() -> None:
     options = FitOptions(
-        parameters=("link1.mass", "load.mass"), priors={"link1.mass": Prior(expected=2.6, deviation=0.1)}, replicas=0,
-        rounds=1, sensor_bend=False,
-    )  # fmt: skip
+        parameters=("link1.mass", "load.mass"),
+        priors={"link1.mass": Prior(expected=2.6, deviation=0.1)},
+        replicas=0,
+        rounds=1,
+        sensor_bend=False,
+    )
     found = fit(arm(), traces(arm(), 1, 4.0), options).parameter("link1.mass")
     assert found.verdict == "unknown"
     assert found.value is found.low is found.high is found.deviation is None
@@ -148,8 +151,11 @@ def test_a_strong_prior_holds_and_the_parameter_is_not_called_known() -> None:
 def test_the_scale_of_torque_is_found_in_records_of_the_whole_arm() -> None:
     options = FitOptions(
         parameters=("*.mass", "*.torque_constant", "*.rotor_inertia", "*.viscous_friction.coefficient", "load.mass"),
-        sensor_bend=False, friction_form=False, replicas=0, rounds=1,
-    )  # fmt: skip
+        sensor_bend=False,
+        friction_form=False,
+        replicas=0,
+        rounds=1,
+    )
     found = fit(arm(), traces(arm(), 2, 4.0), options)
     report = found.identifiability
     assert report.torque_scale_free

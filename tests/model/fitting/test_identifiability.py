@@ -49,8 +49,10 @@ def test_the_scale_of_torque_is_found_and_named() -> None:
     assert only.torque_scale
     assert only.deviation is None
     assert {m.name: m.change for m in only.members} == {
-        "link1.mass": 1.0, "joint1.motor.torque_constant": 1.0, "joint1.viscous_friction.coefficient": 1.0
-    }  # fmt: skip
+        "link1.mass": 1.0,
+        "joint1.motor.torque_constant": 1.0,
+        "joint1.viscous_friction.coefficient": 1.0,
+    }
     verdicts = {p.name: p.verdict for p in report.parameters}
     assert verdicts["link1.length"] == "known"
     assert verdicts["link1.mass"] == verdicts["joint1.motor.torque_constant"] == "combination"

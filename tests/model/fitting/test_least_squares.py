@@ -66,10 +66,16 @@ def found_elsewhere(problem: Curve, robust: bool = False) -> Floats:
     loss, scale = ("huber", 4.0) if robust else ("linear", 1.0)
     return np.asarray(
         least_squares(
-            lambda v: (problem.model(v) - problem.measured) / 0.01, [1.0, 0.5, 0.0], bounds=(low, high), loss=loss,
-            f_scale=scale, xtol=1e-12, ftol=1e-12, gtol=1e-12,
+            lambda v: (problem.model(v) - problem.measured) / 0.01,
+            [1.0, 0.5, 0.0],
+            bounds=(low, high),
+            loss=loss,
+            f_scale=scale,
+            xtol=1e-12,
+            ftol=1e-12,
+            gtol=1e-12,
         ).x
-    )  # fmt: skip
+    )
 
 
 def test_finds_the_least_squares_with_few_jacobians() -> None:

@@ -91,11 +91,15 @@ def test_a_start_outside_the_bounds(good: Trace) -> None:
     assert "outside 2 to 3" in refused([good], SOME.model_copy(update={"bounds": {"load.mass": (2.0, 3.0)}}))
 
 
-@pytest.mark.parametrize("options", [
-    FitOptions(parameters=("load.weight",)), FitOptions(held=("nothing.*",)),
-    FitOptions(bounds={"load.weight": (0, 1)}),
-    FitOptions(priors={"load.weight": Prior(expected=1, deviation=1)}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "options",
+    [
+        FitOptions(parameters=("load.weight",)),
+        FitOptions(held=("nothing.*",)),
+        FitOptions(bounds={"load.weight": (0, 1)}),
+        FitOptions(priors={"load.weight": Prior(expected=1, deviation=1)}),
+    ],
+)
 def test_a_name_that_is_none(good: Trace, options: FitOptions) -> None:
     assert "not in this model" in refused([good], options)
 

@@ -28,9 +28,39 @@ PERIOD, COUNTS, GAIN = 0.02, 4096, 2.0
 """s of control, counts of the converter, P."""
 
 # Columns of a joint's numbers.
-(R, L, KT, KB, J, GEAR, HEATING, COOLING, VISCOUS, COULOMB, ARM, PRESLIDING, STRIBECK, STRIBECK_SPEED, BREAKAWAY,
- DIRECTION, LOSS, GIVE, DAMPING, GAP, RIPPLE_S, RIPPLE_C, RIPPLE_N, SPRING, REST, SHAKE_S, SHAKE_C, SHAKE_F, LAGS,
- GIVES, STICKS) = range(31)  # fmt: skip
+(
+    R,
+    L,
+    KT,
+    KB,
+    J,
+    GEAR,
+    HEATING,
+    COOLING,
+    VISCOUS,
+    COULOMB,
+    ARM,
+    PRESLIDING,
+    STRIBECK,
+    STRIBECK_SPEED,
+    BREAKAWAY,
+    DIRECTION,
+    LOSS,
+    GIVE,
+    DAMPING,
+    GAP,
+    RIPPLE_S,
+    RIPPLE_C,
+    RIPPLE_N,
+    SPRING,
+    REST,
+    SHAKE_S,
+    SHAKE_C,
+    SHAKE_F,
+    LAGS,
+    GIVES,
+    STICKS,
+) = range(31)
 # Columns of the state. X is the relative rise of the resistance.
 Q, V, Z, I, M, W, X, STUCK = range(8)  # noqa: E741 (a current)
 
@@ -253,19 +283,41 @@ def _joint_numbers(model: Model, value: dict[str, float]) -> Floats:
         gives = bool(has & {"backlash", "joint_compliance"})
         contact = of("backlash.contact", _null_contact(model, j)) if gives else 0.0
         damping = of("backlash.damping", of("joint_compliance.damping"))
-        rows.append([
-            of("motor.resistance"), of("motor_inductance.inductance", 1.0), of("motor.torque_constant"),
-            of("motor.back_emf_constant") * (1 + of("back_emf_error.relative")), of("motor.rotor_inertia"),
-            drive.gear_ratio.value, of("resistance_drift.heating"), of("resistance_drift.time_constant", 1.0),
-            of("viscous_friction.coefficient"), of("coulomb_friction.torque"), of("load_dependent_friction.arm"),
-            PRESLIDING_COUNTS * sensor.range.value / COUNTS, of("stribeck_friction.torque"),
-            of("stribeck_friction.speed", 1.0), of("stiction.breakaway"), of("direction_dependent_friction.difference"),
-            of("gear_loss.loss"), of("joint_compliance.compliance") + contact, damping, of("backlash.gap"),
-            of("torque_ripple.sine"), of("torque_ripple.cosine"), of("torque_ripple.cycles", 1.0),
-            of("spring_torque.stiffness"), of("spring_torque.rest"), of("periodic_disturbance.sine"),
-            of("periodic_disturbance.cosine"), of("periodic_disturbance.frequency"), "motor_inductance" in has, gives,
-            "stiction" in has,
-        ])  # fmt: skip
+        rows.append(
+            [
+                of("motor.resistance"),
+                of("motor_inductance.inductance", 1.0),
+                of("motor.torque_constant"),
+                of("motor.back_emf_constant") * (1 + of("back_emf_error.relative")),
+                of("motor.rotor_inertia"),
+                drive.gear_ratio.value,
+                of("resistance_drift.heating"),
+                of("resistance_drift.time_constant", 1.0),
+                of("viscous_friction.coefficient"),
+                of("coulomb_friction.torque"),
+                of("load_dependent_friction.arm"),
+                PRESLIDING_COUNTS * sensor.range.value / COUNTS,
+                of("stribeck_friction.torque"),
+                of("stribeck_friction.speed", 1.0),
+                of("stiction.breakaway"),
+                of("direction_dependent_friction.difference"),
+                of("gear_loss.loss"),
+                of("joint_compliance.compliance") + contact,
+                damping,
+                of("backlash.gap"),
+                of("torque_ripple.sine"),
+                of("torque_ripple.cosine"),
+                of("torque_ripple.cycles", 1.0),
+                of("spring_torque.stiffness"),
+                of("spring_torque.rest"),
+                of("periodic_disturbance.sine"),
+                of("periodic_disturbance.cosine"),
+                of("periodic_disturbance.frequency"),
+                "motor_inductance" in has,
+                gives,
+                "stiction" in has,
+            ]
+        )
     return np.array(rows, dtype=np.float64)
 
 

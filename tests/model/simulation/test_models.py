@@ -43,9 +43,13 @@ def test_a_newer_model_file_is_refused_in_one_line(model: Model, tmp_path: Path)
 
 @pytest.mark.parametrize(
     ("text", "says"),
-    [("{", "not JSON"), ("[]", "neither a model nor"), ('{"machine": {}}', "says no version"),
-     ('{"machine": {}, "format": 1}', "machine.version")],
-)  # fmt: skip
+    [
+        ("{", "not JSON"),
+        ("[]", "neither a model nor"),
+        ('{"machine": {}}', "says no version"),
+        ('{"machine": {}, "format": 1}', "machine.version"),
+    ],
+)
 def test_what_is_not_a_model_is_refused(text: str, says: str, tmp_path: Path) -> None:
     (tmp_path / "m.json").write_text(text, "utf-8")
     with pytest.raises(SpecError, match=says):

@@ -57,7 +57,7 @@ def test_expected_deviations_follow_the_source(name: str, share: float, basis: s
 
 
 def test_a_parameter_around_zero_takes_its_stated_deviation_or_is_refused() -> None:
-    offset = arm().with_effect("potentiometer_offset", (1,)).parameter("joint1.potentiometer_offset.angle")
+    offset = arm().with_effect("potentiometer_offset", (1,)).parameter("joint1.potentiometer_offset.offset")
     assert expected_deviation(offset, "source") == (offset.deviation, "stated")
     with pytest.raises(SpecError, match="no expected deviation"):
         expected_deviation(replace(offset, deviation=None), "source")
