@@ -1,4 +1,4 @@
-"""What a turn's candidates are worth, as they are listed in an answer: evidence, parameters, intervals."""
+"""Candidates as an answer lists them: evidence, parameters and their intervals."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def standard_deviations(
 ) -> Floats:
     """(p,) of estimates by least squares that take a residual for white noise of unit size: what that gives, or, where
     it is more, what the residual's own covariance Σ gives, H⁻¹ (J Σ Jᵀ + P) H⁻¹ with H = J Jᵀ + P (White 1980). Never
-    less, for a fit takes slow noise out of its residual.
+    less, because a fit takes slow noise out of its residual.
 
     Args:
         precision: P, (p,) of the priors. whiteners: of each joint's residual.

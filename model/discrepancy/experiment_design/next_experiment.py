@@ -63,7 +63,7 @@ class Asker:
     budget: float | None = None
 
     def after(self, verdict: Verdict, current: Point, rivals: Sequence[CandidateFit], traces: Sequence[Trace]) -> Asked:
-        """What to make next: what separates the rivals of a name or a group; else what tells most of the arm."""
+        """What to make next: what separates the rivals of a name or a group; else the most informative one."""
         if verdict in ("named", "ambiguous"):
             ended = converge_rivals(rivals)
             return best_experiment(ended, self) if len(ended) > 1 else Asked(None)
@@ -120,14 +120,14 @@ def best_experiment(rivals: Sequence[CandidateFit], asker: Asker) -> Asked:
     pairs = list(combinations(range(len(rivals)), 2))
     best = {pair: max(j.sizes[pair] for j in judged) for pair in pairs}
     hopeless = [pair for pair in pairs if best[pair] < LEAST]
-    told = [pair for pair in pairs if pair not in hopeless]
+    separable = [pair for pair in pairs if pair not in hopeless]
     note = _hopeless(hopeless, best, names, asker.budget)
-    if not told:
+    if not separable:
         return Asked(None, note)
-    chosen = max(judged, key=lambda j: _worth(min(j.sizes[p] for p in told), j.there.duration))
-    hardest = min(told, key=lambda p: chosen.sizes[p])
+    chosen = max(judged, key=lambda j: _worth(min(j.sizes[p] for p in separable), j.there.duration))
+    hardest = min(separable, key=lambda p: chosen.sizes[p])
     separation = chosen.sizes[hardest]
-    members = sorted({k for pair in told for k in pair})
+    members = sorted({k for pair in separable for k in pair})
     place = _differs_at(rivals[hardest[0]], chosen.there.observation, chosen.left[hardest])
     asked = _next(chosen.experiment, chosen.there, tuple(names[k] for k in members), separation)
     hardest_names = (names[hardest[0]], names[hardest[1]])
@@ -135,7 +135,7 @@ def best_experiment(rivals: Sequence[CandidateFit], asker: Asker) -> Asked:
 
 
 def most_information(point: Point, asker: Asker, done: Sequence[ExperimentSpec]) -> Asked:
-    """Of the general experiments that were not made yet, the one that tells most of the arm; of the others, if those
+    """Of the general experiments that were not made yet, the most informative one; of the others, if those
     take too long. None when a general one was made."""
     if any(_same_motion(e.spec, s) for e in asker.experiments if e.general for s in done):
         return Asked(None)
@@ -241,8 +241,8 @@ def _hopeless(
     """The note on pairs that no experiment tells apart."""
     if not pairs:
         return None
-    told = [[names[a], names[b], best[a, b]] for a, b in pairs]
-    return Note(kind="not-separable", values={"pairs": told, "least": LEAST, "budget": budget})
+    listed = [[names[a], names[b], best[a, b]] for a, b in pairs]
+    return Note(kind="not-separable", values={"pairs": listed, "least": LEAST, "budget": budget})
 
 
 def _differs_at(rival: CandidateFit, observation: Observation, left: Floats) -> DifferencePlace:

@@ -70,7 +70,7 @@ class Prediction:
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """The point's unknowns that belong to no trace, for they stay what they are on the next one; then the
+        """The point's unknowns that belong to no trace, because they keep their values on the next one; then the
         starts."""
         return (*(u for u in self.point.unknowns if u.trace is None), *self.there.starts)
 

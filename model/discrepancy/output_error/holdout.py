@@ -45,7 +45,7 @@ class HeldOut:
     def residuals(self, point: Point) -> Signals:
         """Measured − simulated (m, n) rad of every held-out trace, with the point's values.
 
-        Each trace itself tells what no other trace can: its initial posture, within a count or so, because friction
+        Each trace itself gives what no other trace can: its initial posture, within a count or so, because friction
         holds the arm there; and its phase of a periodic disturbance, whose amplitude and frequency are kept.
         """
         return tuple(

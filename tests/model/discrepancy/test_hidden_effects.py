@@ -49,7 +49,7 @@ def _is_named(answer: Diagnosis, name: str, joint: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_two_effects_so_strong_that_the_tolerance_parameters_go_astray_are_both_named(tmp_path: Path) -> None:
+def test_two_effects_so_strong_that_the_fit_diverges_from_the_prior_are_both_named(tmp_path: Path) -> None:
     """Either alone is found from where the first fit ends; of both, no fit was any good there, and none was begun
     again."""
     answer = diagnosed(tmp_path, "spring_torque:joint=2,stiffness=8", "dead_zone:joint=1,width=0.8")

@@ -41,7 +41,7 @@ def test_slow_noise_is_as_uncertain_as_repeated_records_show() -> None:
     assert np.median(deviations) > 3 * white
 
 
-def test_where_the_record_says_nothing_the_prior_stays() -> None:
+def test_an_estimate_without_information_keeps_the_deviation_of_its_prior() -> None:
     whiteners = fit_noise_model([[slow_noise(1, 500)]]).whiteners
     assert standard_deviations(np.array([4.0]), whiteners, [[np.zeros((1, 500))]])[0] == pytest.approx(0.5)
 
@@ -66,7 +66,7 @@ def dead_zone_fitted(noise: float) -> tuple[Fit, Parameter]:
     return judge(converge(given, 4)), parameter
 
 
-def test_an_interval_knows_how_far_noise_has_moved_an_estimate() -> None:
+def test_an_interval_includes_how_far_noise_has_shifted_the_estimate() -> None:
     """A dead zone of little more than a count, under noise of one and a half."""
     found, parameter = dead_zone_fitted(noise=1.5)
     moved = shift_by_noise(found.point, [parameter])
@@ -82,7 +82,7 @@ def test_an_interval_knows_how_far_noise_has_moved_an_estimate() -> None:
     assert wide.low <= WIDTH <= wide.high
 
 
-def test_derivatives_by_a_tones_frequency_are_taken_over_little_of_a_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_derivatives_by_a_tones_rate_do_not_depend_on_their_step(monkeypatch: pytest.MonkeyPatch) -> None:
     ripple = {"sine": 0.6, "cosine": 0.3, "cycles": 30.0}
     arm = imagined.arm().with_effect("torque_ripple", (3,), ripple)
     observation, model, unknowns = observe(arm, [imagined.trace(arm, seconds=20.0)])

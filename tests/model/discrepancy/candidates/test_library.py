@@ -33,7 +33,7 @@ def test_trials_stay_within_bounds() -> None:
                 assert p.low <= value <= p.high, name
 
 
-def test_what_the_model_has_is_tried_by_lifting_its_prior() -> None:
+def test_an_effect_of_the_model_is_tried_by_lifting_its_prior() -> None:
     arm = imagined.arm()
     own = next(c for c in hypotheses(arm, ["viscous_friction"]) if c.joints == (2,))
     assert own.model is arm

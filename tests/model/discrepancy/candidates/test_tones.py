@@ -55,7 +55,7 @@ def test_the_response_to_a_torque_is_the_same_beside_a_tone() -> None:
     assert apart < 0.3
 
 
-def test_a_joint_that_has_both_tones_gets_no_third() -> None:
+def test_a_joint_with_both_kinds_of_tones_gets_no_third() -> None:
     known = imagined.arm().with_effect("periodic_disturbance", (2,), HUM).with_effect("torque_ripple", (2,), RIPPLE)
     point = seen(known, known, seconds=3.0)
     assert propose_tones(point, (2,)) == []

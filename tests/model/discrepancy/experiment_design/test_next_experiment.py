@@ -124,7 +124,7 @@ def speed_law(trace: Trace, point: Point, effect: str) -> CandidateFit:
     return CandidateFit(probe, judge(found.with_new_tangents()), 50.0)
 
 
-def test_what_no_experiment_tells_is_said() -> None:
+def test_candidates_that_no_experiment_separates_are_named_in_a_note() -> None:
     coefficient = SPEED_LAWS["viscous_friction"]
     arm = imagined.arm()
     trace = record(arm.with_values({coefficient: 1.5 * arm.parameter(coefficient).value}), trial_experiment("ramp"), 4)
@@ -142,7 +142,7 @@ def test_what_no_experiment_tells_is_said() -> None:
     assert "back-EMF error on joint 2" in words
 
 
-def test_without_rivals_what_tells_most_is_asked_for_once(ramp_step: Trace) -> None:
+def test_without_rivals_the_most_informative_experiment_is_asked_for_once(ramp_step: Trace) -> None:
     point = known(ramp_step)
     short = Ramp(amplitude=0.1, duration=0.5)
     slight = OfferedExperiment("slight", "a small ramp", ExperimentSpec(trajectory=short, hold=0.5))
@@ -160,7 +160,7 @@ def test_without_rivals_what_tells_most_is_asked_for_once(ramp_step: Trace) -> N
     assert within.duration <= 5.0
 
 
-def test_what_the_limits_forbid_is_not_asked_for(friction: tuple[CandidateFit, ...]) -> None:
+def test_an_experiment_that_the_limits_forbid_is_not_asked_for(friction: tuple[CandidateFit, ...]) -> None:
     def refused(spec: ExperimentSpec) -> NDArray[np.float64]:
         raise SpecError(f"{spec.name}: joint 2 would leave its range")
 

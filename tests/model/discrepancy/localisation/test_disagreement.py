@@ -69,7 +69,7 @@ def test_a_direction_is_kept_through_a_rest(arm: Model, records: tuple[Record, .
     assert [moved[round(t / PERIOD)] for t in (0.2, 1.0, 1.8, 2.4, 3.2)] == [0, 1, 1, -1, -1]
 
 
-def test_noise_is_significant_as_often_as_it_should(arm: Model, records: tuple[Record, ...]) -> None:
+def test_noise_is_called_significant_with_the_stated_probability(arm: Model, records: tuple[Record, ...]) -> None:
     deviations = noise_floor(records, arm.machine, "position")
     named, peaks = 0, []
     for seed in range(30):
@@ -93,7 +93,7 @@ def test_a_sensor_a_little_noisier_than_stated_is_no_disagreement(arm: Model, re
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
-def test_significance_of_alike_samples_follows_a_gaussian(memory: float) -> None:
+def test_significance_of_correlated_samples_follows_a_gaussian(memory: float) -> None:
     noise = alike((400 * 15, 1), 3, memory)[:, 0]
     correlation = correlation_of([noise], 0.5)
     windows = (noise.reshape(-1, 15) ** 2).mean(axis=1)
@@ -102,7 +102,7 @@ def test_significance_of_alike_samples_follows_a_gaussian(memory: float) -> None
     assert np.mean(beyond > 3.0) < 0.006
 
 
-def test_a_lag_after_reversals_is_found_there(arm: Model, records: tuple[Record, ...]) -> None:
+def test_a_lag_after_reversals_is_located_in_the_reversals(arm: Model, records: tuple[Record, ...]) -> None:
     deviations = noise_floor(records, arm.machine, "position")
     residual = alike(records[0].measured.shape, 1) * deviations
     reversal = phases_of(arm, records[0])[:, 1] == REVERSAL
@@ -137,7 +137,7 @@ def test_a_dependence_is_the_most_significant_of_its_joint(
     assert strongest == against or {strongest, against} == {"speed", "drive"}
 
 
-def test_nothing_depends_on_anything_in_noise(arm: Model, records: tuple[Record, ...]) -> None:
+def test_noise_shows_no_dependence(arm: Model, records: tuple[Record, ...]) -> None:
     deviations = noise_floor(records, arm.machine, "position")
     beyond = []
     for seed in range(15):
@@ -146,7 +146,7 @@ def test_nothing_depends_on_anything_in_noise(arm: Model, records: tuple[Record,
     assert np.mean(np.array(beyond) > 3.0) < 0.03
 
 
-def test_means_in_bins_come_with_the_deviation_of_alike_samples() -> None:
+def test_means_in_bins_have_the_deviation_of_correlated_samples() -> None:
     quantity = np.tile(np.repeat([0.25, 0.75], 50), 10)
     means = [
         binned(alike((1000, 1), s, 0.8)[:, 0], quantity, np.array([0, 0.5, 1.0]), [slice(0, 1000)], 0.3)

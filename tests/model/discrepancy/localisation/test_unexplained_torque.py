@@ -48,7 +48,7 @@ def test_a_spring_that_the_model_lacks_comes_out_as_a_torque_against_position(ar
     assert np.corrcoef(torque, true)[0, 1] > 0.85
 
 
-def test_nothing_remains_of_an_arm_that_is_the_model(arm: Model) -> None:
+def test_no_torque_remains_of_an_arm_that_is_the_model(arm: Model) -> None:
     records = records_of([trace_of(arm)], arm.machine, "position")
     deviations = 1.3 * noise_floor(records, arm.machine, "position")
     assert remaining_shapes(Residuals(arm, records, [left(arm, records[0])], deviations)) == ()
@@ -75,7 +75,7 @@ def test_a_shape_is_clear_where_it_explains_enough_in_enough_bins(
     assert (clear_shape([shape]) is not None) == clear
 
 
-def test_the_clearest_shape_is_what_explains_most_whatever_the_order() -> None:
+def test_the_clear_shape_is_the_one_that_explains_most_in_any_order() -> None:
     """Torques without a controller are listed by joint."""
     shape = RemainingShape(
         joint=1, against="speed", unit="rad/s", torque_unit="N·m", centres=(0.0,) * 5, torque=(0.1,) * 5,

@@ -32,7 +32,7 @@ def counting(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return rounds
 
 
-def test_a_rival_without_hope_is_left_where_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fit_that_cannot_reach_its_goal_takes_few_simulations(monkeypatch: pytest.MonkeyPatch) -> None:
     """With a cost to come to that it cannot reach, a fit takes few steps, and has no second way."""
     arm = imagined.arm().with_effect("dead_zone", (2,), {"width": 1.5})
     observation, model, unknowns = observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
@@ -46,7 +46,7 @@ def test_a_rival_without_hope_is_left_where_it_is(monkeypatch: pytest.MonkeyPatc
     assert 0 < len(counted) < 0.7 * with_time
 
 
-def test_a_point_is_astray_where_it_explains_nothing_with_numbers_that_nobody_expects() -> None:
+def test_a_point_has_diverged_where_unlikely_numbers_leave_the_record_unexplained() -> None:
     observation, model, unknowns = observe(imagined.arm(), [imagined.trace(imagined.arm(), seconds=2.0)])
     given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
     sound = replace(given, weighted=given.weighted / np.sqrt(given.misfit))
@@ -60,7 +60,7 @@ def test_a_point_is_astray_where_it_explains_nothing_with_numbers_that_nobody_ex
     assert diverged_from_prior(replace(sound, weighted=unexplained, values=far))
 
 
-def test_a_fit_with_numbers_that_nobody_expects_is_begun_again() -> None:
+def test_a_fit_with_unlikely_numbers_is_restarted() -> None:
     """An inductance that has been taken for a rotor's inertia, ten of its deviations off, with the record explained."""
     arm = imagined.arm().with_effect("motor_inductance", (2,), {"inductance": 0.06})
     observation, model, unknowns = observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
@@ -79,7 +79,7 @@ def test_a_fit_with_numbers_that_nobody_expects_is_begun_again() -> None:
     assert abs(again.fit.point.values[k] - point.values[k]) < 2 * (point.unknowns[k].deviation or 0.0)
 
 
-def test_a_delay_that_has_driven_the_tolerance_parameters_to_the_brink_is_fitted_from_the_expected_numbers() -> None:
+def test_a_delay_that_led_the_tolerance_parameters_to_instability_is_fitted_from_the_expected_numbers() -> None:
     arm = imagined.arm().with_effect("input_delay", (3,), {"time": DELAY})
     observation, model, unknowns = observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
     given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))

@@ -36,7 +36,7 @@ def with_power(given: Trace, error: NDArray[np.float64], factor: float) -> Trace
     return imagined.changed(given, error=error, power_raw=power)
 
 
-def test_a_sound_controller_shows_nothing(sound: Trace) -> None:
+def test_a_sound_controller_gives_no_finding(sound: Trace) -> None:
     assert check_controller([sound], imagined.machine()) == ()
 
 
@@ -65,7 +65,7 @@ def test_lost_set_points_are_counted(sound: Trace) -> None:
     assert np.allclose(restored.set_point, used)
 
 
-def test_nothing_is_said_without_the_controllers_numbers(sound: Trace) -> None:
+def test_there_is_no_finding_without_the_controllers_numbers(sound: Trace) -> None:
     assert check_controller([imagined.changed(sound, error=None, power_raw=None)], imagined.machine()) == ()
 
 
@@ -104,7 +104,7 @@ def sampled() -> Machine:
     return imagined.machine().model_copy(update={"controller": other})
 
 
-def test_a_record_with_all_numbers_tells_of_gains_and_of_set_points(sound: Trace) -> None:
+def test_a_record_with_all_numbers_settles_gains_and_set_points(sound: Trace) -> None:
     assert settled_by_records([sound], imagined.machine()) == BOTH
     assert settled_by_records([sound, sound], imagined.machine()) == BOTH
     assert settled_by_records([], imagined.machine()) == ()
@@ -130,7 +130,7 @@ def test_a_gain_is_judged_on_every_joint_or_not_at_all(sound: Trace) -> None:
     assert "wrong_gain" in settled_by_records([still, sound], imagined.machine())
 
 
-def test_nothing_is_settled_by_records_without_the_numbers(sound: Trace) -> None:
+def test_records_without_the_controllers_numbers_settle_nothing(sound: Trace) -> None:
     assert settled_by_records([imagined.changed(sound, error=None)], imagined.machine()) == ()
     no_power = imagined.changed(sound, power_raw=None)
     assert settled_by_records([no_power], imagined.machine()) == ("lost_set_points",)
@@ -142,7 +142,7 @@ def test_another_controller_is_not_judged(sound: Trace) -> None:
     assert check_controller([sound], sampled()) == ()
 
 
-def test_errors_that_are_wrong_without_a_set_point_that_moved_leave_lost_ones_open(sound: Trace) -> None:
+def test_wrong_errors_while_no_set_point_moves_do_not_settle_lost_set_points(sound: Trace) -> None:
     still = at_rest(sound, 2)
     assert still.error is not None
     error = still.error.copy()
@@ -163,7 +163,7 @@ def test_a_gain_error_that_the_model_states_is_not_found_again(sound: Trace) -> 
     assert check_controller([record], imagined.machine(), better) == ()
 
 
-def test_what_the_model_states_of_a_gain_is_set_right(sound: Trace) -> None:
+def test_a_wrong_gain_error_in_the_model_is_corrected(sound: Trace) -> None:
     assert sound.error is not None
     stated = imagined.arm().with_effect("wrong_gain", (1, 2, 3), {"relative": 0.3})
     found = check_controller([with_power(sound, sound.error, 1.5)], imagined.machine(), stated)

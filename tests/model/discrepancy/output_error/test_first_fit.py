@@ -56,6 +56,6 @@ def test_the_fit_starts_with_the_record_as_feedback_where_the_closed_loop_is_uns
     assert _fit_tolerances(unstable(begun, lambda share, _: share != FEEDBACK_SHARE)).cost < begun.cost
 
 
-def test_a_model_that_is_unstable_everywhere_is_refused_in_a_line() -> None:
+def test_a_model_that_is_unstable_everywhere_is_refused_with_one_line() -> None:
     with pytest.raises(SpecError, match=UNSTABLE):
         _fit_tolerances(unstable(given(), lambda _share, _values: True))

@@ -25,7 +25,7 @@ def begun(traces: int, start: float) -> Point:
 
 
 @pytest.mark.parametrize("fitted", [1, 3])
-def test_the_floor_of_held_out_traces_is_theirs_whatever_number_was_fitted_to(fitted: int) -> None:
+def test_the_floor_of_held_out_traces_does_not_depend_on_the_number_of_fitted_ones(fitted: int) -> None:
     held = hold_out(imagined.arm(), [imagined.trace(imagined.arm(), seconds=3.0, seed=5)])
     assert held is not None
     floor = held.floor(begun(fitted, 0.0))

@@ -39,7 +39,7 @@ def fits(joints: tuple[int, ...]) -> tuple[tuple[CandidateFit, ...], tuple[Candi
     return tuple(singles), tuple(fit_several_joints(fitted, singles, probes, THRESHOLDS, Never()))
 
 
-def test_what_several_joints_have_is_found_on_all_of_them() -> None:
+def test_an_effect_on_three_joints_is_found_on_all_of_them() -> None:
     singles, several = fits((1, 2, 3))
     best = max(several, key=lambda r: r.evidence)
     assert best.hypothesis.joints == (1, 2, 3)
@@ -49,18 +49,18 @@ def test_what_several_joints_have_is_found_on_all_of_them() -> None:
         assert abs(found - LOSS) < 0.25 * LOSS
 
 
-def test_what_one_joint_has_is_found_on_no_other() -> None:
+def test_an_effect_on_one_joint_is_found_on_no_other() -> None:
     singles, several = fits((2,))
     assert max(singles, key=lambda r: r.evidence).hypothesis.joints == (2,)
     assert several == ()
 
 
-def test_what_two_joints_have_is_not_found_on_the_third() -> None:
+def test_an_effect_on_two_joints_is_not_found_on_the_third() -> None:
     _, several = fits((1, 3))
     assert max(several, key=lambda r: r.evidence).hypothesis.joints == (1, 3)
 
 
-def test_a_fit_begins_where_more_is_explained() -> None:
+def test_a_fit_begins_from_the_start_that_explains_more() -> None:
     fitted, probes = before((2,))
     right = next(p for p in probes if p.hypothesis.joints == (2,))
     wrong = replace(right, start=dict.fromkeys(right.start, 0.9))

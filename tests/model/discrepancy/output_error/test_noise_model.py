@@ -17,7 +17,7 @@ def coloured(count: int, pole: float, seed: int) -> np.ndarray:
     return signal
 
 
-def test_colour_costs_nothing_but_size_does() -> None:
+def test_a_coloured_residual_costs_no_more_than_a_white_one_but_a_larger_one_does() -> None:
     white, red = coloured(4000, 0.0, 1), coloured(4000, 0.9, 2)
     described = fit_noise_model([[white], [red]]).by_joint
     assert abs(described[0] - described[1]) < 250, "a red residual of the same prediction error is as likely"
@@ -41,13 +41,13 @@ def test_one_bad_reading_proves_nothing() -> None:
     assert fit_noise_model([[spoilt]]).description - fit_noise_model([[white]]).description < 60
 
 
-def test_runs_are_not_joined() -> None:
+def test_separate_runs_are_described_as_well_as_one() -> None:
     white = coloured(4000, 0.0, 4)
     halves = [white[:2000] + 0.0, white[2000:] + 0.0]
     assert np.isclose(fit_noise_model([halves]).description, fit_noise_model([[white]]).description, atol=15)
 
 
-def test_less_than_rounding_leaves_is_no_likelier() -> None:
+def test_a_residual_below_rounding_gains_no_likelihood() -> None:
     white = coloured(2750, 0.0, 5)
     floor = 2 * 2750 * np.log(LEAST_DEVIATION)
     for scale in (0.7, 0.4, 0.05, 0.0):

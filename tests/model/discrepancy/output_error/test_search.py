@@ -28,7 +28,7 @@ def given() -> Point:
     return point_at(observation, model, unknowns, values)
 
 
-def test_a_search_ends_at_the_noise(given: Point) -> None:
+def test_a_search_ends_at_the_noise_of_the_record(given: Point) -> None:
     found = converge(given, 4)
     names = [u.name for u in given.unknowns]
     values = given.values.copy()
@@ -62,7 +62,7 @@ def test_a_better_fit_without_the_candidate_becomes_the_baseline(given: Point) -
     assert improved_baseline(end, found) is None
 
 
-def test_a_corrected_derivative_repeats_the_step(given: Point) -> None:
+def test_a_corrected_derivative_reproduces_the_step(given: Point) -> None:
     values = given.values + 0.3 * np.array([0.0 if u.deviation is None else u.deviation for u in given.unknowns])
     tried = given.moved_to(values)
     moved = tried.values - given.values
