@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from daq.contracts.trace import Trace
     from model.fitting.options import FitOptions
+    from model.inverse_dynamics.fit import TorqueFit
     from model.machine_model.model import Model
-    from model.torque_space.fit import TorqueFit
 
 MOST_DRAWN = 6
 """Traces in the report's pictures."""
@@ -27,8 +27,8 @@ def fit_recorded_torques(
 ) -> None:  # fmt: skip
     """Fit, save the model, and print what came of it. Raises SpecError and TraceError as the fit does."""
     from daq_cli.models.model_progress import shown_progress
+    from model.inverse_dynamics.fit import fit_torques
     from model.machine_model.model_file import save_model
-    from model.torque_space.fit import fit_torques
 
     with shown_progress("fitting torques") as tell:
         found = fit_torques(begin, traces, held_out, options, progress=tell)
@@ -40,9 +40,9 @@ def fit_recorded_torques(
         _print(found)
         console().print(f"model {found.model.identity}: {out}")
     if report is not None:
+        from model.inverse_dynamics.fit import torque_curves
         from model.reports.page import write_report
         from model.reports.torque_report import torque_report
-        from model.torque_space.curves import torque_curves
 
         curves = [torque_curves(found.model, t, found.cutoff) for t in (*traces, *held_out)[:MOST_DRAWN]]
         console().print(f"report: {write_report(torque_report(found, curves), report)}")

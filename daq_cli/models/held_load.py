@@ -22,7 +22,7 @@ def check_held(model: Model, traces: Sequence[Trace]) -> None:
     A machine whose file limits no supply, or has another drive than a motor, is taken to hold anything."""
     import numpy as np
 
-    from model.discrepancy.inverse_dynamics.supplied import gravity_along
+    from model.inverse_dynamics.supplied_torque import gravity_along
     from model.machine_model import layout as at
     from model.simulation.bodies import chain_body
 

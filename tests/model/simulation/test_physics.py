@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from model.simulation.torque_space import torque_balance
 from scipy.special import ellipk
 
 from daq.contracts.errors import SpecError, TraceError
@@ -16,7 +17,6 @@ from model.machine_model.model import base_model
 from model.simulation.bodies import chain_body
 from model.simulation.inputs import inputs_of
 from model.simulation.simulate import Options, simulate
-from model.simulation.torque_space import torque_balance
 from tests.model.simulation.machines import pendulum, slide
 from tests.model.simulation.records import ramp_trace, trace_of
 

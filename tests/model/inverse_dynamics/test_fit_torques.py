@@ -15,11 +15,11 @@ from daq.contracts.trace import Trace, TraceRecord
 from daq.traces.csv_table import import_csv
 from model.effects.library import library
 from model.fitting.options import FitOptions
+from model.inverse_dynamics.fit import fit_torques, torque_curves
+from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import Model, base_model
 from model.reports.page import write_report
 from model.reports.torque_report import torque_report
-from model.torque_space.curves import torque_curves
-from model.torque_space.fit import NOT_IN_TORQUES, fit_torques
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 LENGTH, MASS, ROTOR, VISCOUS, COULOMB = 0.3, 0.93, 0.0043, 0.03, 0.05
