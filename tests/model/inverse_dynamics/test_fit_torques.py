@@ -60,7 +60,7 @@ def test_the_parameters_of_the_motion_are_found() -> None:
     assert found.model.parameter("joint1.viscous_friction.coefficient").value == pytest.approx(VISCOUS, rel=0.05)
     assert found.model.parameter("joint1.coulomb_friction.torque").value == pytest.approx(COULOMB, rel=0.1)
     assert found.held_out is not None
-    assert found.held_out < 0.03
+    assert found.held_out < 0.002
     assert "link1.mass" in found.identifiability.known
 
 
@@ -172,6 +172,6 @@ def test_a_real_double_pendulum(lab_data: Path) -> None:
         for effect in effects:
             model = model.with_effect(effect, (1, 2))
         left[name] = fit_torques(model, runs[:4], runs[4:], options).held_out
-    assert left["none"] == pytest.approx(0.655, abs=0.02)
-    assert left["friction"] == pytest.approx(0.455, abs=0.02)
-    assert left["gear"] == pytest.approx(0.39, abs=0.02)
+    assert left["none"] == pytest.approx(0.679, abs=0.02)
+    assert left["friction"] == pytest.approx(0.454, abs=0.02)
+    assert left["gear"] == pytest.approx(0.45, abs=0.02)
