@@ -1,5 +1,5 @@
-# What a developer types; `make help` lists it. Set-up happens by itself: a command that needs .venv makes it and brings it
-# up to date with the pinned requirements, and says nothing when there is nothing to do.
+# Commands for developers; `make help` lists them. Set-up is automatic: a command that needs .venv creates it and brings it
+# up to date with the pinned requirements, silently when there is nothing to do.
 
 PYTHON ?= python3
 
@@ -8,15 +8,15 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 FOR_USE := .venv/installed-for-use
 FOR_DEVELOPMENT := .venv/installed-for-development
 
-# Each file of tests stays with one worker, in the order of their names: files of few tests, some of which are the longest,
-# would else be the last, and one worker would wait for the other. One process: make test WORKERS=
+# Each test file stays with one worker, and files run in the order of their names; by default files with few tests, some of
+# them the longest, would run last and leave one worker idle. For one process: make test WORKERS=
 WORKERS ?= -n 2 --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-# Also with -j: `page` and what `lint` runs in the background use the page's packages, which are installed into one folder.
+# Even with -j: `page` and the background part of `lint` both install the page's packages into one folder.
 .NOTPARALLEL:
-.PHONY: help serve demo page test test-all lint format types requirements bench clean distclean
+.PHONY: help serve demo page test test-all lint format types requirements bench golden clean distclean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -63,6 +63,9 @@ types: $(FOR_DEVELOPMENT) ## make the page's types of the API anew, after a chan
 bench: $(FOR_DEVELOPMENT) ## measure the figures about recording of docs/benchmarks.md, shorter than there
 	@$(BIN)/python -m benchmarks main-job --quick
 
+golden: $(FOR_DEVELOPMENT) ## compare answers of every command with those recorded before, to the digit (20 minutes)
+	@$(BIN)/python -m benchmarks.golden
+
 clean: ## remove caches and what was built
 	@rm -rf build dist server/dashboard/dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	@find . -name __pycache__ -type d -not -path './.venv/*' -prune -exec rm -rf {} +
@@ -72,8 +75,8 @@ distclean: clean ## the same, and .venv
 
 # ---- the virtual environment
 
-# uv installs in a seventh of pip's time. It does not read pip's configuration, so that where packages come from a place
-# that only pip is told of, pip takes its turn.
+# uv installs in a seventh of pip's time. It does not read pip's configuration; where the package index is configured for
+# pip only, pip is tried next.
 INSTALL = $(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes --requirement $(1) \
 	|| { echo "uv could not install them; trying pip"; $(PIP) install --require-hashes --requirement $(1); }
 
@@ -92,7 +95,7 @@ $(BIN)/uv: requirements-installer.txt | $(BIN)/pip
 	@$(PIP) install --require-hashes --requirement requirements-installer.txt
 	@touch $@
 
-# ensurepip writes pip last: a .venv whose making was interrupted, or that uv made, has none and is made again.
+# ensurepip writes pip last: a .venv whose creation was interrupted, or that uv made, has no pip and is created again.
 $(BIN)/pip:
 	@command -v $(PYTHON) >/dev/null || { echo "No $(PYTHON) found: install Python 3.11 or newer, or name one: make PYTHON=python3.12"; exit 1; }
 	@$(PYTHON) -c 'import sys; v = sys.version_info; v >= (3, 11) or sys.exit("Python 3.11 or newer is needed and $(PYTHON) is %d.%d: name a newer one: make PYTHON=python3.12" % v[:2])'

@@ -1,7 +1,7 @@
-"""Builds the dashboard's page, with the Node that comes as a Python package: for the wheel, and for the working tree.
+"""Builds the dashboard's page for the wheel and for the working tree, with the Node that comes as a Python package.
 
 `python hatch_build.py` builds it where it is out of date; `check`, `test`, `format` and `types` are the page's part of
-the commands of the Makefile. Whether it is out of date is told by the content of its sources, not by their times.
+the commands of the Makefile. Out of date means that the content of its sources has changed; their times do not matter.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ TOOLS = {
 
 
 class BuildError(Exception):
-    """A tool of the page has failed; its output says why."""
+    """A tool of the page failed; its output gives the reason."""
 
 
 class PageHook(BuildHookInterface):  # type: ignore[type-arg]
-    """Before the package is built, so is the page."""
+    """Builds the page before the package."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
-        """A wheel without the page is none; an installation for development can do without until it is built."""
+        """A wheel needs the page; an editable installation can do without it until it is built."""
         try:
             build_page()
         except BuildError as error:
@@ -54,7 +54,7 @@ class PageHook(BuildHookInterface):  # type: ignore[type-arg]
 
 
 def build_page() -> None:
-    """Builds the page unless what is there was built from these very sources. Raises BuildError."""
+    """Builds the page unless it was built from the present sources. Raises BuildError."""
     sources = _digest(_sources())
     if _text(BUILT_FROM) == sources:
         return
@@ -86,7 +86,7 @@ def write_types(output: Path = SCHEMA) -> None:
 
 
 def _without_problems(description: dict[str, Any]) -> dict[str, Any]:
-    """The same description without the answers to errors: all of them are problems, at every address."""
+    """The description without error responses, which are the same (problems) at every address."""
     for address in description["paths"].values():
         for operation in address.values():
             operation["responses"] = {code: one for code, one in operation["responses"].items() if code < "300"}
@@ -104,7 +104,7 @@ def _install() -> None:
 
 
 def _sources() -> list[Path]:
-    """What the page is built from."""
+    """Files that the page is built from."""
     folders = [path for name in ("src", "public") for path in (DASHBOARD / name).rglob("*") if path.is_file()]
     tests = [path for path in folders if path.name.endswith(".test.ts")]
     settings = ("index.html", "reference.html", "vite.config.ts", "svelte.config.js", COMPRESS.name, *LOCK_FILES)

@@ -10,7 +10,9 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 FOLDER = Path(__file__).parent
 
@@ -37,12 +39,12 @@ def benchmarks() -> dict[str, str]:
     return found
 
 
-def run(name: str, options: list[str]) -> int:
+def run(name: str, options: list[str], run_process: Callable[..., Any] = subprocess.run) -> int:
     """One benchmark in a process of its own, so that none inherits threads, priorities or caches; its exit code.
 
     One that a signal ended has met no target: 1.
     """
-    code = subprocess.run([sys.executable, "-m", f"benchmarks.{name}", *options], check=False).returncode
+    code: int = run_process([sys.executable, "-m", f"benchmarks.{name}", *options], check=False).returncode
     return max(code, 1) if code else 0
 
 
@@ -51,7 +53,7 @@ def _quicker(name: str) -> list[str]:
     return ["--quick"] if '"--quick"' in (FOLDER / f"{name}.py").read_text("utf-8") else []
 
 
-def main(arguments: list[str]) -> int:
+def main(arguments: list[str], run_process: Callable[..., Any] = subprocess.run) -> int:
     """The exit code: 0 when every target was met, 1 when one was missed, 2 for a name that is none."""
     known = benchmarks()
     if not arguments or arguments[0] in ("-h", "--help"):
@@ -61,12 +63,13 @@ def main(arguments: list[str]) -> int:
         return 0
     name, *options = arguments
     if name == "main-job":
-        return max(run(each, _quicker(each) if "--quick" in options else []) for each in MAIN_JOB if each in known)
+        quick = "--quick" in options
+        return max(run(each, _quicker(each) if quick else [], run_process) for each in MAIN_JOB if each in known)
     name = name.replace("-", "_")
     if name not in known:
         print(f"benchmark {name!r}: there is none; there are {', '.join(known)} and main-job", file=sys.stderr)
         return 2
-    return run(name, options)
+    return run(name, options, run_process)
 
 
 if __name__ == "__main__":

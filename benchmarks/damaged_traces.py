@@ -24,8 +24,15 @@ SECTOR = 512
 ROWS, ROWS_A_CHUNK, JOINTS = 60, 15, (1, 2)
 PERIOD = 0.02
 BOUNDARIES = (
-    0, 1, 2**16, 2**31 - 1, 2**31, 2**31 + 1, 2**32 - 1, 2**32, 2**32 + 1, 2**62, 2**63 - 1, 2**63, 2**64 - 1,
-)  # fmt: skip
+    0,
+    1,
+    2**16,
+    *(2**bits + by for bits in (31, 32) for by in (-1, 0, 1)),
+    2**62,
+    2**63 - 1,
+    2**63,
+    2**64 - 1,
+)
 
 Choice = Callable[[], bool]
 """Whether the next damage is done, for a share of all of them."""
@@ -218,7 +225,7 @@ def _with(data: bytes, position: int, value: int, size: int) -> bytes:
 
 
 def flipped(rng: random.Random, data: bytes) -> bytes:
-    """One to eight bits the other way round."""
+    """One to eight bits flipped."""
     changed = bytearray(data)
     for _ in range(rng.choice((1, 1, 1, 2, 8))):
         changed[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
@@ -252,7 +259,7 @@ def left_out(rng: random.Random, data: bytes) -> bytes:
 
 
 def swapped(rng: random.Random, data: bytes) -> bytes:
-    """Two parts in each other's place."""
+    """Two parts exchanged."""
     a, b, c, d = sorted(rng.choices(range(len(data)), k=4))
     return data[:a] + data[c:d] + data[b:c] + data[a:b] + data[d:]
 
@@ -277,7 +284,7 @@ AT_RANDOM: dict[str, Callable[[random.Random, bytes], bytes]] = {
 
 
 def at_random(chosen: list[Original], rng: random.Random) -> Iterator[Damaged]:
-    """Without end: each way in turn, each file at random."""
+    """An endless sequence of damages: each way in turn, each file at random."""
     while True:
         for way, damage in AT_RANDOM.items():
             original = rng.choice(chosen)

@@ -38,11 +38,11 @@ LATENCY_TARGET_MS = 60.0
 FIRST_TARGET_MS = 500.0
 TRANSFER_TARGET_KB = 300.0
 WARM_UP = 3.0
-"""s after the load that are not measured: compilers, caches, 3-D being loaded."""
+"""Time (s) after loading that is not measured: compilation, caches, loading of 3-D."""
 LOADS = 5
 PATIENCE = 60_000
 OPTIONS = ["--enable-unsafe-swiftshader"]
-"""Newer versions of Chromium want to be told that 3-D may be drawn by the processor."""
+"""Options of Chromium; newer versions draw 3-D in software only when it is allowed explicitly."""
 EMULATED_CARD = ["--use-angle=swiftshader"]
 
 WATCH = """
@@ -102,7 +102,7 @@ class Seen:
 
     seconds: float
     script: float
-    """s of JavaScript."""
+    """Time (s) spent in JavaScript."""
     frames: int
     charts: int
     """Frames in which charts were drawn."""
@@ -111,14 +111,14 @@ class Seen:
     moved: bool
     """Whether the arm moved until the end."""
     renderer: str
-    """What draws 3-D, in the browser's words."""
+    """The renderer of 3-D as the browser names it."""
     latencies: list[float]
     firsts: list[float]
-    """ms from the start of a load to the first sample on the screen; nothing was in the browser's cache."""
+    """Times (ms) from the start of a load, with an empty browser cache, to the first sample on the screen."""
     transfer: int
-    """Bytes of the first load, as sent."""
+    """Transferred size (bytes) of the first load."""
     used: float
-    """s of processor time of the server."""
+    """Processor time (s) of the server."""
 
 
 def main() -> int:
@@ -274,7 +274,7 @@ def _now(page: Page, session: CDPSession) -> dict[str, Any]:
 
 
 def _used_during(service: RunningService, seconds: float, page: Page | None) -> float:
-    """s of processor time that the server's process uses in so many seconds, its owner of the port not counted."""
+    """Processor time (s) that the server's process uses in so many seconds, its owner of the port not counted."""
     before = _used(service.process.pid)
     if page is None:
         time.sleep(seconds)

@@ -34,13 +34,13 @@ from tests.model.dynamics.oracles import MuJoCo, Pinocchio
 
 REPEATS = 7
 STATES = 256
-"""Independent states evaluated side by side."""
+"""Number of independent states evaluated side by side."""
 C_NAME = "C -O3 -march=native, same expressions"
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
 START = np.array([0.2, 0.7, -0.4, 0.5, -0.3, 0.8])
 """Joint angles and rates at which the loop starts, rad and rad/s."""
 FEEDBACK = 1e-9
-"""How much of each acceleration goes into the next state: enough for a dependence, too little to move the arm."""
+"""Share of each acceleration that enters the next state: enough for a dependence, too little to move the arm."""
 
 _C = r"""
 #include "three_joint.h"

@@ -15,7 +15,7 @@ import sys
 
 from model.discrepancy.output_error.observation import STEP, step_of_derivatives
 from model.effects.library import library
-from model.simulation.simulate import LONGEST_STEP as STEP_OF_FITS
+from model.simulation.prepared import LONGEST_STEP as STEP_OF_FITS
 from tests.model.simulation.effect_cases import CASES, Bench
 
 SECONDS, EXACT_STEP = 1.3, 1e-5

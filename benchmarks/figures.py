@@ -44,7 +44,7 @@ def show(title: str, command: str, figures: Sequence[Figure]) -> int:
 
 
 def machine() -> str:
-    """What was measured on, in words; the load tells how quiet it was."""
+    """Description of the machine; its load shows how quiet it was."""
     cores = len(os.sched_getaffinity(0))
     return f"{cores} cores, Python {platform.python_version()}, load {os.getloadavg()[0]:.1f}"
 

@@ -49,10 +49,20 @@ DELAY = 0.006
 VOLTS_PER_COUNT = 36.0 / 127
 TIED_BACK_EMF, TIED_ARM = "motor.back_emf_constant_1_3", "friction.arm"
 NAMES = (
-    "link1.mass", "link2.mass", "link3.mass", "load.mass", "link1.radius", "link2.length", "link3.length",
-    TIED_BACK_EMF, "joint2.motor.back_emf_constant", "joint1.viscous_friction.coefficient",
-    "joint2.viscous_friction.coefficient", "joint3.viscous_friction.coefficient", TIED_ARM,
-)  # fmt: skip
+    "link1.mass",
+    "link2.mass",
+    "link3.mass",
+    "load.mass",
+    "link1.radius",
+    "link2.length",
+    "link3.length",
+    TIED_BACK_EMF,
+    "joint2.motor.back_emf_constant",
+    "joint1.viscous_friction.coefficient",
+    "joint2.viscous_friction.coefficient",
+    "joint3.viscous_friction.coefficient",
+    TIED_ARM,
+)
 """Table 7.9: seven of bodies, two back-EMF constants, three of viscous friction, one arm of Coulomb friction."""
 EMF = tuple(f"joint{j}.motor.back_emf_constant" for j in (1, 3))
 SPREAD = 0.15
@@ -79,7 +89,7 @@ class Watch:
         self.began = time.process_time(), time.perf_counter()
 
     def passed(self) -> tuple[float, float]:
-        """Seconds of both."""
+        """Elapsed seconds of both clocks."""
         return time.process_time() - self.began[0], time.perf_counter() - self.began[1]
 
 
@@ -96,10 +106,13 @@ def experiments(seconds: float) -> list[ExperimentSpec]:
             trajectory=Multisine(
                 kind="multisine", amplitude=amplitude, duration=seconds, lowest=0.1, highest=0.8, tones=6, seed=number
             ),
-            joints=(1, 2, 3), start=dict(zip((1, 2, 3), start, strict=True)), settle=0.5, hold=0.5,
+            joints=(1, 2, 3),
+            start=dict(zip((1, 2, 3), start, strict=True)),
+            settle=0.5,
+            hold=0.5,
         )
         for number, start in enumerate(STARTS, start=1)
-    ]  # fmt: skip
+    ]
 
 
 def hidden(truth: dict[str, float]) -> dict[str, float]:
@@ -117,7 +130,7 @@ class Arm:
     <body><joint name="3" axis="0 -1 0"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
     </body></body></body></worldbody></mujoco>"""
     THIN = 1e-9
-    """kg·m² of a thin rod about itself, which MuJoCo wants above zero."""
+    """Inertia (kg·m²) of a thin rod about itself, which MuJoCo requires to be positive."""
 
     def __init__(self, problem: SimulatedProblem) -> None:
         self.problem = problem
@@ -230,7 +243,7 @@ def sysid(problem: SimulatedProblem, begin: Floats) -> Run | str:
 
 
 def _samples(problem: SimulatedProblem) -> int:
-    """Numbers that are compared."""
+    """Number of compared values."""
     return 3 * sum(run.stop - run.start for runs in problem.runs for run in runs)
 
 
@@ -241,14 +254,16 @@ def _error(problem: SimulatedProblem, values: Floats) -> float:
 
 
 def compared(problem: SimulatedProblem, begin: Floats, limit: int) -> list[Figure]:
-    """All three, and by how much ours is quicker."""
+    """Figures of all three, with the ratio of their times to ours."""
     share = 1 + 1 / _samples(problem)  # by which an error may be larger and still count as ours
     goal = 3 * ours(problem, begin).error * share  # the simplex sums over the joints
-    found = best_in_turn({
-        "ours": lambda: ours(problem, begin),
-        "mujoco.sysid": lambda: sysid(problem, begin),
-        "Nelder and Mead": lambda: simplex(problem, begin, goal, limit),
-    })  # fmt: skip
+    found = best_in_turn(
+        {
+            "ours": lambda: ours(problem, begin),
+            "mujoco.sysid": lambda: sysid(problem, begin),
+            "Nelder and Mead": lambda: simplex(problem, begin, goal, limit),
+        }
+    )
     own = found["ours"]
     assert isinstance(own, Run)
     figures = [Figure("ours", _text(own, problem))]
@@ -298,9 +313,14 @@ def fit_of_thirteen(seconds: float) -> tuple[SimulatedProblem, Floats, Floats]:
     plant = plant_text(hidden(dict(zip(NAMES, truth.tolist(), strict=True))))
     traces = recorded(experiments(seconds), machine, 7, plant, board_text(0.0))
     options = FitOptions(
-        parameters=NAMES, use_priors=False, robust=False, start_posture=False, sensor_bend=False, friction_form=False,
+        parameters=NAMES,
+        use_priors=False,
+        robust=False,
+        start_posture=False,
+        sensor_bend=False,
+        friction_form=False,
         bounds={n: (0.4 * v, 2.0 * v) for n, v in zip(NAMES, begin.tolist(), strict=True)},
-    )  # fmt: skip
+    )
     problem = fit_problem(start, traces, options)
     order = [u.name for u in problem.unknowns]
     return replace(problem, unknowns=tuple(problem.unknowns[order.index(n)] for n in NAMES), memory={}), begin, truth

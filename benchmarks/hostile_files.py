@@ -21,7 +21,7 @@ from daq.traces.store import write_trace
 _HEAD = struct.Struct("<BQ")
 _MAGIC = b"\x89MCAP0\r\n"
 DEEP = 100_000
-"""Brackets within each other."""
+"""Depth of nested brackets."""
 Change = Callable[[int, bytes], bytes]
 
 

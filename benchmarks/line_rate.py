@@ -133,12 +133,15 @@ def main() -> int:
         kept = Sample(controller.status().tick - 1, mask_of(JOINTS))
         figures = [
             at_most("a sample of 3 joints every 20 ms", alone, SHARE_TARGET, "% of the line", "both directions added"),
-            Figure("the same with 3 set points", f"{both:.3g} % of the line",
-                   beside=f"both directions added; the busier one {busier:.3g} %"),
+            Figure(
+                "the same with 3 set points",
+                f"{both:.3g} % of the line",
+                beside=f"both directions added; the busier one {busier:.3g} %",
+            ),
             trip_figure("status", controller, ReadStatus(), 15, repeats),
             trip_figure("sample of 3 joints that is there", controller, kept, 27, min(repeats, 200)),
             trip_figure("48 bytes of memory", controller, ReadBlock(controller.memory_map.base, 48), 48, repeats),
-        ]  # fmt: skip
+        ]
     with Controller.connect("mock://?pty=1") as controller:
         took, _ = trips(controller, ReadStatus(), 15, repeats)
         figures.append(Figure("status without a line", f"{1e3 * took:.3g} ms", beside="link, system and mock together"))

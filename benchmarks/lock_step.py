@@ -26,12 +26,12 @@ from daq.contracts.machine import load_machine
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import TraceEvent
 from daq.driver import Controller
-from daq.runner import ArmControl, Arrangement, Consent, Outside, run_experiment
+from daq.runner import ArmControl, Consent, RunSetup, StopRequests, run_experiment
 from mock_controller.device import build_device
 from mock_controller.options import Options
 
 TARGET = 20.0
-"""Times real time."""
+"""Target speed as a multiple of real time."""
 PERIOD_S = 0.02
 
 
@@ -56,7 +56,7 @@ class Cost:
 
 
 class Silent:
-    """Nobody listens."""
+    """A run listener that ignores everything."""
 
     def progress(self, fraction: float, text: str) -> None:
         """How far the run is."""
@@ -77,9 +77,8 @@ def ramps(controller: Controller, repeats: int, folder: Path) -> None:
     """Complete default ramps, one after the other, each with a trace of its own."""
     machine = load_machine("ma2000")
     for _ in range(repeats):
-        run = Arrangement(
-            controller, ArmControl(controller), ExperimentSpec(), machine, machine.limits, folder, Silent(), Outside()
-        )
+        control, spec = ArmControl(controller), ExperimentSpec()
+        run = RunSetup(controller, control, spec, machine, machine.limits, folder, Silent(), StopRequests())
         result = run_experiment(run, Consent())
         if result.outcome != "complete":
             raise RuntimeError(f"a ramp ended {result.outcome}: {result.reason}")
@@ -150,9 +149,12 @@ def main() -> int:
         at_least("by the clock", best.times_real_time, TARGET, "× real time", rival),
         Figure("by processor time", f"{cheapest.cpu_times_real_time:.3g} × real time"),
         Figure("host a period", f"{1e3 * cheapest.host_s / cheapest.periods:.3f} ms"),
-        Figure("mock a period", f"{1e3 * cheapest.mock_s / cheapest.periods:.3f} ms",
-               beside=f"board and plant alone: {1e3 * alone_s / best.periods:.3f} ms"),
-    ]  # fmt: skip
+        Figure(
+            "mock a period",
+            f"{1e3 * cheapest.mock_s / cheapest.periods:.3f} ms",
+            beside=f"board and plant alone: {1e3 * alone_s / best.periods:.3f} ms",
+        ),
+    ]
     title = f"Lock-step on one core, best of {runs} runs of {ramps_a_run} ramps ({best.periods * PERIOD_S:.0f} s)"
     return show(title, "python -m benchmarks lock_step", figures)
 

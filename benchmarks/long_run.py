@@ -40,7 +40,7 @@ FAULTS = ("--fault", f"drop:rate={RATE}", "--fault", f"flip:rate={RATE}")
 JOINTS = (1, 2, 3)
 SINE_S = 4.0
 FETCH_EVERY_S = 0.4
-"""The mock's ring keeps 1.28 s."""
+"""Time (s) between fetches; the mock's ring keeps 1.28 s."""
 
 
 @dataclass
@@ -52,7 +52,7 @@ class BoardRecord:
     _over: threading.Event = field(default_factory=threading.Event)
 
     def fetch_until_over(self) -> None:
-        """To be run by a thread of its own."""
+        """Fetches until the run is over; runs in a thread of its own."""
         last = 0
         while True:
             over = self._over.wait(FETCH_EVERY_S)
@@ -145,14 +145,28 @@ def accuracy_figures(done: Recorded, machine: Machine) -> list[Figure]:
         Figure("wrong samples", f"{wrong}", "0", wrong == 0, "against the board's own record"),
         Figure("samples the record lacks", f"{unknown}", "0", unknown == 0, "not compared"),
         Figure("frames struck", f"{struck}", beside=f"{100 * struck / (frames or 1):.2f} % of {frames} frames"),
-        Figure("struck and not noticed", f"{max(0, struck - timeouts)}", "0", timeouts >= struck,
-               f"{timeouts} time-outs, of which {max(0, timeouts - struck)} for a late answer"),
-        Figure("flipped to the host, not found damaged", f"{max(0, flips_in - damaged)}", "0",
-               damaged >= flips_in, f"{damaged} pieces found damaged, {flips_in} flipped"),
-        Figure("flipped to the board, not found damaged", f"{max(0, flips_out - seen_by_board)}",
-               "0", seen_by_board >= flips_out,
-               f"{seen_by_board} pieces found damaged, {flips_out} flipped"),
-    ]  # fmt: skip
+        Figure(
+            "struck and not noticed",
+            f"{max(0, struck - timeouts)}",
+            "0",
+            timeouts >= struck,
+            f"{timeouts} time-outs, of which {max(0, timeouts - struck)} for a late answer",
+        ),
+        Figure(
+            "flipped to the host, not found damaged",
+            f"{max(0, flips_in - damaged)}",
+            "0",
+            damaged >= flips_in,
+            f"{damaged} pieces found damaged, {flips_in} flipped",
+        ),
+        Figure(
+            "flipped to the board, not found damaged",
+            f"{max(0, flips_out - seen_by_board)}",
+            "0",
+            seen_by_board >= flips_out,
+            f"{seen_by_board} pieces found damaged, {flips_out} flipped",
+        ),
+    ]
 
 
 def timing_figures(done: Recorded) -> list[Figure]:
@@ -177,12 +191,18 @@ def timing_figures(done: Recorded) -> list[Figure]:
         return f"{quantile(values, 0.5):.2f} / {quantile(values, 0.99):.2f} / {max(values):.2f} ms"
 
     return [
-        Figure("tick to arrival, jitter: p50 / p99 / max", three(jitter),
-               beside=f"the quickest {quickest:.2f} ms after its tick: 6.3 ms of the board, 3.1 ms of line"),
+        Figure(
+            "tick to arrival, jitter: p50 / p99 / max",
+            three(jitter),
+            beside=f"the quickest {quickest:.2f} ms after its tick: 6.3 ms of the board, 3.1 ms of line",
+        ),
         Figure("tick to time stamp, jitter: p50 / p99 / max", three(wander), beside=f"stamps are {usual:.2f} ms late"),
-        Figure("mock behind its clock by over 2 ms", f"{done.clock['late_ticks']} periods",
-               beside=f"worst {done.clock['worst_late_us'] / 1e3:.1f} ms"),
-    ]  # fmt: skip
+        Figure(
+            "mock behind its clock by over 2 ms",
+            f"{done.clock['late_ticks']} periods",
+            beside=f"worst {done.clock['worst_late_us'] / 1e3:.1f} ms",
+        ),
+    ]
 
 
 def main() -> int:

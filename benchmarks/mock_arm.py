@@ -19,7 +19,7 @@ from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import Trace, TraceEvent
 from daq.driver import Controller
-from daq.runner import Arrangement, Consent, Outside, run_experiment
+from daq.runner import Consent, RunSetup, StopRequests, run_experiment
 from daq.runner.arm_control import ArmControl
 from daq.traces.reader import read_trace
 from model.machine_model.model import base_model
@@ -43,7 +43,7 @@ FRICTION_ARMS = tuple(f"joint{j}.load_dependent_friction.arm" for j in (1, 2, 3)
 
 
 class Unheard:
-    """Nobody listens to the runs."""
+    """A run listener that ignores everything."""
 
     def progress(self, fraction: float, text: str) -> None:
         """How far the run is."""
@@ -98,7 +98,7 @@ def recorded(
 
 def _recorded(controller: Controller, spec: ExperimentSpec, machine: Machine, folder: Path) -> Trace:
     control = ArmControl(controller)
-    run = Arrangement(controller, control, spec, machine, machine.limits, folder, Unheard(), Outside())
+    run = RunSetup(controller, control, spec, machine, machine.limits, folder, Unheard(), StopRequests())
     result = run_experiment(run, Consent())
     if result.outcome != "complete":
         raise RuntimeError(f"{spec.name or spec.trajectory.kind} ended {result.outcome}: {result.reason}")

@@ -74,14 +74,23 @@ def recover(specs: Iterable[ExperimentSpec], seed: int, bent: bool) -> dict[str,
     result = fit(base_model(MACHINE), traces, FitOptions(sensor_bend=bent))
     truth = {**hidden, **dict.fromkeys(FRICTION_ARMS, hidden["friction.arm"])}
     found = {
-        p.name: {"truth": truth.get(p.name, p.expected), "verdict": p.verdict, "value": p.value, "low": p.low,
-                 "high": p.high}
+        p.name: {
+            "truth": truth.get(p.name, p.expected),
+            "verdict": p.verdict,
+            "value": p.value,
+            "low": p.low,
+            "high": p.high,
+        }
         for p in result.parameters
-    }  # fmt: skip
+    }
     return {
-        "seed": seed, "bent": bent, "parameters": found, "converged": result.converged, "seconds": result.seconds,
+        "seed": seed,
+        "bent": bent,
+        "parameters": found,
+        "converged": result.converged,
+        "seconds": result.seconds,
         "whitened_mean_square": result.whitened_mean_square,
-    }  # fmt: skip
+    }
 
 
 def study(seeds: range, folder: Path, bent: bool) -> list[dict[str, Any]]:

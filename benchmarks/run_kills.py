@@ -43,9 +43,9 @@ from daq.traces.salvage import salvage_folder
 RUN = ("run", "sine", "--joints", "1-3", "--amplitude", "5", "--period", "4", "--cycles", "6", "--hold", "0.2")
 MOCK = ("--tcp", "127.0.0.1:0", "--lock-step", "--seed", "3")
 ENDS_WITHIN = 30.0
-"""s for everything to have ended, on a busy computer."""
+"""Time (s) within which everything must have ended, on a busy computer."""
 HOLDS_FOR = 100
-"""Control periods for which the arm is watched afterwards."""
+"""Number of control periods for which the arm is observed afterwards."""
 AT_REST = 40
 """ADC counts of error within which an arm holds."""
 RECORDING_FROM = 100
@@ -63,7 +63,7 @@ class Way:
 
     @property
     def freezes(self) -> bool:
-        """Whether somebody is left who freezes the arm."""
+        """Whether a process is left that freezes the arm."""
         return not (self.acquisition and self.number is signal.SIGKILL)
 
 
@@ -77,13 +77,13 @@ WAYS = (
 
 @dataclass
 class Findings:
-    """What the moments met, and what was wrong. `wrong` has a line each."""
+    """What was running at the kills, and what was wrong, one line each in `wrong`."""
 
     met: Counter[str] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
     samples: int = 0
     slowest: float = 0.0
-    """s until everything had ended."""
+    """Longest time (s) until everything had ended."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Desk:
 
     @property
     def url(self) -> str:
-        """Of the mock's port."""
+        """URL of the mock's port."""
         return f"{self.mock.url}?lock_step=1"
 
     def start(self) -> subprocess.Popen[bytes]:
@@ -205,7 +205,7 @@ def end_one(
 
 
 def _until_gone(run: subprocess.Popen[bytes], acquisition: int | None, label: str, findings: Findings) -> None:
-    """Nothing of the run is left after ENDS_WITHIN s; else that is told, and ended."""
+    """Waits until nothing of the run is left; what is left after ENDS_WITHIN s is reported and ended."""
     until = time.monotonic() + ENDS_WITHIN
     try:
         run.wait(ENDS_WITHIN)

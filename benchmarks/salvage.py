@@ -39,7 +39,7 @@ PERIOD = 0.02
 LOSS_S = 1.2
 AT_ONCE = 10
 LONGEST_S = 4.0
-"""Kills fall at random between the first sample and this."""
+"""Latest moment (s) of a random kill after the first sample."""
 READY = b"r\n"
 ENDING_TICKS = 60
 """Length of the recordings that are killed around their end."""
@@ -179,8 +179,11 @@ def main() -> int:
     given = parser.parse_args()
     rng = random.Random(given.seed)
     moments = 10 if given.quick else given.moments
-    cases = [Case(way, rng.uniform(0.1, LONGEST_S), rng.randrange(1 << 30)) for way in ("kill", "power cut")
-             for _ in range(moments)]  # fmt: skip
+    cases = [
+        Case(way, rng.uniform(0.1, LONGEST_S), rng.randrange(1 << 30))
+        for way in ("kill", "power cut")
+        for _ in range(moments)
+    ]
     end = ENDING_TICKS * PERIOD
     cases += [Case("around the end", rng.uniform(end - 0.04, end + 0.02), 0) for _ in range(max(10, moments // 4))]
     with tempfile.TemporaryDirectory() as folder:

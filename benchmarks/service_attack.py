@@ -61,7 +61,7 @@ class Attack:
 
 @dataclass
 class Seen:
-    """What came back. `unexpected`: what and how often."""
+    """The answers. `unexpected`: which, and how often."""
 
     requests: int = 0
     statuses: Counter[int] = field(default_factory=Counter)
@@ -69,7 +69,7 @@ class Seen:
 
 
 def attacks(random: Random, count: int) -> list[Attack]:
-    """So many, of every kind, in the seed's order. The same for the same seed."""
+    """So many attacks, of every kind, in an order that the seed determines."""
     sound = sound_trace()
     files = [_upload(name, content, MCAP) for name, content in hostile_traces(sound).items()]
     files += [_upload(name, content, CSV) for name, content in hostile_tables().items()]
@@ -139,21 +139,28 @@ def _two_lengths() -> bytes:
 
 def _strangers() -> list[Attack]:
     socket_head = {
-        "Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13",
+        "Connection": "Upgrade",
+        "Upgrade": "websocket",
+        "Sec-WebSocket-Version": "13",
         "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
-    }  # fmt: skip
+    }
     return [
         Attack("an unknown token", "GET", API, headers={"Authorization": "Bearer daq_nobody"}, expected=(401, 429)),
         Attack("a long token", "GET", API, headers={"Authorization": "Bearer " + "x" * 10_000}, expected=(401, 429)),
         Attack("a foreign origin", "POST", f"{API}/reset", headers={"Origin": ATTACKER}, expected=(403,)),
         Attack("a foreign name", "GET", API, headers={"Host": "attacker.example"}, expected=(403,)),
         Attack("a proxy's stranger", "POST", f"{API}/reset", headers={"X-Forwarded-For": "10.0.0.9"}, expected=(401,)),
-        Attack("a socket of a foreign page", "GET", f"{API}/live",
-               headers=socket_head | {"Origin": ATTACKER}, expected=(403,)),
+        Attack(
+            "a socket of a foreign page",
+            "GET",
+            f"{API}/live",
+            headers=socket_head | {"Origin": ATTACKER},
+            expected=(403,),
+        ),
         Attack("a socket that says nothing", "GET", f"{API}/live", headers=socket_head, expected=(101,)),
         Attack("a path that climbs", "GET", f"{API}/traces/..%2f..%2fetc%2fpasswd/data.mcap", expected=(404,)),
         Attack("a method that is none", "BREW", API, expected=(400, 405)),
-    ]  # fmt: skip
+    ]
 
 
 def send(url: str, attack: Attack, seen: Seen, lock: threading.Lock) -> None:
@@ -282,19 +289,34 @@ def figures_of(found: Measured) -> list[Figure]:
     statuses = ", ".join(f"{status or 'closed'} {count}" for status, count in sorted(seen.statuses.items()))
     rows = [
         Figure("hostile requests", f"{seen.requests}", beside=f"{found.wall:.0f} s, {CLIENTS} clients: {statuses}"),
-        Figure("answers of 5xx", f"{sum(n for s, n in seen.statuses.items() if s >= 500)}", "0",
-               not any(status >= 500 for status in seen.statuses)),
-        Figure("unexpected answers", f"{sum(faults.values())}", "0", not faults,
-               "; ".join(f"{what} × {count}" for what, count in list(faults.items())[:8])),
-        at_most("memory of the service, growth", found.after - found.before, GROWTH_TARGET_MB, "MB",
-                f"before {found.before:.0f}, peak {found.peak:.0f}, after {found.after:.0f} MB"),
-    ]  # fmt: skip
+        Figure(
+            "answers of 5xx",
+            f"{sum(n for s, n in seen.statuses.items() if s >= 500)}",
+            "0",
+            not any(status >= 500 for status in seen.statuses),
+        ),
+        Figure(
+            "unexpected answers",
+            f"{sum(faults.values())}",
+            "0",
+            not faults,
+            "; ".join(f"{what} × {count}" for what, count in list(faults.items())[:8]),
+        ),
+        at_most(
+            "memory of the service, growth",
+            found.after - found.before,
+            GROWTH_TARGET_MB,
+            "MB",
+            f"before {found.before:.0f}, peak {found.peak:.0f}, after {found.after:.0f} MB",
+        ),
+    ]
     for door, stopped in found.stopped.items():
         ms = [1e3 * one for one in stopped.seconds]
         spread = f"p50 {quantile(ms, 0.5):.0f}, max {max(ms):.0f} ms; {len(ms)} stops, {stopped.failed} without answer"
         rows.append(at_most(f"stop through the {door}, p99", quantile(ms, 0.99), STOP_TARGET_MS, "ms", spread))
-        rows.append(Figure(f"stop through the {door}: not confirmed", f"{stopped.unconfirmed}", "0",
-                           stopped.unconfirmed == 0))  # fmt: skip
+        rows.append(
+            Figure(f"stop through the {door}: not confirmed", f"{stopped.unconfirmed}", "0", stopped.unconfirmed == 0)
+        )
     rows.append(at_most("from SIGTERM to the end", found.end, END_TARGET_S, "s", f"exit code {found.code}"))
     return rows
 

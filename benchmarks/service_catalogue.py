@@ -30,8 +30,28 @@ TARGET_MS = 50.0
 START = datetime(2024, 1, 1, tzinfo=UTC)
 KINDS = ("ramp", "cubic", "step", "staircase", "sine", "multisine", "slow_ramp", "pause", "path", "sequence")
 OUTCOMES = (*["complete"] * 97, "stopped", "fault", "interrupted")
-WORDS = ("belt", "loose", "after", "service", "warm", "cold", "payload", "new", "motor", "joint", "elbow", "noise",
-         "wear", "morning", "repeat", "check", "gripper", "open", "bearing", "slack")  # fmt: skip
+WORDS = [
+    "belt",
+    "loose",
+    "after",
+    "service",
+    "warm",
+    "cold",
+    "payload",
+    "new",
+    "motor",
+    "joint",
+    "elbow",
+    "noise",
+    "wear",
+    "morning",
+    "repeat",
+    "check",
+    "gripper",
+    "open",
+    "bearing",
+    "slack",
+]
 TAGS = tuple(f"week {number}" for number in range(40))
 RARE = "brass bush replaced"
 BATCH = 5000
@@ -47,12 +67,24 @@ def rows(count: int, random_: random.Random) -> Iterator[dict[str, Any]]:
         notes = RARE if number % 9973 == 0 else " ".join(random_.choices(WORDS, k=6))
         outcome = random_.choice(OUTCOMES)
         yield {
-            "id": identity, "robot": ROBOT, "file": file, "created": moment, "source": "real", "kind": kind,
-            "name": f"study {number % 300}", "joints": [1, 2, 3], "outcome": outcome, "samples": 1500,
-            "duration": 30.0, "size": 900_000, "operator": "anna", "experiment": None, "notes": notes,
+            "id": identity,
+            "robot": ROBOT,
+            "file": file,
+            "created": moment,
+            "source": "real",
+            "kind": kind,
+            "name": f"study {number % 300}",
+            "joints": [1, 2, 3],
+            "outcome": outcome,
+            "samples": 1500,
+            "duration": 30.0,
+            "size": 900_000,
+            "operator": "anna",
+            "experiment": None,
+            "notes": notes,
             "searched": "\n".join((identity, file, f"study {number % 300}", kind, "anna", notes, outcome)).lower(),
             "missing": False,
-        }  # fmt: skip
+        }
 
 
 def fill(folder: Path, count: int) -> None:
@@ -73,7 +105,7 @@ def fill(folder: Path, count: int) -> None:
 
 
 def listed(service: RunningService, times: int) -> list[float]:
-    """ms of pages of the list, following it from the newest trace on, and beginning anew at random moments."""
+    """Times (ms) of pages of the list, following it from the newest trace on, and beginning anew at random moments."""
     random_, found, cursor = dice(1), [], None
     for number in range(times):
         query: dict[str, Any] = {"limit": 50} | ({} if cursor is None else {"cursor": cursor})
@@ -86,7 +118,7 @@ def listed(service: RunningService, times: int) -> list[float]:
 
 
 def searched(service: RunningService, times: int) -> dict[str, list[float]]:
-    """ms of searches by what they look for."""
+    """Times (ms) of searches by what they look for."""
     random_ = dice(2)
     kinds: dict[str, list[float]] = {}
     for _ in range(times):
@@ -134,9 +166,7 @@ def main() -> int:
     times = 10 if given.quick else given.times
     pages, searches, start = measure(given.traces, times)
     few_pages, few_searches, few_start = measure(max(1, given.traces // 100), times)
-    every, few_every = (
-        [one for each in kinds.values() for one in each] for kinds in (searches, few_searches)
-    )  # fmt: skip
+    every, few_every = ([one for each in kinds.values() for one in each] for kinds in (searches, few_searches))
 
     def beside(many: list[float], few: list[float]) -> str:
         return f"p50 {quantile(many, 0.5):.1f}, max {max(many):.1f} ms; of a hundredth p99 {quantile(few, 0.99):.1f} ms"

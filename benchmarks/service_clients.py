@@ -16,23 +16,23 @@ from urllib.parse import urlsplit
 import websockets
 
 CONNECTIONS = 8
-"""Kept open for the GETs; one that waits for its answer is not used for the next."""
+"""Connections kept open for the GETs; one that waits for an answer is not reused."""
 SUBSCRIBED = ["samples", "robot", "queue", "jobs", "events"]
 
 
 @dataclass
 class Seen:
-    """What the clients met. Times in s."""
+    """Observations of the clients. Times in s."""
 
     latencies: list[float] = field(default_factory=list)
-    """Of every GET, from the moment it was due to go out: one that waits for a free connection is late."""
+    """Latency of every GET from the moment when it was due, so that waiting for a free connection counts."""
     own_lateness: list[float] = field(default_factory=list)
-    """Of the clients' own clock, which shares the cores with all that is measured."""
+    """Lateness of the clients' own timer, which shares the cores with all that is measured."""
     refused: int = 0
     watchers: int = 0
-    """Those that have got their history."""
+    """Number of watchers that have received their history."""
     joining: float = 0.0
-    """s until all watchers had it, all having come at once."""
+    """Time (s) until all watchers, having joined at once, had it."""
     samples: int = 0
     samples_missed: int = 0
     ended_early: int = 0
@@ -174,7 +174,7 @@ class Clients:
 
     @property
     def processes(self) -> dict[str, int]:
-        """By what they do."""
+        """Processes by their task."""
         watching = {} if self._watching is None else {"watchers": self._watching.process}
         return watching | {"GETs": self._asking.process}
 
@@ -192,6 +192,8 @@ def clients(url: str, watchers: int, paths: Sequence[str], rate: float, live: st
         made = Clients(watching, asking)
         yield made
     asked = asking.seen
-    made.seen = asked if watching is None else replace(
-        watching.seen, latencies=asked.latencies, own_lateness=asked.own_lateness, refused=asked.refused
-    )  # fmt: skip
+    made.seen = (
+        asked
+        if watching is None
+        else replace(watching.seen, latencies=asked.latencies, own_lateness=asked.own_lateness, refused=asked.refused)
+    )

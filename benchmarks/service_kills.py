@@ -31,12 +31,12 @@ from daq.traces.reader import read_trace
 
 VICTIMS = ("server", "acquisition", "worker")
 LONGEST_MOMENT_S = 1.5
-"""Kills come up to so long after an experiment or a job was begun."""
+"""Latest moment (s) of a kill after the start of an experiment or a job."""
 WHILE_IT_BEGINS = 0.2
 """Share of the server's kills that are followed by another one before it answers."""
 PORT = "mock://?pty=1&lock_step=1&seed=3"
 LENGTHS_S = (1.0, 40.0)
-"""Of the experiments, in the arm's time."""
+"""Lengths of the experiments, in the arm's time."""
 WITH_A_JOB = 0.3
 """Share of the other kills that find a job under way."""
 QUEUED = 3
@@ -46,7 +46,7 @@ WORKER, OWNER = b"spawn_main", b"server.owner"
 
 @dataclass
 class Told:
-    """What the service tells at one moment. By number."""
+    """The service's answers at one moment, by number."""
 
     experiments: dict[str, dict[str, Any]]
     jobs: dict[str, dict[str, Any]]
@@ -70,14 +70,14 @@ class Findings:
 
     kills: Counter[str] = field(default_factory=Counter)
     back: dict[str, list[float]] = field(default_factory=dict)
-    """s until the service was whole again, by victim."""
+    """Times (s) until the service had recovered, by the killed process."""
     lost: list[str] = field(default_factory=list)
     untrue: list[str] = field(default_factory=list)
     queue: list[str] = field(default_factory=list)
     finished: set[str] = field(default_factory=set)
     """Traces that were seen finished; each was read."""
     found_running: Counter[str] = field(default_factory=Counter)
-    """What the kills met: kind and state."""
+    """Kinds and states of what was running at the kills."""
 
 
 def _all(service: RunningService, path: str) -> dict[str, dict[str, Any]]:
@@ -218,7 +218,7 @@ class Campaign:
         check(before, Told.by(service), self.folder, findings, f"{label}, {victim}")
 
     def _complete_trace(self) -> str:
-        """For the jobs."""
+        """A complete trace for the jobs."""
         ended = self._there.ended("experiments", self._there.submit(ramp()))
         if ended["state"] != "done":
             raise RuntimeError(f"the first experiment ended {ended['state']}: {ended['reason']}")

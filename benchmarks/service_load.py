@@ -64,12 +64,12 @@ class Measured:
     """What one run of everything gave. Times in s."""
 
     endings: list[str] = field(default_factory=list)
-    """Of experiments that were not carried out to their end."""
+    """Endings of experiments that were not completed."""
     idle: list[float] = field(default_factory=list)
     """Jitter of the samples that nobody watched."""
     loaded: list[float] = field(default_factory=list)
     lost: tuple[int, int] = (0, 0)
-    """Ticks lost, of how many, under load."""
+    """Lost ticks under load, and the number of ticks."""
     frozen: dict[str, list[float]] = field(default_factory=lambda: {OWN_DOOR: [], STOP_DOOR: []})
     used: dict[str, list[float]] = field(default_factory=lambda: {OWN_DOOR: [], STOP_DOOR: []})
     unconfirmed: int = 0
@@ -91,7 +91,7 @@ def jitter(path: Path) -> tuple[list[float], int]:
 
 
 def ready_again(service: RunningService) -> None:
-    """After a run that did not come to its end."""
+    """Makes the robot ready after a run that was not completed."""
     service.ask("POST", "/reset", json={})
     service.ask("POST", "/queue/resume", json={})
 
@@ -115,7 +115,7 @@ class ProcessorTime:
         self._before = self._now()
 
     def shares(self) -> dict[str, float]:
-        """Of one core, since the beginning."""
+        """Shares of one core since the beginning."""
         seconds = time.monotonic() - self._begun
         shares = {name: (now - self._before[name]) / seconds for name, now in self._now().items()}
         return shares | {OTHERS: max(0.0, shares[OTHERS] - sum(shares.values()) + shares[OTHERS])}
@@ -125,13 +125,13 @@ class ProcessorTime:
 
 
 def _machine_time() -> float:
-    """s that all cores of this machine were busy."""
+    """Time (s) that all cores of this machine were busy."""
     user, nice, system, _idle, _waiting, *interrupts = map(int, Path("/proc/stat").read_text("utf-8").split()[1:9])
     return (user + nice + system + sum(interrupts)) / os.sysconf("SC_CLK_TCK")
 
 
 def _processor_time(process: int) -> float:
-    """s, of all its threads."""
+    """Processor time (s) of all threads of a process."""
     fields = Path(f"/proc/{process}/stat").read_text("utf-8").rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -203,8 +203,10 @@ def measure(seconds: float, stops: int) -> Measured:
         service.ask("POST", "/connect")
         found.idle, _ = record(service, seconds, found)
         short = service.ended("experiments", service.submit(ramp(duration=1.0)))["trace"]
-        service.ended("jobs", service.ask("POST", "/jobs", json={"kind": "compare", "traces": [short],
-                                                                 "models": ["machine"]})["id"])  # fmt: skip
+        service.ended(
+            "jobs",
+            service.ask("POST", "/jobs", json={"kind": "compare", "traces": [short], "models": ["machine"]})["id"],
+        )
         with clients(service.url, WATCHERS, PATHS, RATE, f"{API}/live") as load:
             fit = service.ask("POST", "/jobs", json=FIT | {"traces": [short]})["id"]
             processes = {
@@ -250,16 +252,18 @@ def figures_of(found: Measured) -> list[Figure]:
     idle, loaded = (1e3 * quantile(times, 0.99) for times in (found.idle, found.loaded))
     lost, count = found.lost
     seen = found.seen
-    gets, floor, late = ([1e3 * one for one in times]
-                         for times in (seen.latencies, found.floor.latencies, seen.own_lateness))  # fmt: skip
+    gets, floor, late = (
+        [1e3 * one for one in times] for times in (seen.latencies, found.floor.latencies, seen.own_lateness)
+    )
 
     def spread(times: list[float]) -> str:
         return f"p50 {quantile(times, 0.5):.1f}, max {max(times):.1f} ms"
 
     stops = []
     for what, target, doors in (
-        ("frozen in memory", FROZEN_TARGET_MS, found.frozen), ("first used", USED_TARGET_MS, found.used)
-    ):  # fmt: skip
+        ("frozen in memory", FROZEN_TARGET_MS, found.frozen),
+        ("first used", USED_TARGET_MS, found.used),
+    ):
         for door, times in doors.items():
             ms = [1e3 * one for one in times] or [math.inf]
             beside = f"{spread(ms)}, {len(times)} stops"
@@ -269,19 +273,30 @@ def figures_of(found: Measured) -> list[Figure]:
     return [
         Figure("experiments not completed", f"{len(found.endings)}", "0", not found.endings, "; ".join(found.endings)),
         Figure("ticks lost", f"{lost}", "0", lost == 0, f"of {count}"),
-        at_most("tick jitter added, p99", loaded - idle, JITTER_TARGET_MS, "ms",
-                f"p99 {loaded:.2f} ms, alone {idle:.2f} ms"),
+        at_most(
+            "tick jitter added, p99", loaded - idle, JITTER_TARGET_MS, "ms", f"p99 {loaded:.2f} ms, alone {idle:.2f} ms"
+        ),
         *stops,
-        Figure("stops without confirmation", f"{found.unconfirmed}", "0", found.unconfirmed == 0,
-               f"a fit ran beside {found.fitting} of {sum(map(len, found.used.values()))}"),
+        Figure(
+            "stops without confirmation",
+            f"{found.unconfirmed}",
+            "0",
+            found.unconfirmed == 0,
+            f"a fit ran beside {found.fitting} of {sum(map(len, found.used.values()))}",
+        ),
         at_most("plain GET, p99", quantile(gets, 0.99), GET_TARGET_MS, "ms", f"{spread(gets)}, {len(gets)} requests"),
         Figure("an empty FastAPI application, alone, p99", f"{quantile(floor, 0.99):.3g} ms", beside=spread(floor)),
         Figure("requests refused", f"{seen.refused}", "0", seen.refused == 0, own),
         Figure("processor time, of one core", f"{100 * sum(found.busy.values()):.0f} %", beside=busy),
         Figure("until all watchers had the last 60 s", f"{seen.joining:.2f} s", beside="all of them join at once"),
-        Figure("samples that a watcher did not get", f"{seen.samples_missed}", "0", seen.samples_missed == 0,
-               f"of {seen.samples}, {seen.watchers} watchers, {seen.ended_early} dropped"),
-    ]  # fmt: skip
+        Figure(
+            "samples that a watcher did not get",
+            f"{seen.samples_missed}",
+            "0",
+            seen.samples_missed == 0,
+            f"of {seen.samples}, {seen.watchers} watchers, {seen.ended_early} dropped",
+        ),
+    ]
 
 
 def main() -> int:

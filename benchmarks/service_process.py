@@ -60,7 +60,7 @@ class RunningService:
                 raise RuntimeError(f"experiment {number} ended {found['state']}: {found['reason']}")
 
     def kill(self) -> None:
-        """As a power cut does to this one process."""
+        """Kills this one process as a power cut would."""
         self.process.send_signal(signal.SIGKILL)
         self.process.wait(END_WITHIN)
 

@@ -29,26 +29,36 @@ from numpy.typing import NDArray
 
 from benchmarks.figures import Figure, at_least, at_most, show
 from daq.contracts.machine import load_machine
+from model import layout as at
 from model.dynamics.rod_arm import RodArm
-from model.machine_model import layout as at
 from model.machine_model.model import Model, base_model
+from model.simulation.batch import BatchRun, available_cores
 from model.simulation.bodies import rod_arm_body
-from model.simulation.engines import available_cores, engine_for
 from model.simulation.inputs import RunInputs
 from model.simulation.period import OUT_POSITION, OUTPUTS
-from model.simulation.simulate import LONGEST_STEP, Options, Prepared, prepare, sensitivities, simulate
+from model.simulation.prepared import LONGEST_STEP, Options, Prepared, prepare
+from model.simulation.simulate import sensitivities, simulate
 from tests.model.dynamics.oracles import mjcf
 from tests.model.simulation.records import ramp_inputs
 
 REPEATS = 40
 BATCH = 1000
 JACOBIAN = (
-    "link1.mass", "link2.mass", "link3.mass", "load.mass", "link2.length", "link3.length",
-    "joint1.motor.back_emf_constant", "joint2.motor.back_emf_constant", "joint3.motor.back_emf_constant",
-    "joint1.viscous_friction.coefficient", "joint2.viscous_friction.coefficient",
-    "joint3.viscous_friction.coefficient", "joint2.load_dependent_friction.arm",
-)  # fmt: skip
-"""Thirteen parameters of table 7.9's model."""
+    "link1.mass",
+    "link2.mass",
+    "link3.mass",
+    "load.mass",
+    "link2.length",
+    "link3.length",
+    "joint1.motor.back_emf_constant",
+    "joint2.motor.back_emf_constant",
+    "joint3.motor.back_emf_constant",
+    "joint1.viscous_friction.coefficient",
+    "joint2.viscous_friction.coefficient",
+    "joint3.viscous_friction.coefficient",
+    "joint2.load_dependent_friction.arm",
+)
+"""The thirteen parameters of table 7.9's model that derivatives are taken for."""
 FOLDER = Path(__file__).parent
 Pointer = ctypes.POINTER(ctypes.c_double)
 
@@ -71,8 +81,9 @@ def _one_run(model: Model, inputs: RunInputs, prepared: Prepared) -> list[Figure
     ours, c = _ours(model, prepared, 1), _c_runs(model, prepared, 1)
     _check_agreement(ours, c)
     one, rival, plant = _best_in_turn(lambda: ours(1), lambda: c(1), _mujoco_run(inputs))
-    jacobian = _best(lambda: sensitivities(model, inputs, JACOBIAN), REPEATS)
-    one_dual = _best(lambda: sensitivities(model, inputs, JACOBIAN[:1]), REPEATS)
+    parameters = [model.parameter(name) for name in JACOBIAN]
+    jacobian = _best(lambda: sensitivities(model, inputs, parameters), REPEATS)
+    one_dual = _best(lambda: sensitivities(model, inputs, parameters[:1]), REPEATS)
     cores = available_cores()
     return [
         at_most("one closed-loop run, numba", one / rival, 1.3, "× C", f"{_ms(one)}; C -O3 -march=native {_ms(rival)}"),
@@ -110,15 +121,8 @@ def _spread(model: Model, count: int) -> NDArray[np.float64]:
 
 
 def _ours(model: Model, prepared: Prepared, count: int) -> Callable[[int], NDArray[np.float64]]:
-    out = np.zeros((count, OUTPUTS, *prepared.set_points.shape))
-    initial = np.tile(prepared.initial, (count, 1, 1))
-    vectors, which, engine = _spread(model, count), np.zeros(count, np.int64), engine_for(model)
-
-    def run(cores: int) -> NDArray[np.float64]:
-        engine.run([prepared], which, vectors, initial, model.flags, LONGEST_STEP, out, cores=cores)
-        return out
-
-    return run
+    initials, which = np.tile(prepared.initial, (count, 1, 1)), np.zeros(count, np.int64)
+    return BatchRun(model, (prepared,), which, _spread(model, count), initials, LONGEST_STEP).run
 
 
 def _c_runs(model: Model, prepared: Prepared, count: int) -> Callable[[int], NDArray[np.float64]]:
@@ -144,9 +148,12 @@ def _c_runs(model: Model, prepared: Prepared, count: int) -> Callable[[int], NDA
     flags = np.array(model.flags, dtype=ctypes.c_long)
     deflection = _initial_deflection(model, prepared)
     tail = (
-        flags.ctypes.data_as(ctypes.POINTER(ctypes.c_long)), deflection.ctypes.data_as(Pointer), ctypes.c_long(1),
-        ctypes.c_double(LONGEST_STEP), out.ctypes.data_as(Pointer),
-    )  # fmt: skip
+        flags.ctypes.data_as(ctypes.POINTER(ctypes.c_long)),
+        deflection.ctypes.data_as(Pointer),
+        ctypes.c_long(1),
+        ctypes.c_double(LONGEST_STEP),
+        out.ctypes.data_as(Pointer),
+    )
 
     def piece(first: int, last: int) -> None:
         library.run_many(ctypes.c_long(first), ctypes.c_long(last), ctypes.c_long(periods), *pointers, *tail)
@@ -203,9 +210,15 @@ def _mujoco_run(inputs: RunInputs) -> Callable[[], NDArray[np.float64]]:
     damping = gain * gear * [d.back_emf_constant.value for d in drives] + gear**2 * viscous
     masses = [j.link.mass.value for j in joints]
     arm = RodArm(
-        masses[0], 0.062899, masses[1], masses[2], 1.250307, joints[1].geometry.a.value, joints[2].geometry.a.value,
+        masses[0],
+        0.062899,
+        masses[1],
+        masses[2],
+        1.250307,
+        joints[1].geometry.a.value,
+        joints[2].geometry.a.value,
         rotor_inertia=(float(rotor[0]), float(rotor[1]), float(rotor[2])),
-    )  # fmt: skip
+    )
     xml = mjcf(arm.chain()).replace("armature=", 'frictionloss="1.5" armature=')
     xml = xml.replace(' constraint="disable"', "").replace('angle="radian"', 'angle="radian" boundinertia="1e-6"')
     plant = mujoco.MjModel.from_xml_string(xml)
@@ -275,7 +288,7 @@ inputs = ramp_inputs(model.machine)
 loaded = time.perf_counter()
 simulate(model, inputs)
 once = time.perf_counter()
-sensitivities(model, inputs, tuple(sys.argv[1:]))
+sensitivities(model, inputs, [model.parameter(name) for name in sys.argv[1:]])
 print(f"{loaded - start:.2f} {once - loaded:.2f} {time.perf_counter() - once:.2f}")
 """
 

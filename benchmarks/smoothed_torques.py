@@ -10,11 +10,11 @@ from scipy.signal import savgol_filter
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
+from model import layout as at
 from model.inverse_dynamics.supplied_torque import friction_levels, needed_torque
-from model.machine_model import layout as at
 from model.machine_model.model import Model
+from model.machine_model.nominal import is_rod_arm
 from model.simulation.bodies import chain_body
-from model.simulation.engines import is_rod_arm
 
 Floats = NDArray[np.float64]
 

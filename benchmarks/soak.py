@@ -37,16 +37,16 @@ SPEC = {
 AT_ONCE = 10
 """Experiments that are queued before the last of them is waited for."""
 MAY_GROW_MB = 16.0
-"""Of resident memory between a tenth of the runs and the end: caches of the database and the live history fill up, and
-pages that were freed are not always given back."""
+"""Permitted growth (MB) of resident memory between a tenth of the runs and the end: caches of the database and the live
+history fill up, and pages that were freed are not always given back."""
 
 
 @dataclass(frozen=True)
 class Held:
-    """What a process holds."""
+    """Resources that a process holds."""
 
     memory: float
-    """MB, resident."""
+    """Resident memory (MB)."""
     descriptors: int
     threads: int
 
@@ -109,14 +109,14 @@ def _in_between(service: RunningService) -> None:
 
 
 def _quiet(service: RunningService) -> None:
-    """Until nothing is under way any more: threads that were needed for a moment have ended."""
+    """Waits until nothing is under way and temporary threads have ended."""
     service.ask("GET", "/events", params={"limit": 1})
     time.sleep(1.0)
 
 
 @contextmanager
 def _watched(service: RunningService) -> Iterator[None]:
-    """Somebody looks at the arm all the time."""
+    """Keeps a watcher on the live stream."""
     address = service.url.replace("http", "ws") + f"/api/v1/robots/{ROBOT}/live"
     with connect(address, max_size=None) as socket:
         socket.send(json.dumps({"subscribe": ["samples", "robot", "queue", "events"], "history": 0}))

@@ -37,8 +37,8 @@ from daq.contracts.errors import TraceError
 from daq.contracts.machine import BoardPid
 from daq.contracts.trace import Trace
 from daq.traces.reader import read_trace
+from model import layout as at
 from model.inverse_dynamics.recorded_motion import holds_drive_between_samples
-from model.machine_model import layout as at
 from model.machine_model.model import Model, base_model
 
 Floats = NDArray[np.float64]
@@ -47,26 +47,26 @@ Place = tuple[str, int | None]
 """An effect, and the joint (from 1) it is on; None for the whole machine."""
 
 WINDOW = 0.26
-"""s of the local polynomials that give speeds and accelerations; shorter ones let noise through."""
+"""Window (s) of the local polynomials that give speeds and accelerations; shorter ones let noise through."""
 THRESHOLDS = np.geomspace(1.0, 0.01, 16)
-"""Of normalised coefficients, as shares of the target's deviation."""
+"""Thresholds of normalised coefficients, as shares of the target's deviation."""
 RIDGE = 0.05
-"""Share of a term's own square: terms that are nearly alike must share what they explain instead of cancelling."""
+"""Ridge penalty as a share of a term's own square; nearly collinear terms then share the fit instead of cancelling."""
 STRIBECK_SPEEDS = (0.05, 0.15, 0.4)
 STICTION_SPEED = 0.015
 PEAKS = 3
-"""Highest peaks of a joint's periodogram that a wave is tried at."""
+"""Number of periodogram peaks of a joint at which a wave is tried."""
 HIGHEST = 6.0
-"""Hz; beyond, the smoothing leaves little."""
+"""Highest frequency (Hz) of a wave; beyond it the smoothing leaves little."""
 SHORTEST_WAVE = 0.01
-"""Of a ripple, as a share of the joint's travel."""
+"""Shortest wavelength of a ripple, as a share of the joint's travel."""
 MOVING = 0.03
 """Share of its higher speeds from which a joint counts as moving."""
 ARM = 0.01
-"""m by which the arm of load-dependent friction is moved."""
+"""Change (m) of the arm of load-dependent friction for a finite difference."""
 LIMITS = (0.9, 0.75, 0.6, 0.45)
 LEAST_GAIN_ERROR = 0.02
-"""Relative residual of the controller's law from which it is the controller that is wrong."""
+"""Relative residual of the controller's law above which the controller itself is taken to be wrong."""
 
 
 def ranked_effects(trace: Trace, model: Model) -> list[Place]:
@@ -186,8 +186,12 @@ def _terms(
         yield (name, None), _moved(model.with_effect(name, (), values), trace, target)
     joints = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
     for j, joint in enumerate(model.machine.modelled_joints):
-        for name, values in (("link_mass", {"added": 0.1}), ("centre_of_mass", {"shift": 0.01}),
-                             ("back_emf_error", {"relative": 0.05}), ("input_delay", {"time": 0.005})):  # fmt: skip
+        for name, values in (
+            ("link_mass", {"added": 0.1}),
+            ("centre_of_mass", {"shift": 0.01}),
+            ("back_emf_error", {"relative": 0.05}),
+            ("input_delay", {"time": 0.005}),
+        ):
             yield (name, joint), _moved(model.with_effect(name, (joint,), values), trace, target)
         arm = {"arm": float(joints[j, at.COULOMB_ARM]) + ARM}
         yield ("load_dependent_friction", joint), _moved(_with_friction(model, joint, arm), trace, target)
@@ -246,14 +250,19 @@ def _own_terms(
         wanted = asked / gain + joints[j, at.GEAR] * joints[j, at.BACK_EMF] * v
         sign = np.tanh(v / max(0.02 * float(np.quantile(np.abs(v), 0.95)), 1e-6))
         own: list[tuple[str | None, Floats]] = [
-            ("viscous_friction", v), ("coulomb_friction", sign), ("direction_dependent_friction", sign**2),
-            ("gear_loss", sign * np.abs(asked)), ("stiction", sign * np.exp(-np.abs(v) / STICTION_SPEED)),
-            ("spring_torque", q - q.mean()), (None, np.ones_like(q)),
-            ("dead_zone", np.sign(wanted)), ("resistance_drift", asked * np.cumsum(base.motor[:, j] ** 2)),
+            ("viscous_friction", v),
+            ("coulomb_friction", sign),
+            ("direction_dependent_friction", sign**2),
+            ("gear_loss", sign * np.abs(asked)),
+            ("stiction", sign * np.exp(-np.abs(v) / STICTION_SPEED)),
+            ("spring_torque", q - q.mean()),
+            (None, np.ones_like(q)),
+            ("dead_zone", np.sign(wanted)),
+            ("resistance_drift", asked * np.cumsum(base.motor[:, j] ** 2)),
             ("motor_inductance", np.gradient(asked, step)),
             ("joint_compliance", _second(base.required[:, j], step)),
             ("backlash", _second(np.tanh(base.required[:, j] / (0.05 * base.required[:, j].std())), step)),
-        ]  # fmt: skip
+        ]
         own += [("stribeck_friction", sign * np.exp(-np.abs(v) / speed)) for speed in STRIBECK_SPEEDS]
         own += _waves(base, left, j)
         largest = float(np.abs(volts).max())
@@ -346,12 +355,16 @@ def _scored(folder: Path) -> list[Scored]:
     recorded = {row["seed"]: row for row in _rows(folder / "record.jsonl")}
     return [
         Scored(
-            folder / "traces" / recorded[row["seed"]]["trace"], row["known_as"][0], frozenset(row["joints"][0]),
-            row["named_right"], row["in_first"], bool(row["joint_right"]),
+            folder / "traces" / recorded[row["seed"]]["trace"],
+            row["known_as"][0],
+            frozenset(row["joints"][0]),
+            row["named_right"],
+            row["in_first"],
+            bool(row["joint_right"]),
         )
         for row in _rows(folder / "score.jsonl")
         if row["kind"] == "single" and row["detectable"]
-    ]  # fmt: skip
+    ]
 
 
 def _rows(file: Path) -> list[dict[str, Any]]:

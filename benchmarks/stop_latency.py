@@ -27,6 +27,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 from benchmarks.figures import Figure, at_most, quantile, show
 from benchmarks.mock_control import MockControl
@@ -125,11 +126,13 @@ def _by_command(host: Connection, after_s: float, desk: Path) -> tuple[float, bo
     return at, code == 0
 
 
-def stop_command(desk: Path) -> int:
+def stop_command(desk: Path, run_process: Callable[..., Any] = subprocess.run) -> int:
     """The exit code of `daq stop` at a desk of its own, where it finds the robots of this benchmark and no other."""
     command = [str(Path(sys.executable).with_name("daq")), "stop"]
     environment = environment_of(desk)
-    return subprocess.run(command, stdout=subprocess.DEVNULL, check=False, cwd=desk, env=environment).returncode
+    ended = run_process(command, stdout=subprocess.DEVNULL, check=False, cwd=desk, env=environment)
+    code: int = ended.returncode
+    return code
 
 
 def record_of_stop(control: MockControl, number: int) -> tuple[float, float]:
@@ -191,8 +194,15 @@ def figures_of(line: str, results: dict[str, Stops], retries: int, clock: dict[s
                 rows.append(at_most(name, quantile(times, 0.99), target, "ms", beside))
     unconfirmed = sum(stops.unconfirmed for stops in results.values())
     late = f"mock behind its clock by more than 2 ms in {clock['late_ticks']} periods"
-    rows.append(Figure(f"{line}: stops without confirmation", f"{unconfirmed}", "0", unconfirmed == 0,
-                       f"{retries} repetitions; {late}"))  # fmt: skip
+    rows.append(
+        Figure(
+            f"{line}: stops without confirmation",
+            f"{unconfirmed}",
+            "0",
+            unconfirmed == 0,
+            f"{retries} repetitions; {late}",
+        )
+    )
     return rows
 
 

@@ -32,18 +32,18 @@ API = f"/api/v1/robots/{ROBOT}"
 PATHS = (API, f"{API}/queue", f"{API}/experiments?limit=20", f"{API}/traces?limit=20")
 PORT = "mock://?pty=1&lock_step=1&seed=3"
 WARM_UP = 3.0
-"""s until all clients ask."""
+"""Time (s) until all clients are active."""
 PATIENCE = 30.0
-"""s for one stop; it counts as not answered then."""
+"""Time-out (s) of one stop; after it the stop counts as unanswered."""
 OWN_DOOR, LISTENER = "the service's own door", "the stop listener"
 ALONE = 100
-"""Stops at each door without load."""
+"""Number of stops at each address without load."""
 OWN_TARGET, LISTENER_TARGET = 3.0, 1.0
-"""s: what `daq.client` waits for one door; and that an operator at the page does not press again."""
+"""Targets (s): the time-out of `daq.client` for one address, and a time in which an operator does not press again."""
 
 
 def compute() -> None:
-    """Until it is ended."""
+    """Computes until the process is ended."""
     while True:
         sum(range(100_000))
 
@@ -89,7 +89,7 @@ def load(url: str) -> Iterator[multiprocessing.sharedctypes.Synchronized[int]]:
 
 
 def stop(host: str, port: int) -> float | None:
-    """s until a confirmed answer, on a new connection; None for none."""
+    """Time (s) until a confirmed answer on a new connection; None without an answer."""
     begun = time.monotonic()
     line = http.client.HTTPConnection(host, port, timeout=PATIENCE)
     try:
@@ -104,7 +104,7 @@ def stop(host: str, port: int) -> float | None:
 
 
 Times = dict[str, list[float | None]]
-"""Of stops at each door, s; None for one that was not answered."""
+"""Times (s) of stops at each address; None for an unanswered one."""
 
 
 def at_both_doors(url: str, stops: int, pause: float) -> Times:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 ANSWER_WITHIN = 60.0
 PAUSE = 0.1
-"""s between two stops."""
+"""Pause (s) between two stops."""
 
 
 @dataclass
@@ -28,7 +28,7 @@ class Stopped:
 
 @dataclass
 class Stops:
-    """By door. Filled when the stops have ended."""
+    """Stops by address; filled when they have ended."""
 
     found: dict[str, Stopped] = field(default_factory=dict)
 
@@ -71,7 +71,7 @@ def _stop(host: str, port: int, path: str, stopped: Stopped) -> None:
 
 
 def stop_again_and_again() -> None:
-    """In the process: until nobody holds the other end of its input any more."""
+    """Runs in the process until the other end of its input is closed."""
     host, doors, path = sys.argv[1], json.loads(sys.argv[2]), sys.argv[3]
     found = {door: Stopped() for door in doors}
     while not select.select([sys.stdin], [], [], PAUSE)[0]:

@@ -51,7 +51,7 @@ CREATED = datetime(2026, 11, 21, 5, 14, 42, tzinfo=UTC)
 
 @dataclass
 class Tally:
-    """What was counted; the first few of each fault are told."""
+    """Counts; the first few of each fault are printed."""
 
     cases: int = 0
     by_way: Counter[str] = field(default_factory=Counter)
@@ -61,16 +61,23 @@ class Tally:
     slowest: float = 0.0
 
     def fault(self, kind: str, damaged: Damaged, detail: str) -> None:
-        """Something that must not be."""
+        """Counts a fault."""
         self.faults[kind] += 1
         if self.faults[kind] <= 3:
             self.examples.append(f"{kind}: {damaged.original.kind}, {damaged.way}: {detail}")
 
 
 def record() -> TraceRecord:
-    """That of a run on the mock, with a machine."""
-    return TraceRecord(trace_id="ab12cd34ef56", created=CREATED, software="benchmark", source="mock", period=0.02,
-                       drive_unit="V", machine=load_machine("ma2000"))  # fmt: skip
+    """The record of a run on the mock, with a machine."""
+    return TraceRecord(
+        trace_id="ab12cd34ef56",
+        created=CREATED,
+        software="benchmark",
+        source="mock",
+        period=0.02,
+        drive_unit="V",
+        machine=load_machine("ma2000"),
+    )
 
 
 def differs(trace: Trace, original: Trace) -> str | None:
@@ -79,8 +86,9 @@ def differs(trace: Trace, original: Trace) -> str | None:
         there, expected = getattr(trace, name), getattr(original, name)
         if (there is None) != (expected is None) or not np.array_equal(there, expected):
             return name
-    if trace.record != original.record.model_copy(update={"outcome": trace.record.outcome,
-                                                          "counters": trace.record.counters}):  # fmt: skip
+    if trace.record != original.record.model_copy(
+        update={"outcome": trace.record.outcome, "counters": trace.record.counters}
+    ):
         return "record"
     return None if (trace.joints, trace.events) == (original.joints, original.events) else "joints or events"
 
@@ -192,8 +200,15 @@ def figures(tally: Tally) -> list[Figure]:
     """What was found, beside what may be."""
     ways = ", ".join(f"{count} {way}" for way, count in tally.by_way.items())
     ends = ", ".join(f"{count} {end}" for end, count in sorted(tally.ends.items()))
-    kinds = ("other exceptions", "wrong samples", "called complete", "called trustworthy", "part files lost or left",
-             "salvaged traces that are none", "errors of several lines")  # fmt: skip
+    kinds = (
+        "other exceptions",
+        "wrong samples",
+        "called complete",
+        "called trustworthy",
+        "part files lost or left",
+        "salvaged traces that are none",
+        "errors of several lines",
+    )
     return [
         at_least("damaged files", tally.cases, 20_000, "", ways),
         *(at_most(kind, tally.faults[kind], 0, "") for kind in kinds),

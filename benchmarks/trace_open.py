@@ -27,10 +27,10 @@ from daq.traces.recording import Recording
 from daq.traces.writer import SYNC_INTERVAL
 
 RATE = 50
-"""Samples a second."""
+"""Sampling rate (Hz)."""
 FIRST_S, AGAIN_S = 6.0, 0.2
 ROWS_A_SYNC = round(RATE * SYNC_INTERVAL)
-"""In one chunk, as when the recording is made in real time."""
+"""Rows in one chunk, as in a recording in real time."""
 
 
 def rows(minutes: float, joints: int) -> list[SampleRow]:

@@ -34,9 +34,9 @@ from firmware_protocol.framing import Frame, FrameDecoder, encode_frame
 
 BOUND = 2.0**-16
 BATCH = 20_000
-"""Frames damaged at a time: bounds the memory of a long campaign."""
+"""Frames damaged at a time, which bounds the memory of a long campaign."""
 POOL = 400
-"""Frames of each length to choose from."""
+"""Number of frames of each length to choose from."""
 CONFIDENCE = 0.95
 WITHIN = "within the bound"
 

@@ -7,7 +7,7 @@ import sys
 
 
 def main() -> None:
-    """Entry point of `daq`. A stop is asked for before anything else is even imported."""
+    """Entry point of `daq`. A stop is sent before anything else is imported."""
     if sys.argv[1:2] == ["stop"] and not {"-h", "--help"} & set(sys.argv):
         from daq_cli.app import early_stop
 

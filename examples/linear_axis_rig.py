@@ -17,16 +17,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 TRUE = {"mass": 6.0, "viscous": 25.0, "coulomb": 8.0, "cogging": 5.0, "pitch": 0.032}
-"""kg, N·s/m, N, N, m."""
+"""True parameters of the axis, in kg, N·s/m, N, N, m."""
 PERIOD, STEP, NOISE = 0.004, 0.0002, 2e-6
 WAVES = ((0.20, 0.10), (0.45, 0.05), (0.90, 0.02), (1.70, 0.006))
-"""Hz and m."""
+"""Frequencies (Hz) and amplitudes (m) of the motion."""
 STIFFNESS, DAMPING = 3000.0, 250.0
-"""Of the servo, N/m and N·s/m."""
+"""Gains of the servo, in N/m and N·s/m."""
 
 
 def wanted(time: float, seed: int) -> tuple[float, float]:
-    """Where the carriage is to be, m, and how fast, m/s."""
+    """Desired position (m) and velocity (m/s) of the carriage."""
     turns = [(2 * math.pi * rate, size, seed * (k + 1)) for k, (rate, size) in enumerate(WAVES)]
     return (
         sum(size * math.sin(turn * time + phase) for turn, size, phase in turns),

@@ -18,11 +18,11 @@ from pathlib import Path
 TRUE = {"inertia": 1.93e-4, "constant": 0.05, "resistance": 2.0, "viscous": 1.2e-5, "coulomb": 0.008}
 PERIOD, STEP, NOISE = 0.005, 0.00025, 0.2
 WAVES = ((0.15, 5.0), (0.4, 2.5), (0.9, 1.7), (2.1, 1.3))
-"""Hz and volts."""
+"""Frequencies (Hz) and amplitudes (V) of the input."""
 
 
 def volts(time: float, seed: int) -> float:
-    """What the amplifier gives."""
+    """Output of the amplifier."""
     return sum(size * math.sin(2 * math.pi * rate * time + seed * (k + 1)) for k, (rate, size) in enumerate(WAVES))
 
 

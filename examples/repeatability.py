@@ -16,7 +16,7 @@ from daq.contracts.experiment import ExperimentSpec, Ramp
 
 
 def run_once(robot: Robot, spec: ExperimentSpec, folder: Path) -> dict[int, float]:
-    """One run; overshoot in degrees by joint. Raises SystemExit when it did not come to its end."""
+    """One run; overshoot in degrees by joint. Raises SystemExit when it was not completed."""
     ended = robot.experiments.wait(robot.experiments.submit(spec).id)
     if ended.state != "done" or ended.trace is None:
         raise SystemExit(f"experiment {ended.id} {ended.state}: {ended.reason}")
@@ -26,13 +26,13 @@ def run_once(robot: Robot, spec: ExperimentSpec, folder: Path) -> dict[int, floa
     return {one.joint: one.overshoot for one in figures if one.moved and one.overshoot is not None}
 
 
-def main() -> None:
+def main(arguments: list[str] | None = None) -> None:
     """Runs the study, and prints mean and spread of the overshoot of every joint."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("url")
     options.add_argument("--runs", type=int, default=5)
     options.add_argument("--folder", type=Path, default=Path("traces"))
-    chosen = options.parse_args()
+    chosen = options.parse_args(arguments)
     if chosen.runs < 2:
         options.error(f"--runs {chosen.runs}: the spread of runs needs at least 2")
     chosen.folder.mkdir(parents=True, exist_ok=True)

@@ -20,9 +20,9 @@ TRUE = {"mass": 0.87, "length": 0.3, "inertia": 0.0044, "gain": 0.5, "viscous": 
 PERIOD, DELAY, P, D = 0.005, 0.001, 40.0, 0.8
 COUNT = 2 * math.pi / 2**14
 STEP = 0.00005
-"""s; steps of 0.25 ms would pass for 0.2 ms less delay, which a fit sees."""
+"""Integration step (s). Steps of 0.25 ms would look like 0.2 ms less delay, which a fit detects."""
 PADDLE = 0.015
-"""Drag of the paddle, N·m a (rad/s)²."""
+"""Drag coefficient of the paddle, N·m/(rad/s)²."""
 
 
 def wanted(time: float, seed: int) -> float:

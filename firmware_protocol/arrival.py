@@ -11,8 +11,8 @@ from firmware_protocol.requests import Advance, Hello
 from firmware_protocol.stamp import Stamp
 
 WINDOW = 0x4000
-"""The number of the last `Advance` is never left more than this far behind the newest request. Without it, half a
-circle of other requests would make the next `Advance` look old."""
+"""Largest distance by which the number of the last `Advance` may lag behind the newest request. Without this bound, the
+next `Advance` after half a circle of other requests would look old."""
 
 
 class Arrival(Enum):
@@ -25,7 +25,7 @@ class Arrival(Enum):
 
 
 class Session:
-    """The session of the host that greeted last: twelve bytes of state.
+    """The session of the host that sent the last `Hello`: twelve bytes of state.
 
     Within a session commands are numbered upwards and never wrap, so that nothing recorded is ever new again.
     """
@@ -36,7 +36,7 @@ class Session:
         self._newest = 1
 
     def greet(self, nonce: int, fresh: Callable[[], int]) -> bool:
-        """Takes a `Hello`; whether a new session has begun, under the number that `fresh` gives.
+        """Handles a `Hello`; returns whether a new session has begun, under the number that `fresh` gives.
 
         The nonce of the present session is a repeat of its own greeting, and changes nothing.
         """
@@ -69,7 +69,7 @@ class AdvanceOrder:
         self._number: int | None = None
 
     def judge(self, sequence: int, request: Request) -> Arrival:
-        """What to do with a request that has just arrived; of those that let no time pass only the number counts."""
+        """What to do with a request that has just arrived. Of requests other than `Advance` only the number matters."""
         if isinstance(request, Hello):
             self._number = None
             return Arrival.NEW

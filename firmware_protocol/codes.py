@@ -4,7 +4,7 @@ from enum import IntEnum, IntFlag
 
 PROTOCOL_VERSION = 2
 NO_SESSION = 0
-"""In place of a session's number: there is none. No bridge gives it to a session."""
+"""Session number that means "no session"; no bridge assigns it."""
 
 
 class Capability(IntFlag):
@@ -15,7 +15,7 @@ class Capability(IntFlag):
     LOCK_STEP = 2
     """Its time stands still until the host asks for more (`Advance`, or `Sample` of a tick not yet made)."""
     SIMULATED = 4
-    """No arm behind it."""
+    """There is no arm behind the bridge."""
 
 
 class StatusFlag(IntFlag):
@@ -26,7 +26,7 @@ class StatusFlag(IntFlag):
     RESTARTED = 2
     """The board has been reset since the last `Hello` that began a session; commands are refused until the next."""
     SET_POINT_MISSED = 4
-    """In this period the controller wanted the memory while the host had it, and took no set points."""
+    """In this period the host held the memory when the controller needed it, so the controller took no set points."""
 
 
 class Refusal(IntEnum):
@@ -39,10 +39,11 @@ class Refusal(IntEnum):
     NOT_CAPABLE = 5
     FROZEN = 6
     NOTHING_NEW = 7
-    """The controller has begun no new period for so long that waiting on is of no use."""
+    """The controller has begun no new period for so long that further waiting is useless."""
     STALE = 8
     """A command that arrived after a later one: obeying it would undo the later one."""
     BAD_SESSION = 9
-    """A command of no session, or of one that has ended: recorded, delayed, or of a host that another has replaced."""
+    """A command without a session or from one that has ended: replayed, delayed, or sent by a host that was
+    replaced."""
     OTHER_STOP = 10
     """A `Release` that names a stop which is not the newest: the newest one holds."""

@@ -23,8 +23,8 @@ from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import FrameDecoder, encode_frame
 
 IDLE_MARK = b"\0\0\0\0"
-"""In lock-step the bridge ends each turn with this: it has no more to say until it is spoken to. Frames never make
-it: where one ends and the next begins, two zeros meet."""
+"""In lock-step the bridge ends each turn with this mark: it sends nothing more until the next request. Frames never
+make it: where one ends and the next begins, two zeros meet."""
 
 
 class LinkDialect(Protocol):

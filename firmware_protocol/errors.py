@@ -18,7 +18,7 @@ class BlockAddressError(ProtocolError):
 
 
 class UnitsError(ProtocolError):
-    """A value that its register, or the joint's range, cannot hold."""
+    """A value outside its register's range or the joint's range."""
 
 
 class MemoryMapError(ProtocolError):

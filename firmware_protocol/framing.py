@@ -109,7 +109,7 @@ class FrameDecoder:
     damaged: int = 0
     """Pieces between delimiters that were not a frame: stuffing, length or CRC wrong."""
     oversized: int = 0
-    """Pieces longer than any frame, thrown away without being stored."""
+    """Pieces longer than any frame; they are discarded without being stored."""
     _partial: bytearray = field(default_factory=bytearray)
     _overrun: bool = False
 

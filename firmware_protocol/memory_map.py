@@ -1,4 +1,4 @@
-"""The shared memory as data: which register lies where, in which unit, and who says so."""
+"""The shared memory as data: the address, unit and source of every register."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SINGLE_REGISTERS = ("process_inputs", "process_outputs", "gripper")
 
 
 class Kind(NamedTuple):
-    """What driver and controller take a register for. A map may move it and not change this."""
+    """How driver and controller use a register. A memory map may move a register but not change its use."""
 
     unit: Unit
     signed: bool
@@ -178,7 +178,7 @@ def parse_memory_map(text: str, origin: str = "memory map") -> MemoryMap:
         found = first["input"]
         value = f" (found {found!r:.60})" if isinstance(found, bool | int | float | str) else ""
         raise MemoryMapError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}{value}") from error
-    except ValueError as error:  # of the TOML; also a whole number of thousands of digits
+    except ValueError as error:  # malformed TOML, or an integer with thousands of digits
         raise MemoryMapError(f"{origin}: not TOML: {error}") from error
 
 

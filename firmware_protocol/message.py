@@ -79,7 +79,8 @@ class Request(Message):
     """Host to controller."""
 
     IS_COMMAND: ClassVar[bool] = False
-    """Changes something, and travels with a `Stamp`: refused in another session, or after a later command."""
+    """Whether the request changes something. A command travels with a `Stamp`, and is refused in another session or
+    after a later command."""
 
 
 class Reply(Message):

@@ -17,7 +17,7 @@ from firmware_protocol.units import POSTURE_UNITS
 _TICK_AND_STATUS = 5
 """Bytes of a snapshot before its joints."""
 _SHORT_HELLO = 10
-"""Bytes of a greeting's answer in version 1, and where no session has begun."""
+"""Bytes of the reply to `Hello` in version 1, and where no session has begun."""
 
 
 @dataclass(frozen=True)
@@ -269,11 +269,5 @@ class Refused(Reply):
     reason: int
 
 
-REPLIES: dict[int, type[Reply]] = {
-    kind.OPCODE: kind
-    for kind in (
-        HelloReply, Block, BlockWritten, SetPointsTaken, Gains, GainsSet, ErrorsPositionsPowers, Snapshot, Stopped,
-        Released, Process, OutputsWritten, GripperSet, Status, Advanced, Refused,
-    )
-}  # fmt: skip
+REPLIES: dict[int, type[Reply]] = {kind.OPCODE: kind for kind in Reply.__subclasses__()}
 """Every reply by its opcode."""

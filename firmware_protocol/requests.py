@@ -20,7 +20,7 @@ from firmware_protocol.stamp import STAMP_BYTES
 from firmware_protocol.units import GAIN_MAX, POSTURE_UNITS
 
 AFTER_NEWEST = 0xFFFFFFFF
-"""SAMPLE(after=AFTER_NEWEST) waits for the next snapshot to be made, whatever has been seen."""
+"""`Sample(after=AFTER_NEWEST)` waits for the next snapshot, whichever ones have been delivered."""
 MAX_READ = MAX_PAYLOAD
 """Most bytes that one `ReadBlock` asks for."""
 MAX_WRITE = MAX_PAYLOAD - STAMP_BYTES - 2
@@ -53,7 +53,7 @@ class Hello(Request):
 
     @classmethod
     def parse(cls, payload: bytes) -> Self:
-        """Of another version's greeting only the version is read. Raises PayloadLengthError."""
+        """Reads only the version from a `Hello` of another version. Raises PayloadLengthError."""
         if not payload:
             return cls(1, 0)
         if payload[0] != PROTOCOL_VERSION:
@@ -256,11 +256,5 @@ class Advance(Request):
     microseconds: int
 
 
-REQUESTS: dict[int, type[Request]] = {
-    kind.OPCODE: kind
-    for kind in (
-        Hello, ReadBlock, WriteBlock, WriteSetPoints, ReportGains, SetGains, ReportErrorsPositionsPowers, Sample,
-        Stop, Release, ReadProcess, WriteOutputs, SetGripper, ReadStatus, Advance,
-    )
-}  # fmt: skip
+REQUESTS: dict[int, type[Request]] = {kind.OPCODE: kind for kind in Request.__subclasses__()}
 """Every request by its opcode."""

@@ -14,7 +14,7 @@ _LAYOUT = struct.Struct("<II")
 STAMP_BYTES = _LAYOUT.size
 """Bytes at the beginning of a command's payload."""
 LARGEST_NUMBER = 0xFFFFFFFF
-"""Of a command in one session: 2.7 years of one command a period."""
+"""Largest number of a command in one session: enough for 2.7 years at one command a period."""
 
 
 @dataclass(frozen=True)
@@ -46,4 +46,4 @@ class Stamp:
 
 
 UNSTAMPED = Stamp(NO_SESSION, 0)
-"""Of a command that belongs to no session. Every bridge refuses it."""
+"""The stamp of a command that belongs to no session. Every bridge refuses it."""

@@ -1,4 +1,4 @@
-"""The control port's vocabulary: what a test, a benchmark or a person may ask of the mock behind the host's back.
+"""The commands of the control port, by which a test, a benchmark or a person controls the mock unseen by the host.
 
 One JSON object a line in, one a line out: `{"do": "counts"}` → `{"ok": true, …}`; what cannot be done is answered by
 `{"ok": false, "error": "…"}` and changes nothing.

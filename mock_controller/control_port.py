@@ -12,7 +12,7 @@ _LONGEST_LINE = 65536
 
 
 class ControlPort:
-    """Listens at HOST:PORT or unix:PATH. Raises PortError when that cannot be."""
+    """Listens at HOST:PORT or unix:PATH. Raises PortError for an address that cannot be used."""
 
     def __init__(self, address: str, execute: Callable[[bytes], bytes]) -> None:
         self._execute = execute
@@ -33,7 +33,7 @@ class ControlPort:
         return [self._listener.fileno(), *self._clients]
 
     def serve(self, readable: int) -> None:
-        """Does what a readable descriptor asks for."""
+        """Handles a readable descriptor."""
         if readable == self._listener.fileno():
             try:
                 client, _ = self._listener.accept()

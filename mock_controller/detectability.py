@@ -1,7 +1,7 @@
 """`python -m mock_controller.detectability SEED… --experiment FILE`: how well the effects of a secret arm can be seen.
 
 One line of JSON an arm: d′ of all its effects together and of each with the others acting, after a refit of the
-tolerance parameters. It tells what the seeds hide, and is for whoever scores answers. Exit code 2 for wrong options.
+tolerance parameters. It reveals what the seeds hide, and is meant for scoring answers. Exit code 2 for wrong options.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any, cast
 from mock_controller.board import default_board
 from mock_controller.hidden.arm import LOAD_KG, HiddenArm, Load, draw_arm, loaded
 from mock_controller.hidden.experiment import BUILT_IN, Experiment, read_experiment
-from mock_controller.hidden.separation import MOST_REFITS, Priors, Tangents, seen, separation, tangents
+from mock_controller.hidden.separation import MOST_REFITS, Priors, Tangents, modelled_readings, separation, tangents
 from mock_controller.plant import default_plant
 
 
@@ -54,7 +54,7 @@ def detectability(arm: HiddenArm, experiment: Experiment, known: Tangents, refit
     if not arm.effects:
         return {"seed": arm.seed, "load_kg": LOAD_KG[arm.load], "d_prime": 0.0, "effects": []}
     parts = arm.parts(plant, board)
-    present = seen(parts, experiment)
+    present = modelled_readings(parts, experiment)
     together = separation(parts, experiment, known, refits=refits if len(arm.effects) == 1 else 0, present=present)
     alone = (
         [together]

@@ -31,7 +31,7 @@ class Device:
     link: Link
     modifications: tuple[str, ...]
     keeps_secret: bool
-    """Whether the arm is one whose true state nobody may ask for."""
+    """Whether the true state of the arm is secret."""
 
 
 def build_device(options: Options, disconnect: Callable[[float], None]) -> Device:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from mock_controller.board.board import Board
 
 _HELD_US = 10
-"""How long the memory is held around the moment of a fetch."""
+"""Time (µs) for which the memory is held around the moment of a fetch."""
 
 
 class FaultyBoard:

@@ -23,9 +23,9 @@ from mock_controller.bridge.link import Link
 from mock_controller.bridge.pieces import PieceSplitter
 
 HOST_PATIENCE_US = 20_000
-"""How long the host is taken to wait for a reply that may still come: one control period."""
+"""Time (µs) that the host is assumed to wait for a reply: one control period."""
 SLICE_US = 500_000
-"""Board time after which long work is interrupted to look after the control port."""
+"""Board time (µs) after which long work is interrupted to serve the control port."""
 
 
 class LockStepPace:
@@ -40,7 +40,7 @@ class LockStepPace:
         self._patience_ends_us = 0
 
     def hang_up(self) -> None:
-        """The host is gone."""
+        """Handles the end of the connection."""
         self._splitter.reset()
         self._pieces.clear()
         self._in_turn = False
@@ -51,7 +51,7 @@ class LockStepPace:
         self._pieces.extend(self._splitter.feed(data))
 
     def timeout_s(self) -> float | None:
-        """How long there is nothing to do: not at all, or until the host speaks."""
+        """Time (s) until there is work: none, or until the host sends something."""
         return 0.0 if self._in_turn or self._pieces else None
 
     def work(self) -> bytes:

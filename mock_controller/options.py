@@ -1,4 +1,4 @@
-"""What the mock can be told when it is started: command line, or the same words in a TOML file."""
+"""Options of the mock: from the command line, or under the same names from a TOML file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Gain = Annotated[int, Field(ge=0, le=GAIN_MAX)]
 
 
 class OptionsError(ValueError):
-    """An option that cannot be; the message is one line that says which and what is allowed."""
+    """An invalid option; the message is one line that says which and what is allowed."""
 
 
 class Options(BaseModel):
@@ -106,7 +106,7 @@ def _numbers(text: str) -> list[str]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
+    """Reports errors in one line."""
 
     def error(self, message: str) -> Any:
         raise OptionsError(message)

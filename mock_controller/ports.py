@@ -13,7 +13,7 @@ from pathlib import Path
 
 _READ_SIZE = 65536
 UNSENT_LIMIT = 65536
-"""Bytes kept for a host that does not read; beyond that they are lost, as on a line without flow control."""
+"""Most bytes kept for a host that does not read; further ones are lost, as on a line without flow control."""
 
 
 class PortError(ValueError):
@@ -53,7 +53,7 @@ class Port(ABC):
 
     @abstractmethod
     def restore(self) -> None:
-        """The line is back. Raises PortError when the address is taken."""
+        """Restores the line. Raises PortError when the address is taken."""
 
     @property
     def waiting_to_write(self) -> list[int]:
@@ -184,7 +184,7 @@ class TcpPort(Port):
 
     def _accept(self, listener: socket.socket) -> None:
         if self._connection is not None and select.select([self._connection], [], [], 0)[0]:
-            return  # what is unread may be the end of the connection that is: the next one waits until it is read
+            return  # unread input may be the end of the present connection: the next one waits until it is read
         with contextlib.suppress(BlockingIOError, ConnectionError):
             connection, _ = listener.accept()
             if self._connection is not None:

@@ -28,7 +28,7 @@ class Provenance:
 
 
 class QuantityReader:
-    """Takes quantities out of one parsed data file; `finish` complains about what nobody asked for."""
+    """Takes quantities out of one parsed data file; `finish` refuses entries that were not taken."""
 
     def __init__(self, text: str, origin: str) -> None:
         self._origin = origin

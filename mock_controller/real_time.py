@@ -15,9 +15,9 @@ from mock_controller.board.board import Board
 from mock_controller.bridge.link import Link
 
 EVENTS_AT_ONCE = 6
-"""Most of the controller's events (three a period) that are simulated before the host is listened to again."""
+"""Most controller events (three a period) that are simulated before the host's input is read again."""
 LATE_US = 2_000
-"""A controller's event that is simulated so much after its moment counts as late."""
+"""Delay (µs) beyond which a simulated controller event counts as late."""
 
 
 @dataclass
@@ -41,7 +41,7 @@ class RealTimePace:
         self.lateness = Lateness()
 
     def hang_up(self) -> None:
-        """The host is gone."""
+        """Handles the end of the connection."""
         self._link.hang_up()
 
     def receive(self, data: bytes) -> None:

@@ -1,6 +1,6 @@
 """`python -m mock_controller.reveal SEED…`: what the arms of `--secret SEED` hide, one line of JSON each.
 
-For whoever scores answers, once they have been given. Exit code 2 for seeds that stand for no arm.
+For scoring answers after they have been given. Exit code 2 for seeds without a meaning.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ from mock_controller.real_time import RealTimePace
 
 _STDIN = 0
 _RETRY_S = 0.1
-"""Seconds between attempts to open again a port that somebody else has taken meanwhile."""
+"""Seconds between attempts to reopen a port that another program has taken meanwhile."""
 
 
 def _clock_us() -> int:
@@ -117,7 +117,7 @@ class Server:
         return True
 
     def _read(self, descriptor: int) -> None:
-        if descriptor not in self._port.watched:  # cut by the control port in this very turn
+        if descriptor not in self._port.watched:  # cut by the control port in this turn
             return
         data = self._port.read(descriptor)
         if data is None:

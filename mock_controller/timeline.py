@@ -6,7 +6,7 @@ from mock_controller.board.board import Board
 from mock_controller.faults.fault_set import FaultSet
 
 _BEFORE_PERIOD_US = 1
-"""How long before a period begins its faults are prepared."""
+"""Time (µs) before a period at which its faults are prepared."""
 
 
 class Timeline:

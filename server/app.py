@@ -10,9 +10,23 @@ from fastapi import APIRouter, FastAPI
 from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
 
-from server import description, problems
+from server import problems
 from server.access.gate import Gate
-from server.api import controller, experiments, jobs, live, presets, programs, queue, robots, system, teaching, traces
+from server.api import (
+    controller,
+    description,
+    experiments,
+    jobs,
+    live,
+    presets,
+    programs,
+    queue,
+    robots,
+    system,
+    teaching,
+    traces,
+)
+from server.api.state_metrics import StateMetrics
 from server.page import page_router
 from server.services import Services
 
@@ -27,6 +41,7 @@ def make_app(services: Services, gate: Gate) -> FastAPI:
     """The application over services that are not yet started, behind its gate."""
     app = bare_app(services)
     app.add_middleware(gate.middleware)
+    services.metrics.registry.register(StateMetrics(services))
     return app
 
 
@@ -37,13 +52,13 @@ def bare_app(services: Services | None) -> FastAPI:
     async def life(app: FastAPI) -> AsyncIterator[None]:
         assert services is not None
         app.state.services = services
-        for one in services.robots():
-            one.hub.open(lambda robot=one.robot: robot.experiment)  # type: ignore[misc]
+        for rig in services.robots():
+            rig.hub.open(lambda robot=rig.robot: robot.experiment)  # type: ignore[misc]
         await run_in_threadpool(services.start)
         yield
         await run_in_threadpool(services.close)
-        for one in services.robots():
-            await one.hub.close()
+        for rig in services.robots():
+            await rig.hub.close()
 
     app = FastAPI(
         title="MA2000 DAQ",

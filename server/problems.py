@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from daq.contracts.errors import DaqError
 from daq.contracts.service.problems import FieldProblem, ProblemDetails
 from daq.transport import PortBusyError
-from server.store.database_errors import BRING_BACK, DamagedError, advice_of, line_of
+from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of
 
 if TYPE_CHECKING:
     from fastapi import FastAPI, Request

@@ -13,11 +13,11 @@ import uvicorn
 from daq.config import Settings
 from daq.config.service import ServiceSettings
 from daq.contracts.errors import SpecError
+from server.access.connections import Connection
 from server.access.gate import Gate
 from server.access.origin import is_loopback
 from server.access.tokens import KnownTokens
 from server.app import make_app
-from server.connections import Connection
 from server.ending import EndInTime
 from server.listening import listening
 from server.services import Services
@@ -49,7 +49,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         except SpecError:
             services.close()
             raise
-        door.knows(services.tokens.callers())
+        door.set_tokens(services.tokens.callers())
         app = make_app(services, gate)
         config = uvicorn.Config(
             app,
@@ -69,8 +69,8 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         _connect(services, door, beside)
 
         def ending() -> None:
-            for one in services.robots():
-                one.hub.end_waiting()
+            for rig in services.robots():
+                rig.hub.end_waiting()
             services.uploads.close()
             services.motions.close()
 
@@ -95,7 +95,7 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
     known = KnownTokens(services.tokens, services.clock)
     names = tuple(name.lower() for name in section.names)
     metrics = services.metrics
-    return Gate(known, services.tickets, local, names, stop_port, metrics.request, metrics.refused)
+    return Gate(known, services.tickets, local, names, stop_port, metrics.count_request, metrics.count_refusal)
 
 
 def _is_open_here(section: ServiceSettings) -> bool:
@@ -123,12 +123,12 @@ def _connect(services: Services, door: StopDoor, listener: socket.socket) -> Non
     def stopped(news: Stopped) -> None:
         services.robot(news.robot).queue.stop_asked(news.actor)
         with suppress(RuntimeError):  # the service is ending, and writes nothing down any more
-            services.tell_later(news.robot, "stop", news.text, actor=news.actor)
+            services.record_event_later(news.robot, "stop", news.text, actor=news.actor)
 
     services.stop_port = listener.getsockname()[1]
     door.stopped = stopped
-    for one in services.robots():
-        one.robot.reached.append(lambda reach: door.owned(reach.robot, reach.owner, reach.terminal))
+    for rig in services.robots():
+        rig.robot.reached.append(lambda reach: door.set_owner(reach.robot, reach.owner, reach.terminal))
 
 
 class _Server(uvicorn.Server):

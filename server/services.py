@@ -20,6 +20,7 @@ from daq.contracts.errors import DaqError
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import EventMessage, JobMessage
+from daq.contracts.service.robot import RobotStatus
 from daq.trajectories import control_period
 from server.access.lanes import Lanes
 from server.access.tickets import Tickets
@@ -28,22 +29,22 @@ from server.bounded.messages import Limits
 from server.bounded.workers import Workers
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock, SystemClock
-from server.jobs.desk import JobDesk, JobParts
 from server.jobs.models import Models
+from server.jobs.service import JobContext, JobService
 from server.live.history import History
 from server.live.hub import Hub
-from server.metrics import Metrics
+from server.monitoring.metrics import Metrics
+from server.monitoring.readiness import Readiness
 from server.owner.messages import Answer, ArmReport, Opened, Report
 from server.problems import ProblemError, conflict, not_found
-from server.queue.desk import QueueDesk
-from server.queue.parts import QueueParts
-from server.readiness import Readiness
-from server.robot.control import ControlDesk
+from server.queue.context import QueueContext
+from server.queue.service import QueueService
+from server.robot.control import ControlService
 from server.robot.keeper import Keeper
 from server.robot.robot import Robot, RobotPlace
 from server.robot.status import status_of
-from server.robot.stop import StopDesk
-from server.robot.teaching import TeachingDesk, Word
+from server.robot.stop import StopService
+from server.robot.teaching import TeachingService, Word
 from server.store.engine import Store
 from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
@@ -65,14 +66,18 @@ class RobotServices:
 
     robot: Robot
     keeper: Keeper
-    stop: StopDesk
-    control: ControlDesk
-    queue: QueueDesk
+    stop: StopService
+    control: ControlService
+    queue: QueueService
     catalogue: Catalogue
-    teaching: TeachingDesk
+    teaching: TeachingService
     hub: Hub
-    jobs: JobDesk
+    jobs: JobService
     models: Models
+
+    def status(self) -> RobotStatus:
+        """The status of the robot now."""
+        return status_of(self.robot, self.control.status(), self.queue.status())
 
     def require_motion(self, lease: str | None) -> None:
         """Raises a 409 unless this lease has the control now, and with it the operator's word for a real arm."""
@@ -119,7 +124,6 @@ class Services:
         self.tickets = Tickets(self.clock)
         self._robots: dict[str, RobotServices] = {}
         self._robots = {settings.robot.name: self._make_robot(settings)}
-        self.metrics.look_at(self)
 
     def robots(self) -> list[RobotServices]:
         """All of them: one, for now."""
@@ -133,27 +137,27 @@ class Services:
 
     def start(self) -> None:
         """Traces into the catalogue, robots connected, queues begun."""
-        for one in self.robots():
-            found = one.catalogue.bring_up_to_date()
-            one.catalogue.clear_uploads()
-            log.info("catalogue of %s: %s new traces in %s", one.robot.name, found, one.catalogue.folder)
-            one.queue.start()
-            one.jobs.start()
-            one.keeper.start(connect=self.settings.server.connect_at_start)
+        for rig in self.robots():
+            found = rig.catalogue.bring_up_to_date()
+            rig.catalogue.clear_uploads()
+            log.info("catalogue of %s: %s new traces in %s", rig.robot.name, found, rig.catalogue.folder)
+            rig.queue.start()
+            rig.jobs.start()
+            rig.keeper.start(connect=self.settings.server.connect_at_start)
 
     def close(self) -> None:
         """Freezes what moves, closes traces, ends threads and processes. Within SHUTDOWN s; what is not done by then
         ends with this process."""
         self.end_processes()
         every = self.robots()
-        for one in every:
-            one.queue.take_no_more()  # first: the end of the connection is no reason to find the queue held
+        for rig in every:
+            rig.queue.take_no_more()  # first: the end of the connection is no reason to find the queue held
         _all_within(
             SHUTDOWN,
-            [partial(close, SHUTDOWN) for o in every for close in (o.keeper.close, o.queue.close, o.jobs.close)],
+            [partial(end, SHUTDOWN) for rig in every for end in (rig.keeper.close, rig.queue.close, rig.jobs.close)],
         )
         _all_within(
-            TIDYING, [self._later.shutdown, *(close for o in every for close in (o.control.close, o.stop.close))]
+            TIDYING, [self._later.shutdown, *(end for rig in every for end in (rig.control.close, rig.stop.close))]
         )
         self.store.close()
 
@@ -170,57 +174,61 @@ class Services:
             load_memory_map(settings.robot.memory_map)
             memory_map = settings.robot.memory_map.read_text("utf-8")
         robot = Robot(RobotPlace(name, settings.port, settings.machine(), folder, memory_map), self.clock)
-        control = ControlDesk(
+        control = ControlService(
             self.clock, lambda holder: self._lapsed(robot, holder), lambda holder: self._given_back(robot, holder)
         )
         catalogue = Catalogue(folder, name, self.traces, self.experiments, settings.traces.limits)
 
-        def told(kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
-            self.tell(name, kind, text, actor=actor, experiment=experiment)
+        def record_event(kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
+            self.record_event(name, kind, text, actor=actor, experiment=experiment)
 
         def recorded(answer: Answer) -> None:
             assert answer.finished is not None
             catalogue.add(Path(answer.finished.trace))
 
-        queue = QueueDesk(
-            QueueParts(
+        queue = QueueService(
+            QueueContext(
                 robot=robot,
                 control=control,
                 experiments=self.experiments,
                 schedules=self.schedules,
                 queues=QueueStore(self.store),
                 clock=self.clock,
-                told=told,
+                record_event=record_event,
                 recorded=recorded,
                 unfinished=lambda: self._take_in(catalogue),
                 unattended=settings.server.unattended,
             )
         )
 
-        def heard(report: Report) -> None:
+        def on_report(report: Report) -> None:
             if isinstance(report, Progress):
                 queue.progressed(report.fraction, report.text)
             elif isinstance(report, ArmReport):
-                queue.hear(report)
+                queue.on_arm_report(report)
             elif isinstance(report, Opened):
                 queue.connection_made()
             elif isinstance(report, EventHappened):
                 queue.wake()
 
-        robot.listeners.append(heard)
+        robot.listeners.append(on_report)
         robot.disconnected.append(queue.connection_ended)
         # After the loss of a process that wrote a trace, its part file is finished and found.
         robot.disconnected.append(lambda _why: self._take_in(catalogue))
-        teaching = TeachingDesk(robot, lambda line: self.tell_later(name, "teaching", line))
+        teaching = TeachingService(robot, lambda line: self.record_event_later(name, "teaching", line))
         history = History(len(robot.machine.joints), control_period(robot.machine), settings.server.history)
-        hub = Hub(self.clock, history, lambda: status_of(self._robots[name]))
-        robot.listeners.append(hub.hear)
-        robot.listeners.append(lambda report: self.metrics.hear(name, report))
+
+        def status() -> RobotStatus:
+            return self._robots[name].status()
+
+        hub = Hub(self.clock, history, status)
+        robot.listeners.append(hub.on_report)
+        robot.listeners.append(lambda report: self.metrics.count_report(name, report))
         robot.disconnected.append(lambda _why: hub.look())
-        stop = StopDesk(robot)
+        stop = StopService(robot)
         models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
-        jobs = JobDesk(
-            JobParts(
+        jobs = JobService(
+            JobContext(
                 robot=name,
                 machine=robot.machine,
                 folder=self.folder / "jobs",
@@ -234,7 +242,7 @@ class Services:
         )
         return RobotServices(robot, Keeper(robot), stop, control, queue, catalogue, teaching, hub, jobs, models)
 
-    def tell(
+    def record_event(
         self, robot: str, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None
     ) -> None:
         """Something that happened: into the log, the database, and to whoever listens.
@@ -242,38 +250,38 @@ class Services:
         Raises nothing where the database fails: what has happened has happened, and whoever asked for it is told so.
         """
         log.info("%s: %s: %s", robot, kind, text, extra={"actor": actor, "experiment": experiment})
-        self.metrics.told(robot, kind)
+        self.metrics.count_event(robot, kind)
         event: ServiceEvent | None = None
         try:
             event = self.events.add(robot, kind, text, self.clock.utc(), actor, experiment)
         except Exception:  # without its row it has no number, by which pages tell events apart: the log alone has it
             log.exception("%s: %s: could not be written", robot, kind)
-        one = self._robots.get(robot)
-        if one is not None:
+        rig = self._robots.get(robot)
+        if rig is not None:
             if event is not None:
-                one.hub.publish("events", EventMessage(event=event))
-            one.hub.look()
+                rig.hub.publish("events", EventMessage(event=event))
+            rig.hub.look()
 
     def _job_changed(self, hub: Hub, job: Job) -> None:
-        self.metrics.job(job)
+        self.metrics.count_job(job)
         hub.publish("jobs", JobMessage(job=job))
 
-    def tell_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:
+    def record_event_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:
         """The same, for whoever must not wait for a disk."""
-        self._later.submit(self.tell, robot, kind, text, actor=actor)
+        self._later.submit(self.record_event, robot, kind, text, actor=actor)
 
     def _lapsed(self, robot: Robot, holder: str) -> None:
         """A client went silent: the arm holds, and the queue waits for a person."""
-        one = self._robots.get(robot.name)
-        if one is not None:
-            one.queue.control_lapsed(holder)
-            one.teaching.hold()
-        self.tell(robot.name, "control", f"{holder} lost control: the arm holds its posture", actor=holder)
+        rig = self._robots.get(robot.name)
+        if rig is not None:
+            rig.queue.control_lapsed(holder)
+            rig.teaching.hold()
+        self.record_event(robot.name, "control", f"{holder} lost control: the arm holds its posture", actor=holder)
 
     def _given_back(self, robot: Robot, holder: str) -> None:
-        one = self._robots.get(robot.name)
-        if one is not None:
-            one.queue.control_given_back(holder)
+        rig = self._robots.get(robot.name)
+        if rig is not None:
+            rig.queue.control_given_back(holder)
 
     def _take_in(self, catalogue: Catalogue) -> None:
         try:

@@ -23,20 +23,25 @@ def mark_this_process() -> None:
 
 @dataclass(frozen=True)
 class Running:
-    """The threads and the ids of the processes of this test run, at one moment."""
+    """The threads of this process, and the ids of processes, at one moment.
+
+    Taking one lists the ids of all processes of the machine and reads nothing about them: it is done twice a test.
+    Only a difference knows which of them belong to this test run.
+    """
 
     threads: frozenset[threading.Thread]
     processes: frozenset[int]
 
     @classmethod
     def now(cls) -> "Running":
-        return cls(frozenset(threading.enumerate()), frozenset(_marked_processes() | _forked_processes()))
+        return cls(frozenset(threading.enumerate()), frozenset(_processes()))
 
     def __sub__(self, earlier: "Running") -> "Running":
-        """What was not there earlier, and was not begun by what was: a service that several tests share may begin
-        processes of its own, which the end of the tests looks for."""
-        begun = {process for process in self.processes if _parent(process) not in earlier.processes}
-        return Running(self.threads - earlier.threads, frozenset(begun - earlier.processes))
+        """What of this test run was not there earlier, and was not begun by what was: a service that several tests
+        share may begin processes of its own, which the end of the tests looks for."""
+        new = {process for process in self.processes - earlier.processes if _is_of_this_run(process)}
+        begun = {process for process in new if not _shared(_parent(process), earlier)}
+        return Running(self.threads - earlier.threads, frozenset(begun))
 
     def __bool__(self) -> bool:
         return bool(self.threads or self.processes)
@@ -48,8 +53,8 @@ class Running:
             thread.join(max(0.0, deadline - time.monotonic()))
         for process in self.processes:
             _wait_for_end(process, max(0.0, deadline - time.monotonic()))
-        still = Running.now()
-        return Running(self.threads & still.threads, self.processes & still.processes)
+        running = {process for process in self.processes if _is_of_this_run(process)}  # one that has ended has no mark
+        return Running(self.threads & frozenset(threading.enumerate()), frozenset(running))
 
     def kill_processes(self) -> None:
         """End the processes, so that a test that failed for leaving them does not disturb the next."""
@@ -65,19 +70,28 @@ class Running:
         return ", ".join(sorted(lines))
 
 
-def _marked_processes() -> set[int]:
-    mark = f"{MARK}={os.getpid()}\0".encode()
-    found = set()
-    for entry in os.scandir("/proc"):
-        if not entry.name.isdigit():
-            continue
-        try:
-            environment = Path(entry.path, "environ").read_bytes()
-        except OSError:  # it has ended meanwhile, or belongs to another user
-            continue
-        if mark in environment and not _serves_multiprocessing(entry.name):
-            found.add(int(entry.name))
-    return found - {os.getpid()}
+def _processes() -> set[int]:
+    """Ids of all processes of this machine."""
+    return {int(name) for name in os.listdir("/proc") if name.isdigit()}
+
+
+def _is_marked(process: int) -> bool:
+    """Whether a process carries the mark of this test run and is not a helper of the standard library."""
+    try:
+        environment = Path(f"/proc/{process}/environ").read_bytes()
+    except OSError:  # it has ended meanwhile, or belongs to another user
+        return False
+    return f"{MARK}={os.getpid()}\0".encode() in environment and not _serves_multiprocessing(process)
+
+
+def _is_of_this_run(process: int) -> bool:
+    """Whether this test run, or a program that it started, has begun a process."""
+    return _is_marked(process) or process in _forked_processes()
+
+
+def _shared(parent: int, earlier: Running) -> bool:
+    """Whether a parent is a process of this test run that was there earlier."""
+    return parent in earlier.processes and parent != os.getpid() and _is_of_this_run(parent)
 
 
 def _forked_processes() -> set[int]:

@@ -8,8 +8,8 @@ python -m benchmarks.golden NAME…          only questions whose name begins so
 from __future__ import annotations
 
 import argparse
-import gzip
 import json
+import lzma
 import subprocess
 import sys
 import time
@@ -25,7 +25,7 @@ from benchmarks.golden.records import ask, record_all_rigs, record_arm
 
 PLACE = EXAMPLES.parent / ".golden"
 """Where the records are kept between runs; git ignores it."""
-KEPT = Path(__file__).parent / "recorded.json.gz"
+KEPT = Path(__file__).parent / "recorded.json.xz"
 SHOWN = 12
 """Differences of one answer that are printed."""
 Answers = dict[str, dict[str, Leaf]]
@@ -38,7 +38,7 @@ def main() -> int:
     parser.add_argument("--record", action="store_true")
     parser.add_argument("--processes", type=int, default=2)
     given = parser.parse_args()
-    kept: Answers = json.loads(gzip.decompress(KEPT.read_bytes())) if KEPT.exists() else {}
+    kept: Answers = json.loads(lzma.decompress(KEPT.read_bytes())) if KEPT.exists() else {}
     begun, found = time.monotonic(), {}
     with ThreadPoolExecutor(given.processes) as pool:
         record_all_rigs(PLACE)
@@ -57,7 +57,8 @@ def main() -> int:
                 found[name] = answer
                 print(_told(name, kept, answer, given.record), flush=True)
     if given.record:
-        KEPT.write_bytes(gzip.compress(json.dumps({**kept, **found}, sort_keys=True, indent=0).encode(), mtime=0))
+        answers = json.dumps({**kept, **found}, sort_keys=True, indent=0)
+        KEPT.write_bytes(lzma.compress(answers.encode(), preset=9))
         values = sum(map(len, found.values()))
         print(f"recorded {len(found)} answers, {values} values, in {time.monotonic() - begun:.0f} s")
         return 0

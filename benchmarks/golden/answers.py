@@ -7,11 +7,11 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-TIMES = frozenset({"seconds", "created", "duration_s", "age", "time_s", "software", "elapsed"})
+TIMES = frozenset({"seconds", "created", "duration_s", "age", "time_s", "software", "elapsed", "utc"})
 PROSE = frozenset(
     {"description", "summary", "title", "reason", "note", "notes", "text", "rejected_because", "why", "words"}
 )
-RANDOM = re.compile(r"\b([0-9a-f]{6,64}|\d{4}-\d\d-\d\dT[0-9:.\-]+Z?)\b|/\S+/")
+RANDOM = re.compile(r"\b([0-9a-f]{6,64}|\d{4}-\d\d-\d\dT[0-9:.\-]+Z?)\b|\S+\.mcap|/\S+/")
 
 Leaf = str | int | float | bool | None
 
@@ -28,7 +28,7 @@ def leaves(answer: Any, path: str = "") -> Iterator[tuple[str, Leaf]]:
         for number, value in enumerate(answer):
             yield from leaves(value, f"{path}[{number}]")
     elif isinstance(answer, str):
-        # Whatever has a space in it is prose: it may be put in better words.
+        # Text with a space is prose, whose wording may change.
         if " " not in answer:
             yield path, RANDOM.sub("*", answer)
     else:
@@ -59,5 +59,5 @@ def differences(recorded: dict[str, Leaf], found: dict[str, Leaf]) -> list[str]:
 
 
 def _same(one: Leaf, other: Leaf) -> bool:
-    """To the digit; not-a-number is the same as itself, and 1 is not the same as 1.0 or true."""
+    """Whether two values agree to the digit; NaN equals itself, and 1 differs from 1.0 and from true."""
     return repr(one) == repr(other)

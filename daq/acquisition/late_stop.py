@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from daq.driver import Controller
 from daq.link import LinkError
-from daq.runner.arm_control import told
+from daq.runner.arm_control import stop_line
 
 
 @dataclass(frozen=True)
@@ -41,4 +41,4 @@ def deliver_late_stop(controller: Controller, window: float, sleep: Callable[[fl
         controller.link.reconnect(_UntilClosed(begun + window, sleep))
     except LinkError as error:
         return f"the link did not come back within {window:g} s ({error}): the arm holds its last set point"
-    return f"the link came back after {time.monotonic() - begun:.1f} s: {told(controller.stop())}"
+    return f"the link came back after {time.monotonic() - begun:.1f} s: {stop_line(controller.stop())}"

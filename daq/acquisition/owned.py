@@ -1,68 +1,47 @@
-"""A robot held by this process itself, for work that a person leads: teaching. Stoppable like any run."""
+"""A robot held by this process itself, for work that a person leads: teaching. It can be stopped like any run."""
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 
-from daq.acquisition.freezer import Freezer
-from daq.acquisition.guardian import Guardian
-from daq.acquisition.stop_socket import stop_listener
-from daq.contracts.errors import SafetyError
+from daq.acquisition.session import PortSession, port_session
 from daq.driver import Controller
-from daq.runner import ArmControl, Consent, MissingConsentError, StoppedError
-from firmware_protocol.commands import StatusFlag
+from daq.runner import ArmControl, Consent, StoppedError, require_not_stopped
 from firmware_protocol.memory_map import MemoryMap
 
 
 @dataclass(frozen=True)
 class OwnedRobot:
-    """A greeted controller, its state, and who may end the work from outside."""
+    """The session that holds the port, and the arm's state."""
 
-    controller: Controller
+    session: PortSession[Controller]
     control: ArmControl
-    guardian: Guardian
+
+    @property
+    def controller(self) -> Controller:
+        """The greeted controller."""
+        return self.session.controller
 
     def ended(self) -> str | None:
-        """Why somebody wants the end: `daq stop`, a signal; None while nobody does."""
-        return None if self.guardian.cause is None else self.guardian.cause.value
+        """Why somebody wants the end of the work: `daq stop`, a signal; None while nobody does."""
+        return self.session.ended()
 
 
 @contextmanager
 def owned_robot(robot: str, url: str, memory_map: MemoryMap, consent: Consent) -> Iterator[OwnedRobot]:
-    """The robot at `url`, with a stop socket and signals listened to. Enter on the main thread.
+    """The robot at `url`, held by this process. Enter on the main thread.
 
-    Raises MissingConsentError for a real arm nobody has agreed to move, SafetyError for one that has been stopped,
+    Raises MissingConsentError for a real arm that nobody has agreed to move, SafetyError for one that has been stopped,
     StoppedError when a stop came before it was reached, LinkError. Whatever ends the block early freezes the arm.
     """
-    with (
-        ExitStack() as closed_last,
-        Freezer(robot, url) as freezer,
-        stop_listener(robot) as listener,
-        Guardian(listener, None, freezer.freeze) as guardian,
-    ):
-        closed_last.enter_context(_stopped_by_ctrl_z())
-        controller = closed_last.enter_context(Controller.connect(url, memory_map))
-        if not controller.identity.simulated and not consent.moves_real_arm:
-            raise MissingConsentError(f"{url} is a real arm: it moves only with the operator's consent (--yes)")
-        if StatusFlag.FROZEN in controller.status().flags:
-            raise SafetyError("the arm has been stopped and holds its posture; `daq reset` ends that")
-        control = freezer.control = ArmControl(controller)
-        if guardian.cause is not None:
-            control.stop(guardian.cause.value)
-            raise StoppedError(f"the arm has been stopped: {guardian.cause.value}")
+    with port_session(Controller.connect, robot, url, memory_map, ctrl_z_stops=True) as session:
+        consent.require(session.controller)
+        require_not_stopped(session.controller)
+        control = session.take_control()
+        if (cause := session.ended()) is not None:
+            control.stop(cause)
+            raise StoppedError(f"the arm has been stopped: {cause}")
         with control.frozen_on_error():
-            yield OwnedRobot(controller, control, guardian)
-
-
-@contextmanager
-def _stopped_by_ctrl_z() -> Iterator[None]:
-    """Ctrl-Z stops the arm like Ctrl-C: put aside, this process could not be asked for a stop. With a handler of
-    Python's own the guardian hears of it."""
-    before = signal.signal(signal.SIGTSTP, lambda _number, _frame: None)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTSTP, before)
+            yield OwnedRobot(session, control)

@@ -22,9 +22,14 @@ def stop_at_port(robot: str, url: str) -> StopAnswer:
     except DaqError as error:
         return StopAnswer(robot=robot, port=url, delivered=False, confirmed=False, text=str(error))
     return StopAnswer(
-        robot=robot, port=url, delivered=True, confirmed=True, tick=stopped.tick, postures=tuple(stopped.postures),
+        robot=robot,
+        port=url,
+        delivered=True,
+        confirmed=True,
+        tick=stopped.tick,
+        postures=tuple(stopped.postures),
         text=limp,
-    )  # fmt: skip
+    )
 
 
 def _limp(link: Link) -> str:

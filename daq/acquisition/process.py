@@ -3,36 +3,29 @@
 from __future__ import annotations
 
 import sys
-from contextlib import ExitStack
 from dataclasses import replace
 
-from daq.acquisition.freezer import Freezer
-from daq.acquisition.guardian import EndCause, Guardian
+from daq.acquisition.guardian import EndCause
 from daq.acquisition.job_input import read_job
 from daq.acquisition.late_stop import deliver_late_stop
 from daq.acquisition.messages import Failed, Finished, Job
+from daq.acquisition.session import port_session
 from daq.acquisition.speaker import Speaker
-from daq.acquisition.stop_socket import stop_listener
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.driver import Controller
 from daq.link import LinkState
 from daq.runner import (
-    ArmControl,
-    Arrangement,
     Consent,
     MissingConsentError,
-    Outside,
     RunResult,
+    RunSetup,
     StoppedError,
+    StopRequests,
     run_experiment,
 )
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.memory_map import default_memory_map, parse_memory_map
-
-EXIT_CODES = {"complete": 0, "fault": 5, "interrupted": 5, "stopped": 6}
-EXIT_PROGRAM_FAULT = 1
-EXIT_WRONG_INPUT = 2
-EXIT_INTERRUPTED = 130
 
 
 def main() -> int:
@@ -50,13 +43,13 @@ def main() -> int:
             speaker.ended(Failed(message=str(error), exit_code=error.exit_code, needs_consent=needs_consent))
             return error.exit_code
         except ProtocolError as error:
-            speaker.ended(Failed(message=str(error), exit_code=EXIT_WRONG_INPUT))
-            return EXIT_WRONG_INPUT
+            speaker.ended(Failed(message=str(error), exit_code=exit_codes.WRONG_INPUT))
+            return exit_codes.WRONG_INPUT
         except KeyboardInterrupt:
-            return EXIT_INTERRUPTED
+            return exit_codes.INTERRUPTED
         except BaseException as error:
             line = f"program fault: {type(error).__name__}: {error}"
-            speaker.ended(Failed(message=line, exit_code=EXIT_PROGRAM_FAULT))
+            speaker.ended(Failed(message=line, exit_code=exit_codes.PROGRAM_FAULT))
             raise
         speaker.ended(
             Finished(
@@ -68,35 +61,20 @@ def main() -> int:
                 reason=result.reason,
             )
         )
-    return EXIT_CODES[result.outcome]
+    return exit_codes.OF_OUTCOME[result.outcome]
 
 
 def run_job(job: Job, speaker: Speaker) -> RunResult:
-    """Listens for stop, opens the port, runs. Raises DaqError, ProtocolError.
-
-    The guardian listens before the port is opened, and no longer when the port is closed: a stop that comes later
-    finds nobody here, and opens the port itself.
-    """
+    """Holds the port, and runs. Raises DaqError, ProtocolError."""
     memory_map = default_memory_map() if job.memory_map is None else parse_memory_map(job.memory_map)
-    with (
-        ExitStack() as closed_last,
-        Freezer(job.robot, job.url) as freezer,
-        stop_listener(job.robot) as listener,
-        Guardian(listener, sys.stdin.fileno(), freezer.freeze) as guardian,
-    ):
-        controller = closed_last.enter_context(Controller.connect(job.url, memory_map))
-        control = freezer.control = ArmControl(controller)
-        if guardian.cause is not None:
+    with port_session(Controller.connect, job.robot, job.url, memory_map, parent=sys.stdin.fileno()) as session:
+        controller, control = session.controller, session.take_control()
+        if (cause := session.ended()) is not None:
             # It came while there was nothing to freeze. Now there is.
-            control.stop(guardian.cause.value)
-            raise StoppedError(f"{guardian.cause.value} before it began; nothing moved")
-        outside = Outside(
-            ended=lambda: None if guardian.cause is None else guardian.cause.value,
-            interrupted=lambda: guardian.cause is EndCause.ORPHANED,
-        )
-        run = Arrangement(
-            controller, control, job.spec, job.machine, job.limits, job.folder, speaker, outside, job.robot
-        )
+            control.stop(cause)
+            raise StoppedError(f"{cause} before it began; nothing moved")
+        requests = StopRequests(ended=session.ended, interrupted=lambda: session.guardian.cause is EndCause.ORPHANED)
+        run = RunSetup(controller, control, job.spec, job.machine, job.limits, job.folder, speaker, requests, job.robot)
         result = run_experiment(run, Consent(job.moves_real_arm))
         if controller.link.state is LinkState.LOST and controller.link.control is None:
             # A mock of our own has gone for good; anything else may come back.

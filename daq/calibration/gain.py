@@ -21,9 +21,9 @@ from daq.contracts.trace import Floats, Integers, Trace
 from firmware_protocol.units import DAC_MAX
 
 FEWEST_ERRORS = 3
-"""Different magnitudes of error that an estimate needs: a choice."""
+"""Least number of different error magnitudes for an estimate: a choice."""
 WIDEST = 0.1
-"""Half the width of the interval of possible gains, over the gain, above which the data cannot tell: a choice."""
+"""Largest relative half-width of the interval of possible gains for which an estimate is given: a choice."""
 ROUNDING = 1 / math.sqrt(12)
 """Standard deviation of a rounding error spread evenly over one count; scatter is never taken to be less."""
 

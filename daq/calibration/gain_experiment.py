@@ -12,7 +12,7 @@ STEPS = (1.0, 2.0, 3.0)
 """Steps at each posture, up and down, in degrees: choices. On a major axis 3° are 46 ADC counts, below the 63.5 at
 which P = 2 saturates the DAC."""
 DWELL = 0.5
-"""Time (s) after each step."""
+"""Time (s) held after each step."""
 TRAVEL = 1.5
 """Time (s) from posture to posture."""
 

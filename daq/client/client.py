@@ -19,7 +19,7 @@ class Client:
 
     url:      as `daq serve` tells it, such as http://127.0.0.1:8300
     token:    as `daq token add` shows it; None at loopback
-    stop_url: of the stop listener, where it is not at the port after the service's (behind a proxy)
+    stop_url: address of the stop listener, where it is not at the port after the service's (behind a proxy)
     """
 
     def __init__(self, url: str, token: str | None = None, *, stop_url: str | None = None) -> None:
@@ -41,11 +41,11 @@ class Client:
 
     @property
     def url(self) -> str:
-        """Of the service."""
+        """Address of the service."""
         return self._connection.url
 
     def me(self) -> Me:
-        """Who the service takes this client for."""
+        """This client as the service identified it."""
         return self._connection.get(Me, "me")
 
     def system(self) -> SystemStatus:

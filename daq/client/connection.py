@@ -21,17 +21,17 @@ from daq.contracts.service.problems import ProblemDetails
 
 API = "/api/v1"
 CONNECT_WITHIN = 5.0
-"""s for a connection to be made."""
+"""Time-out (s) for connecting."""
 ANSWER_WITHIN = 30.0
-"""s for an answer to begin, beyond what the request itself says it may wait."""
+"""Time-out (s) until an answer begins, beyond the time that the request itself allows."""
 PAUSES = (0.2, 0.5, 1.0)
-"""s before a request that changes nothing is sent a second, third and fourth time."""
+"""Pauses (s) before a request that changes nothing is sent a second, third and fourth time."""
 LONGEST_PAUSE = 5.0
-"""s of `Retry-After` that are waited for; a service that asks for more is told about."""
+"""Longest `Retry-After` (s) that is waited for; beyond it the refusal is reported."""
 PART = 65536
-"""Bytes written at once of a file that comes."""
+"""Size (bytes) of the parts in which a download is written."""
 TOKEN = re.compile(r"[!-~]+")
-"""What a header can carry."""
+"""Characters of a token that an HTTP header can carry."""
 T = TypeVar("T")
 Query = Mapping[str, Any]
 
@@ -85,7 +85,7 @@ class Connection:
         """The answer to a request. Raises ServiceError, ServiceNotReachedError."""
         response = self._sent(request)
         try:
-            # A newer service may say more than this client knows of.
+            # A newer service may send fields that this client does not know.
             adapter: TypeAdapter[T] = _adapter(cast(Any, answer))
             return adapter.validate_json(response.content, extra="ignore")
         except ValidationError as error:

@@ -21,7 +21,7 @@ from daq.contracts.word import require_word
 HEADER = "Control-Lease"
 T = TypeVar("T")
 JOIN_WITHIN = 10.0
-"""s for the thread of heartbeats to end."""
+"""Time (s) allowed for the heartbeat thread to end."""
 
 
 class ControlLostError(DaqError):

@@ -1,4 +1,4 @@
-"""What goes wrong between a client and the service: each error one line, with what to do."""
+"""Errors between a client and the service: one line each, with advice."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ServiceError(DaqError):
 
     @property
     def status(self) -> int:
-        """Of HTTP."""
+        """Status code of the HTTP response."""
         return self.problem.status
 
 

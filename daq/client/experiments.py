@@ -24,7 +24,7 @@ from daq.contracts.service.queue import QueueResume, QueueStatus
 from daq.contracts.word import require_word
 
 WAIT = 30.0
-"""s that one question about the end of something waits at the service."""
+"""Time (s) that one request for the end of an experiment waits at the service."""
 
 
 def new_key() -> str:
@@ -33,7 +33,7 @@ def new_key() -> str:
 
 
 class Experiments:
-    """What has been, is, and will be run."""
+    """Past, running and waiting experiments."""
 
     def __init__(self, connection: Connection, robot: str) -> None:
         self._connection = connection
@@ -53,7 +53,7 @@ class Experiments:
         return self._connection.ask(MotionPreview, Request("POST", f"{self._path}/preview", body, repeatable=True))
 
     def get(self, experiment: str, wait: float = 0.0) -> Experiment:
-        """One of them, as it is now; with `wait` as it is at its end, or after so many s (60 at most)."""
+        """The present state of an experiment; with `wait` (s, at most 60) its state at its end or after that time."""
         path = f"{self._path}/{experiment}"
         return self._connection.get(Experiment, path, wait=wait or None, patience=wait)
 
@@ -75,11 +75,12 @@ class Experiments:
                 raise TimeoutError(f"experiment {experiment} is {found.state} after {seconds:g} s")
 
     def cancel(self, experiment: str, *, within: float | None = None) -> Experiment:
-        """Takes back what waits; stops the arm where it runs, which needs a reset then. `within`: s for the answer."""
+        """Withdraws a waiting experiment; for a running one it stops the arm, which then needs a reset. `within`: s for
+        the answer."""
         return self._connection.ask(Experiment, Request("POST", f"{self._path}/{experiment}/cancel", within=within))
 
     def set_priority(self, experiment: str, priority: int) -> Experiment:
-        """Of one that waits; higher goes first."""
+        """Sets the priority of a waiting experiment; higher goes first."""
         body = ExperimentChange(priority=priority)
         return self._connection.ask(Experiment, Request("PATCH", f"{self._path}/{experiment}", body))
 
@@ -100,16 +101,16 @@ class Queue:
         return self._connection.get(tuple[Experiment, ...], f"{self._path}/experiments")
 
     def pause(self) -> QueueStatus:
-        """Lets no other experiment begin."""
+        """Keeps further experiments from starting."""
         return self._connection.ask(QueueStatus, Request("POST", f"{self._path}/pause"))
 
     def resume(self, *, moves_real_arm: bool = False) -> QueueStatus:
-        """The operator's word that the queue may move the arm."""
+        """Gives the operator's consent that the queue may move the arm."""
         body = QueueResume(moves_real_arm=require_word(moves_real_arm))
         return self._connection.ask(QueueStatus, Request("POST", f"{self._path}/resume", body))
 
     def attend(self, *, within: float | None = None) -> QueueStatus:
-        """The operator's word to be there, for a minute more; with `within` (s for the answer) said once."""
+        """Confirms that an operator is present for the next 60 s; with `within` (s for the answer) sent only once."""
         request = Request("POST", f"{self._path}/attend", repeatable=within is None, within=within)
         return self._connection.ask(QueueStatus, request)
 
@@ -143,11 +144,11 @@ class Schedules:
         return self._connection.every(Schedule, self._path)
 
     def switch(self, schedule: str, *, active: bool) -> Schedule:
-        """On or off."""
+        """Switches a schedule on or off."""
         return self._connection.ask(
             Schedule, Request("PATCH", f"{self._path}/{schedule}", ScheduleChange(active=active))
         )
 
     def delete(self, schedule: str) -> None:
-        """Takes it away; what it submitted stays."""
+        """Deletes a schedule; the experiments that it submitted stay."""
         self._connection.do(Request("DELETE", f"{self._path}/{schedule}"))

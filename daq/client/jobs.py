@@ -36,7 +36,7 @@ class Jobs:
         return self._connection.ask(Job, Request("POST", self._path, request, headers=headers, repeatable=True))
 
     def get(self, job: str) -> Job:
-        """One of them, as it is now."""
+        """The present state of a job."""
         return self._connection.get(Job, f"{self._path}/{job}")
 
     def list(self, *states: JobState, kind: JobKind | None = None) -> Iterator[Job]:
@@ -44,9 +44,13 @@ class Jobs:
         return self._connection.every(Job, self._path, state=states or None, kind=kind)
 
     def wait(
-        self, job: str, told: Callable[[Job], None] | None = None, clock: Callable[[], float] = time.monotonic,
-        seconds: float | None = None, look_every: float = WAIT,
-    ) -> Job:  # fmt: skip
+        self,
+        job: str,
+        told: Callable[[Job], None] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        seconds: float | None = None,
+        look_every: float = WAIT,
+    ) -> Job:
         """Waits until it has ended; `told` is called with it at least every `look_every` s.
 
         Raises TimeoutError after `seconds`; it goes on then.
@@ -63,15 +67,15 @@ class Jobs:
                 raise TimeoutError(f"job {job} is {found.state} after {seconds:g} s")
 
     def cancel(self, job: str) -> Job:
-        """Takes back what waits; asks what runs to end."""
+        """Withdraws a waiting job; asks a running one to end."""
         return self._connection.ask(Job, Request("POST", f"{self._path}/{job}/cancel"))
 
     def result(self, job: str) -> dict[str, Any]:
-        """What it found, once it is done: by kind of job as the OpenAPI description of the service says."""
+        """The result of a finished job; the OpenAPI description of the service gives its form by kind of job."""
         return self._connection.get(dict[str, Any], f"{self._path}/{job}/result")
 
     def download_report(self, job: str, target: Path) -> Path:
-        """Its report: one page. Raises SpecError when it cannot be written."""
+        """Downloads a job's report, one page. Raises SpecError when it cannot be written."""
         return _written(self._connection, f"{self._path}/{job}/report.html", target)
 
     def delete(self, job: str) -> None:
@@ -91,11 +95,11 @@ class Models:
         return self._connection.every(ModelEntry, self._path)
 
     def get(self, model: str) -> ModelDetails:
-        """Its effects, its parameters, the models that it comes from."""
+        """A model's effects, parameters and ancestors."""
         return self._connection.get(ModelDetails, f"{self._path}/{model}")
 
     def machine_parameters(self) -> Sequence[ModelParameter]:
-        """Of the model that the machine file describes (`machine` in requests)."""
+        """Parameters of the model that the machine file describes (`machine` in requests)."""
         return self._connection.get(tuple[ModelParameter, ...], f"{self._path}/machine/parameters")
 
     def upload(self, file: Path, name: str | None = None) -> ModelEntry:
@@ -108,13 +112,17 @@ class Models:
         except OSError as error:
             raise SpecError(f"model {file}: cannot be read: {error.strerror or error}") from error
         request = Request(
-            "POST", self._path, content=content, query={"name": name or Path(file).stem},
-            headers={"Content-Type": "application/json"}, repeatable=True,
-        )  # fmt: skip
+            "POST",
+            self._path,
+            content=content,
+            query={"name": name or Path(file).stem},
+            headers={"Content-Type": "application/json"},
+            repeatable=True,
+        )
         return self._connection.ask(ModelEntry, request)
 
     def download(self, model: str, target: Path) -> Path:
-        """Its file, for `daq validate` and the like. Raises SpecError when it cannot be written."""
+        """Downloads a model's file, for `daq validate` and the like. Raises SpecError when it cannot be written."""
         return _written(self._connection, f"{self._path}/{model}/model.json", target)
 
     def change(self, model: str, *, name: str | None = None, notes: str | None = None) -> ModelEntry:
@@ -123,7 +131,7 @@ class Models:
         return self._connection.ask(ModelEntry, Request("PATCH", f"{self._path}/{model}", body))
 
     def delete(self, model: str) -> None:
-        """For good. Refused while another model comes from it."""
+        """Deletes a model for good. Refused while another model derives from it."""
         self._connection.do(Request("DELETE", f"{self._path}/{model}"))
 
 

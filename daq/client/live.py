@@ -18,7 +18,7 @@ from daq.client.errors import ServiceNotReachedError
 from daq.contracts.service.live import LiveFrame, LiveMessage, LiveRequest, SampleRate, Topic
 
 LARGEST_FRAME = 64 << 20
-"""Bytes: the history of an hour."""
+"""Size limit (bytes) of a frame: the history of an hour fits."""
 CLOSE_WITHIN = 2.0
 _FRAME: TypeAdapter[LiveFrame] = TypeAdapter(LiveFrame)
 
@@ -27,17 +27,22 @@ class LiveStream:
     """An open stream. Iterate over it for frames; `next_frame` waits no longer than it is told."""
 
     def __init__(self, connection: Connection, robot: str) -> None:
-        """Raises ServiceNotReachedError, also when the service lets this client not in."""
+        """Raises ServiceNotReachedError, also when the service refuses this client."""
         self._url = f"{_websocket(connection.url)}{API}/{robot}/live"
         self._closed_last = ExitStack()
         headers = {} if connection.token is None else {"Authorization": f"Bearer {connection.token}"}
         try:
             self._socket: ClientConnection = self._closed_last.enter_context(
                 connect(
-                    self._url, additional_headers=headers, open_timeout=CONNECT_WITHIN, close_timeout=CLOSE_WITHIN,
-                    max_size=LARGEST_FRAME, compression=None, proxy=proxy_to(connection.url),
+                    self._url,
+                    additional_headers=headers,
+                    open_timeout=CONNECT_WITHIN,
+                    close_timeout=CLOSE_WITHIN,
+                    max_size=LARGEST_FRAME,
+                    compression=None,
+                    proxy=proxy_to(connection.url),
                 )
-            )  # fmt: skip
+            )
         except (OSError, InvalidHandshake, InvalidProxy, InvalidURI, TimeoutError) as error:
             raise ServiceNotReachedError(f"{self._url}: no stream: {error or 'no answer in time'}") from error
 
@@ -56,11 +61,11 @@ class LiveStream:
     def subscribe(
         self, *topics: Topic, rate: SampleRate | None = None, history: float | None = None, points: int = 1000
     ) -> None:
-        """From now on also these topics; `rate` samples a second; `history` s of samples at once, in about `points`."""
+        """Subscribes to further topics; `rate` samples a second; `history` s of samples at once, in about `points`."""
         self.send(LiveRequest(subscribe=topics, rate=rate, history=history, points=points))
 
     def unsubscribe(self, *topics: Topic) -> None:
-        """These no more."""
+        """Ends the subscription to these topics."""
         self.send(LiveRequest(unsubscribe=topics))
 
     def send(self, request: LiveRequest) -> None:

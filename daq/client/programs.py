@@ -28,7 +28,7 @@ class Programs:
         self._path = f"{robot}/programs"
 
     def list(self) -> tuple[ProgramEntry, ...]:
-        """Those that are kept, the one changed last first."""
+        """The programs, most recently changed first."""
         return self._connection.get(tuple[ProgramEntry, ...], self._path)
 
     def get(self, kind: type[Content], name: str) -> tuple[Content, ProgramEntry]:

@@ -21,11 +21,11 @@ from daq.contracts.service.robot import Done, JointGains, ProcessState, ResetReq
 from daq.contracts.service.teaching import CalibrationRequest, TeachingStatus
 
 CONNECT_PATIENCE = 60.0
-"""s for a mock with its physics engine to start, on a busy computer."""
+"""Time (s) allowed for a mock with its physics engine to start on a busy computer."""
 
 
 class Robot:
-    """What the service knows of one robot, and may do with it."""
+    """State and operations of one robot."""
 
     def __init__(self, connection: Connection, name: str, stop_url: str | None = None) -> None:
         self.name = name
@@ -48,7 +48,7 @@ class Robot:
         return stopping.stop(self._stop_addresses, self._path, self._connection.token)
 
     def status(self) -> RobotStatus:
-        """Everything about it now; every value says how old it is."""
+        """The present status; every value states its age."""
         return self._connection.get(RobotStatus, self._path)
 
     def machine(self) -> Machine:

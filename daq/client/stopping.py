@@ -1,5 +1,5 @@
-"""A stop through the service, asked for at two doors at once: the service's own, and the one beside it that its event
-loop has no part in."""
+"""A stop through the service, requested at two addresses at once: the service's own, and the stop listener's, which
+does not depend on the service's event loop."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from daq.contracts.service.system import stop_port_after
 
 CONNECT_WITHIN = 1.0
 ANSWER_WITHIN = 3.0
-"""s for one door: the service itself answers within 1.1 s, whatever the link does."""
+"""Time-out (s) for one address; the service itself answers within 1.1 s, whatever the link does."""
 
 
 class NoSuchRobot(StopResult):
@@ -31,7 +31,7 @@ def stop_addresses(url: str, stop_url: str | None = None) -> list[str]:
         return [url, stop_url.rstrip("/")]
     found = httpx.URL(url)
     if found.scheme != "http" or found.port is None:
-        return [url]  # a proxy stands before it: what it calls the listener is not known
+        return [url]  # behind a proxy the listener's address is unknown
     return [url, str(found.copy_with(port=stop_port_after(found.port), path="/")).rstrip("/")]
 
 
@@ -58,7 +58,7 @@ def stop(addresses: Sequence[str], robot_path: str, token: str | None) -> StopRe
 
 
 def _tells(answer: StopResult) -> tuple[bool, bool, bool, bool]:
-    """How much an answer says."""
+    """Rank of an answer: the higher, the more it confirms."""
     return answer.confirmed, answer.delivered, answer.seconds > 0, isinstance(answer, NoSuchRobot)
 
 

@@ -14,12 +14,12 @@ from daq.contracts.service.traces import CatalogueEntry, Source, TraceChange, Tr
 from daq.contracts.trace import Outcome
 
 LAST = "last"
-"""Instead of a number: the newest."""
+"""Name of the newest trace, in place of its number."""
 KINDS = {".mcap": "application/octet-stream", ".csv": "text/csv"}
 MOST_NAMED = 4
-"""Traces named in the complaint about a beginning that several share."""
+"""Number of traces named in the error about an ambiguous beginning."""
 UPLOAD_WITHIN = 600.0
-"""s for the answer to a file that is sent."""
+"""Time-out (s) for the answer to an upload."""
 
 
 class Traces:
@@ -42,12 +42,19 @@ class Traces:
     ) -> Iterator[CatalogueEntry]:
         """The newest first; `text` is looked for in number, file, name, kind, operator, notes and tags."""
         return self._connection.every(
-            CatalogueEntry, self._path, q=text, tag=tag, source=source, outcome=outcome, kind=kind,
-            since=None if since is None else since.isoformat(), until=None if until is None else until.isoformat(),
-        )  # fmt: skip
+            CatalogueEntry,
+            self._path,
+            q=text,
+            tag=tag,
+            source=source,
+            outcome=outcome,
+            kind=kind,
+            since=None if since is None else since.isoformat(),
+            until=None if until is None else until.isoformat(),
+        )
 
     def get(self, trace: str) -> TraceDetails:
-        """What one says about itself, its figures and events."""
+        """A trace's description, figures and events."""
         return self._connection.get(TraceDetails, f"{self._path}/{trace}")
 
     def find(self, wanted: str) -> CatalogueEntry:
@@ -137,7 +144,7 @@ class Traces:
         return self._connection.ask(CatalogueEntry, Request("PATCH", f"{self._path}/{trace}", body))
 
     def delete(self, trace: str) -> None:
-        """For good. Refused while a model or a job refers to it."""
+        """Deletes a trace for good. Refused while a model or a job refers to it."""
         self._connection.do(Request("DELETE", f"{self._path}/{trace}"))
 
     def gains(self, trace: str) -> Sequence[MeasuredGain]:

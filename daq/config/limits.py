@@ -1,4 +1,4 @@
-"""A configuration's limits over those of the machine file. What is not given stays: no guard is lost by omission."""
+"""Merges a configuration's limits with the machine file's. A limit that is not given stays in force."""
 
 from __future__ import annotations
 

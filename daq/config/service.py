@@ -1,4 +1,4 @@
-"""The configuration of the service: where it listens, where it keeps what is its own, what it may do unattended."""
+"""The configuration of the service: where it listens, where it keeps its data, what it may do unattended."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ DEFAULT_PORT = 8300
 
 
 def _true_or_false(given: object) -> object:
-    """Raises ValueError for anything but the two; an environment variable has them as text."""
+    """Raises ValueError for anything but true and false, which an environment variable gives as text."""
     if isinstance(given, bool) or given in ("true", "false"):
         return given
     raise ValueError("must be true or false")
 
 
 Consent = Annotated[bool, BeforeValidator(_true_or_false)]
-"""Something that may move an arm: `true` and nothing that merely looks like it."""
+"""Consent that may move an arm: `true`, and no other value that is merely truthy."""
 
 
 class ServiceSettings(BaseModel):
@@ -29,30 +29,30 @@ class ServiceSettings(BaseModel):
     host: Annotated[str, Field(min_length=1, max_length=253)] = "127.0.0.1"
     """Address to listen at. Anything but loopback needs tokens (`daq token add`)."""
     tokens: Literal["remote", "always"] = "remote"
-    """Who needs one: who is no user of this computer, or everybody. A proxy on this computer may make strangers look
-    like its users: `always` behind one."""
+    """Who needs a token: remote clients, or everybody. A proxy on this computer makes remote clients look local: use
+    `always` behind one."""
     port: Annotated[int, Field(ge=0, le=65535)] = DEFAULT_PORT
-    """0: any free one, which is told."""
+    """Port; 0 for any free one, which is printed."""
     stop_port: Annotated[int, Field(ge=0, le=65535)] | None = None
     """Port of the stop listener; None for the one after `port`, 0 for any free one."""
     folder: Path = Path("service")
-    """The database, models and results of jobs."""
+    """Folder of the database, models and results of jobs."""
     database: str | None = None
     """URL of the database; None for a SQLite file in `folder`."""
     connect_at_start: bool = True
-    """Connecting moves nothing."""
+    """Whether the service connects to the robot when it starts; connecting moves nothing."""
     unattended: Consent = False
-    """Whether the queue may move a real arm while no operator says to be there."""
+    """Whether the queue may move a real arm while no operator has confirmed being present."""
     jobs_at_once: Annotated[int, Field(ge=1, le=64)] = 1
     """Worker processes for fits and diagnoses; short jobs have one of their own."""
     history: Annotated[float, Field(ge=10, le=3600)] = 300.0
-    """s of live samples that a client finds when it joins."""
+    """Time span (s) of live samples that a client receives when it joins."""
     upload_size: Annotated[int, Field(ge=1, le=65536)] = 512
-    """MB that an uploaded trace may have."""
+    """Largest size (MB) of an uploaded trace."""
     upload_memory: Annotated[int, Field(ge=64, le=1 << 20)] = 2048
-    """MB of memory for the process that reads it."""
+    """Memory limit (MB) of the process that reads an upload."""
     upload_time: Annotated[float, Field(ge=1, le=3600)] = 60.0
-    """s that it may take."""
+    """Time limit (s) of that process."""
     names: tuple[Annotated[str, Field(max_length=253)], ...] = ()
     """Names by which browsers reach this service, beside its address: others are refused."""
 
@@ -63,5 +63,5 @@ class ServiceSettings(BaseModel):
 
     @property
     def database_url(self) -> str:
-        """Of SQLAlchemy."""
+        """Database URL for SQLAlchemy."""
         return self.database or f"sqlite:///{self.folder.absolute() / 'service.sqlite'}"

@@ -1,4 +1,4 @@
-"""Strict TOML configuration. A key nobody knows is an error, and every error names key, value and what is allowed."""
+"""Strict TOML configuration. An unknown key is an error, and every error names key, value and what is allowed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ APP = "ma2000-daq"
 LOCAL_FILE = "daq.toml"
 MOCK_URL = "mock://"
 SERVER_VARIABLE = "DAQ_SERVER"
-"""Of the command line: URL of a service, and no section `[server]`."""
+"""Environment variable of the command line: URL of a service. It does not configure the section `[server]`."""
 
 
 class RobotSettings(BaseModel):
@@ -51,7 +51,7 @@ class TraceSettings(BaseModel):
 
     folder: Path = Path("traces")
     limits: TraceLimits = TraceLimits()
-    """How large a file may be that is read, whoever made it."""
+    """Limits for files that are read, whatever their origin."""
 
     @field_validator("folder")
     @classmethod
@@ -60,7 +60,7 @@ class TraceSettings(BaseModel):
 
 
 class Settings(BaseSettings):
-    """Everything that can be configured. Environment variables (`DAQ_ROBOT__PORT=…`) go before the file."""
+    """Everything that can be configured. Environment variables (`DAQ_ROBOT__PORT=…`) override the file."""
 
     model_config = SettingsConfigDict(
         env_prefix="DAQ_",
@@ -104,7 +104,7 @@ class Settings(BaseSettings):
 
 
 def config_files(explicit: Path | None = None) -> list[Path]:
-    """Where a configuration is looked for, first found wins: the one asked for, ./daq.toml, the user's."""
+    """Candidates for the configuration file, in order: the one requested, ./daq.toml, the user's."""
     if explicit is not None:
         return [explicit]
     if "DAQ_CONFIG" in os.environ:
@@ -131,7 +131,7 @@ def _parse(path: Path) -> Settings:
     data = parse_toml(read_text(path, what), what)
     server = data.get("server")
     given = server.get("unattended") if isinstance(server, dict) else None
-    if isinstance(given, str):  # only the environment has nothing but text
+    if isinstance(given, str):  # text is allowed from the environment only, which has nothing else
         raise SpecError(f"{what}: server.unattended = {shown(given)}: must be true or false, without quotation marks")
     return _validated(data, str(path))
 

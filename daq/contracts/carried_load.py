@@ -7,15 +7,15 @@ from daq.contracts.machine import Machine
 from daq.contracts.quantity import Quantity
 
 LEAST_DEVIATION = 1e-3
-"""kg: no load that is told is known better."""
+"""Least deviation (kg) of a load that a user states."""
 
 
 def carrying(machine: Machine, kilograms: float, source: str) -> Machine:
-    """The machine with a load of so many kg, known as well as the file's own relative to its size; where the file
-    states an arm without load, as well as that one in kg.
+    """The machine with a load of `kilograms`. Its relative deviation is that of the file's own load; where the file
+    states an arm without load, the absolute deviation (kg) is the file's.
 
     Args:
-        source: who says so.
+        source: where the value comes from.
 
     Raises SpecError for a machine whose file has no load, and for a load outside the file's bounds.
     """
@@ -28,7 +28,5 @@ def carrying(machine: Machine, kilograms: float, source: str) -> Machine:
         raise SpecError(f"load {kilograms:g} kg: the machine file of {machine.title} allows {allowed}")
     scale = kilograms / own.value if own.value > 0 else 1.0
     deviation = None if own.deviation is None else max(own.deviation * scale, LEAST_DEVIATION)
-    load = Quantity(
-        value=kilograms, unit=own.unit, source=source, low=own.low, high=own.high, deviation=deviation
-    )  # fmt: skip
+    load = Quantity(value=kilograms, unit=own.unit, source=source, low=own.low, high=own.high, deviation=deviation)
     return machine.model_copy(update={"load": load})

@@ -12,24 +12,25 @@ from typing import Any
 from daq.contracts.errors import SpecError
 
 LARGEST = 64 << 20
-"""Bytes of the largest file that is read: a path recorded for an hour has about 20 MB."""
+"""Size (bytes) of the largest file that is read; a path recorded for an hour has about 20 MB."""
 DEEPEST = 64
-"""Levels of nesting that are taken. No file here needs 10; parsers, validators and `repr` recurse once a level."""
+"""Most levels of nesting. No file here needs 10; parsers, validators and `repr` recurse once a level."""
 MOST_KEY_PARTS = 64
-"""Parts of a dotted TOML key (`a.b.c`) that are taken: reading one costs the square of their number."""
+"""Most parts of a dotted TOML key (`a.b.c`); reading one costs the square of their number."""
 
 MOST_BITS = 4096
-"""Bits of a whole number that are taken: Python cannot write one of many thousands as text."""
+"""Most bits of a whole number; Python cannot write one of many thousands as text."""
 
 _LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:[\w\"'-]+[ \t]*\.[ \t]*){{{MOST_KEY_PARTS}}}", re.MULTILINE)
-"""Only where a key can begin, so that looking for one takes time in proportion to the text."""
+"""Matches only where a key can begin, so that the search takes time in proportion to the text."""
 
 
 class _Short(reprlib.Repr):
-    """As reprlib's, but for whole numbers that Python does not write in decimal digits (those from TOML's 0x…)."""
+    """As `reprlib.Repr`, except for whole numbers that Python does not write in decimal digits (those from TOML's
+    0x…)."""
 
     def repr_int(self, x: int, level: int) -> str:
-        """In hexadecimal digits where there are many."""
+        """A whole number, in hexadecimal digits where it has many."""
         del level
         if x.bit_length() <= _DECIMAL_BITS:
             return repr(x)
@@ -117,7 +118,7 @@ def _too_deep(what: str) -> SpecError:
 
 
 def _bounded(data: Any, what: str) -> Any:
-    """The data itself. Level by level, not by recursion. Raises SpecError."""
+    """Returns the data unchanged if it is within bounds; works level by level, without recursion. Raises SpecError."""
     level = [data]
     for _ in range(DEEPEST + 1):
         parts = [

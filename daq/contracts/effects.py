@@ -1,4 +1,4 @@
-"""The names of physical effects that everyone shares."""
+"""The shared names of physical effects."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cache
 from importlib import resources
 
 UNKNOWN_EFFECT = "unknown_effect"
-"""What an effect is called whose name is not in the shared list."""
+"""Name of every effect that is not in the shared list."""
 
 
 @dataclass(frozen=True)

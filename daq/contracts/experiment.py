@@ -15,17 +15,17 @@ from daq.contracts.errors import SpecError
 
 JOINTS = 6
 GAIN_PLACE = 3
-"""Length of the place of one gain: the field, the joint, which of P, I, D."""
+"""Length of the error location of one gain: the field, the joint, which of P, I, D."""
 DEFAULT_AMPLITUDE = math.radians(21.6)
-"""21.6°, that is 80 posture units (section 6.5 of the source)."""
+"""Amplitude of the default ramp: 21.6°, that is 80 posture units (section 6.5 of the source)."""
 DEFAULT_RAMP_TIME = 0.65
 """Duration of the ramp in s (section 6.5)."""
 
 LONGEST_SHOWN = 60
-"""Characters of a wrong text that an error repeats whole."""
+"""Length up to which an error message repeats a wrong text in full."""
 
 MOST_POINTS = 1_000_000
-"""Points of a path: four hours of set points at 50 Hz are 720 000."""
+"""Most points of a path: four hours of set points at 50 Hz are 720 000."""
 
 Duration = Annotated[FiniteFloat, Field(gt=0, le=3600)]
 Hold = Annotated[FiniteFloat, Field(ge=0, le=3600)]
@@ -176,7 +176,7 @@ class Pause(_Part):
 
 Simple = Annotated[
     Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | Pause, Field(discriminator="kind")
-]  # fmt: skip
+]
 
 
 class Segment(_Part):
@@ -196,7 +196,7 @@ class Sequence(_Part):
 Trajectory = Annotated[
     Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | PickAndPlace | Path | Pause | Sequence,
     Field(discriminator="kind"),
-]  # fmt: skip
+]
 
 
 class ExperimentSpec(_Part):
@@ -264,7 +264,7 @@ def _one_line(error: ValidationError) -> str:
     """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
     first = error.errors()[0]
     where, value = [str(part) for part in first["loc"]], first["input"]
-    # Names that pydantic gives to the branches of a union are not the user's.
+    # Pydantic's names for the branches of a union mean nothing to a user.
     where = [
         part
         for i, part in enumerate(where)

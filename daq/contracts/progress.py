@@ -28,7 +28,7 @@ def stop_if(cancel: Cancel) -> None:
 
 
 class Never:
-    """A cancel that never comes."""
+    """A `Cancel` that is never set."""
 
     def is_set(self) -> bool:
         """Always False."""
@@ -36,4 +36,4 @@ class Never:
 
 
 def silent(_fraction: float, _text: str) -> None:
-    """A progress that tells nobody."""
+    """A `Progress` that does nothing."""

@@ -22,18 +22,33 @@ TRACE_FORMAT = 1
 
 Outcome = Literal["complete", "stopped", "fault", "interrupted"]
 EventKind = Literal[
-    "start", "ramp_start", "ramp_end", "reversal", "gains", "limit", "pause", "resume", "retry", "missing",
-    "missed_set_point", "restart", "link_lost", "stop", "fault", "note", "end",
-]  # fmt: skip
+    "start",
+    "ramp_start",
+    "ramp_end",
+    "reversal",
+    "gains",
+    "limit",
+    "pause",
+    "resume",
+    "retry",
+    "missing",
+    "missed_set_point",
+    "restart",
+    "link_lost",
+    "stop",
+    "fault",
+    "note",
+    "end",
+]
 
 
 EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(2262, 1, 1, tzinfo=UTC)
-"""Between them a moment fits into 64 bits of ns since 1970, as time stamps are written."""
+"""Range of moments that fit into 64 bits of ns since 1970, as time stamps are written."""
 
 
 def _stamped_by_64_bits(moment: datetime) -> datetime:
     """Raises ValueError for a moment outside of EARLIEST to LATEST."""
-    # Compared, not converted: near the year 9999 a moment may have no UTC.
+    # Compared and not converted: near the year 9999 a moment may have no UTC.
     aware = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
     if not EARLIEST <= aware < LATEST:
         raise ValueError("a moment of the years 1970 to 2261 is expected")
@@ -41,7 +56,7 @@ def _stamped_by_64_bits(moment: datetime) -> datetime:
 
 
 Moment = Annotated[datetime, AfterValidator(_stamped_by_64_bits)]
-"""A moment that a trace can have been recorded at."""
+"""A moment at which a trace can have been recorded."""
 
 
 class TraceEvent(BaseModel):
@@ -140,7 +155,7 @@ class Trace:
 
     @property
     def missing(self) -> int:
-        """Control periods between the first and the last sample that have none."""
+        """Number of control periods without a sample between the first and the last."""
         if self.tick is None or len(self) == 0:
             return 0
         return int(self.tick[-1] - self.tick[0]) + 1 - len(self)

@@ -9,7 +9,7 @@ from daq.link import Link
 from firmware_protocol.commands import Advance, Advanced
 
 LONGEST_ADVANCE_US = 1_000_000
-"""One turn of lock-step lets at most this much time pass, so that its watchdog keeps its meaning."""
+"""Longest time (µs) of one turn of lock-step; a longer turn could trigger the watchdog."""
 
 
 class Clock(Protocol):
@@ -58,7 +58,7 @@ class LockStepClock:
         return self._now
 
     def tick_seen(self, tick: int) -> None:
-        """A reply has shown that period `tick` is over."""
+        """Records that a reply has shown period `tick` to be over."""
         self._now = max(self._now, self._tick_zero_s + tick * self._period_s)
 
     def sleep_until(self, time_s: float) -> None:

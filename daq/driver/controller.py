@@ -66,7 +66,7 @@ class Identity:
     ring_depth: int
     boots: int
     restarted: bool = False
-    """It has been reset since this host last asked."""
+    """Whether it has been reset since this host last asked."""
 
     @property
     def simulated(self) -> bool:
@@ -242,7 +242,7 @@ class Controller:
         except RequestRefusedError as error:
             if error.reason != Refusal.BAD_LENGTH:
                 raise
-            raise self._other_version(1) from None  # which knows no greeting but the empty one
+            raise self._other_version(1) from None  # version 1 accepts only an empty Hello
         if reply.version != PROTOCOL_VERSION:
             raise self._other_version(reply.version)
         identity = Identity(

@@ -31,7 +31,7 @@ SETTLING_S = 0.002
 READ_REGISTERS = ("position", "error", "power")
 """Set points are not read: the memory holds what was sent, position + error tells what was taken."""
 MOST_READINGS = 8
-"""Of one period."""
+"""Largest number of readings in one period."""
 
 
 @dataclass(frozen=True)

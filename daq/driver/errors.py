@@ -1,4 +1,4 @@
-"""What the driver may find beside a link that fails."""
+"""Errors of the driver, other than those of the link."""
 
 from __future__ import annotations
 

@@ -34,10 +34,10 @@ MOST_MISSING = 10
 
 
 class Sampling(Protocol):
-    """How snapshots are had from one controller."""
+    """How snapshots are obtained from one controller."""
 
     def write(self, postures: Mapping[int, int]) -> SetPointsTaken:
-        """Sends set points (joint → posture units), taken together."""
+        """Sends set points (joint → posture units), which the controller takes together."""
         ...
 
     def next(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
@@ -135,7 +135,7 @@ class RingSampling:
         try:
             return link.exchange(*requests)
         except LinkTimeoutError:
-            # A board that restarted counts its ticks anew: the one that was waited for is far away.
+            # A restarted board counts its ticks anew: the requested tick would never come.
             self._deliveries.check_restart(link.request(ReadStatus(), Status).status)
             raise
 

@@ -40,7 +40,7 @@ class SetPointWatch:
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def sending(self, postures: Mapping[int, int]) -> SentSetPoints:
-        """Takes note of a batch that is about to be written: from now on it may show."""
+        """Records a batch that is about to be written: from now on snapshots may show it."""
         with self._lock:
             before = self._sent[-1].postures if self._sent else {}
             batch = SentSetPoints({**before, **postures})
@@ -48,23 +48,23 @@ class SetPointWatch:
             return batch
 
     def confirmed(self, batch: SentSetPoints, due: int) -> None:
-        """The board has confirmed a batch: from period `due` on it must show."""
+        """Records that the board has confirmed a batch: from period `due` on snapshots must show it."""
         with self._lock:
             batch.due = due
 
     def withdrawn(self, batch: SentSetPoints) -> None:
-        """The board has refused a batch."""
+        """Records that the board has refused a batch."""
         with self._lock:
             if batch in self._sent:
                 self._sent.remove(batch)
 
     def replaced(self, postures: Mapping[int, int], due: int) -> None:
-        """A stop has put other set points in force; what was sent before counts no longer."""
+        """Records that a stop has put other set points in force; what was sent before no longer counts."""
         with self._lock:
             self._sent = [*self._sent[-1:], SentSetPoints(dict(postures), due)]
 
     def forget(self) -> None:
-        """Nothing is known of the set points in force."""
+        """Forgets everything: the set points in force are unknown."""
         with self._lock:
             self._sent.clear()
 

@@ -1,4 +1,4 @@
-"""What the driver delivers: one control period of the board, whole and told apart from every other."""
+"""What the driver delivers: one consistent control period of the board, identified by its tick."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class BoardSnapshot:
     flags: StatusFlag
     consistent_by: Consistency
     missing_before: int = 0
-    """Periods between the sample before and this one that have none."""
+    """Number of periods without a sample between the previous sample and this one."""
     set_points_missed: bool = False
     """The controller did not take what was in its memory when the period began."""
 

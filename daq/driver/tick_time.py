@@ -1,11 +1,12 @@
-"""When a tick was, by the host's clock, from the times at which samples arrived."""
+"""Estimates when a tick was, by the host's clock, from the arrival times of samples."""
 
 from __future__ import annotations
 
 from collections import deque
 
 WINDOW_TICKS = 500
-"""10 s of samples: two quartz clocks that differ by 100 ppm drift 1 ms apart meanwhile."""
+"""Ticks over which the offset is taken, 10 s: two quartz clocks that differ by 100 ppm drift apart by 1 ms in that
+time."""
 
 
 class TickTime:

@@ -70,7 +70,8 @@ class Connection:
         return transactions
 
     def repeat(self, transactions: Sequence[Transaction], ahead: Sequence[Request] = ()) -> list[Transaction]:
-        """Writes requests again under their numbers, behind new ones `ahead`; returns these. Raises LinkLostError."""
+        """Writes requests again under their numbers, after the new ones `ahead`; returns the latter. Raises
+        LinkLostError."""
         with self._write_lock:
             self.check()
             self.tally.count("retries", len(transactions))
@@ -80,7 +81,7 @@ class Connection:
         return first
 
     def receive(self, timeout_s: float) -> bytes:
-        """What has arrived, its replies matched. One thread at a time. Raises LinkLostError."""
+        """Reads what has arrived and matches its replies. One thread at a time. Raises LinkLostError."""
         try:
             data = self._channel.read(timeout_s)
         except ChannelError as error:
@@ -144,6 +145,6 @@ class Connection:
             raise self.fail(str(error)) from error
 
     def _note_round_trip(self, transaction: Transaction) -> None:
-        # Of a repeated request nobody knows which copy was answered; a sample waits for its tick.
+        # With a repeated request it is unknown which copy was answered; a sample waits for its tick.
         if self.timing.measured and transaction.written == 1 and not isinstance(transaction.request, Sample):
             self.tally.round_trip(transaction.answered_at - transaction.written_at)

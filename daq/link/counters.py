@@ -1,4 +1,4 @@
-"""What a link has been through, counted; an immutable copy is part of every status and trace."""
+"""The counters of a link; an immutable copy is part of every status and trace."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class RoundTrips:
 
 @dataclass(frozen=True)
 class LinkCounters:
-    """All since the link was opened, or since a moment that was marked."""
+    """Counts since the link was opened, or since a `Mark`."""
 
     requests: int = 0
     """Transactions begun."""
@@ -33,7 +33,7 @@ class LinkCounters:
     damaged: int = 0
     """Pieces of input that were no whole reply (CRC, stuffing, length)."""
     stale: int = 0
-    """Replies to nothing that is waited for."""
+    """Replies that no request was waiting for."""
     duplicates: int = 0
     """Second replies to a request already answered."""
     refused: int = 0
@@ -43,7 +43,7 @@ class LinkCounters:
     missed_set_points: int = 0
     """Periods in which the controller did not take the set points that were in its memory."""
     missing_samples: int = 0
-    """Periods of which no sample was delivered."""
+    """Periods for which no sample was delivered."""
     late: int = 0
     """Samples that came more than one period after the tick they describe."""
     restarts: int = 0
@@ -69,7 +69,7 @@ _EDGES_S = tuple(_FINEST_S * _STEP**i for i in range(120))
 
 @dataclass(frozen=True)
 class Mark:
-    """What had been counted by a moment; nothing, by default."""
+    """The counts at one moment; all zero by default."""
 
     counts: Mapping[str, int] = field(default_factory=lambda: dict.fromkeys(COUNTED, 0))
     damaged: int = 0
@@ -100,7 +100,7 @@ class Tally:
             self._trip_max_s = max(self._trip_max_s, seconds)
 
     def mark(self, damaged: int) -> Mark:
-        """This moment, to count from; `damaged` is the dialect's own count."""
+        """The counts now, from which `snapshot` can count; `damaged` is the dialect's own count."""
         with self._lock:
             return Mark(dict(self._counts), damaged, tuple(self._trips), self._trip_sum_s)
 

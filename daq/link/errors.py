@@ -1,4 +1,4 @@
-"""What a transaction can end in besides its reply."""
+"""How a transaction can fail."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The link to a controller: requests in, replies out, whatever happens to the bytes between."""
+"""The link to a controller: requests in, replies out, with lost or damaged bytes made good by repetition."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ R = TypeVar("R", bound=Reply)
 
 
 class LinkState(StrEnum):
-    """How well the controller can be spoken to."""
+    """Quality of the connection to the controller."""
 
     CONNECTED = "connected"
     DEGRADED = "degraded"
@@ -60,7 +60,7 @@ class Link:
     number until it is answered or its budget is used up, and then the link is lost. `stop` goes ahead of everything
     that is not yet written.
 
-    `chance` draws the first sequence number and, but on the bench, the nonces of greetings.
+    `chance` draws the first sequence number and, except in lock-step, the nonces of `Hello`.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Link:
         now: Callable[[], float] = time.monotonic,
         chance: Random | None = None,
     ) -> None:
-        # On the bench a run repeats to the bit.
+        # In lock-step a run repeats to the bit.
         self._chance = chance or (Random(0) if endpoint.lock_step else SystemRandom())
         self.tally = Tally()
         self._endpoint = endpoint
@@ -104,7 +104,7 @@ class Link:
 
     @property
     def bytes_per_second(self) -> float:
-        """What the line carries in each direction; infinite where nothing limits it."""
+        """Capacity of the line in each direction; infinite where nothing limits it."""
         return self._endpoint.bytes_per_second
 
     @property
@@ -114,7 +114,7 @@ class Link:
 
     @property
     def state(self) -> LinkState:
-        """How well the controller can be spoken to now."""
+        """Present quality of the connection."""
         if self._connection.failure is not None or self._unanswered:
             return LinkState.LOST
         return LinkState.CONNECTED if self._clean >= CLEAN_TRANSACTIONS else LinkState.DEGRADED
@@ -125,11 +125,11 @@ class Link:
         return self.tally.snapshot(self._connection.damaged)
 
     def mark(self) -> Mark:
-        """This moment, for `counters_since`."""
+        """The counts now, for `counters_since`."""
         return self.tally.mark(self._connection.damaged)
 
     def counters_since(self, mark: Mark) -> LinkCounters:
-        """What the link has been through since then."""
+        """The counts since that mark."""
         return self.tally.snapshot(self._connection.damaged, mark)
 
     def set_period(self, period_s: float) -> None:
@@ -163,12 +163,13 @@ class Link:
     def greet(self) -> HelloReply:
         """Begins a session, without which no command is obeyed. Moves nothing.
 
-        Raises RequestRefusedError by a controller of version 1, LinkTimeoutError, LinkLostError.
+        Raises RequestRefusedError where the controller speaks version 1, LinkTimeoutError, LinkLostError.
         """
         return self.request(Hello(PROTOCOL_VERSION, self._nonce()), HelloReply)
 
     def _nonce(self) -> int:
-        """Another one for each greeting. On the bench a run repeats to the bit: there it is the bench's own time."""
+        """A different one for each `Hello`; in lock-step the controller's own time, so that a run repeats to the
+        bit."""
         if self.lock_step:
             with contextlib.suppress(RequestRefusedError):
                 return self.request(Advance(0), Advanced).time_us & 0xFFFFFFFF

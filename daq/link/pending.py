@@ -1,4 +1,4 @@
-"""Requests that wait for their replies: numbers given out, replies matched, everything else dropped and counted.
+"""Requests that wait for their replies: assigns numbers, matches replies, drops and counts everything else.
 
 Pure bookkeeping without a clock, a lock or a channel; `Link` guards it with its own lock.
 """
@@ -14,7 +14,7 @@ from firmware_protocol.commands import NO_SESSION, PROTOCOL_VERSION, Hello, Hell
 
 SEQUENCE_NUMBERS = 0x10000
 REMEMBERED = 256
-"""Answered requests whose second replies are told apart from stale ones."""
+"""Number of answered requests that are remembered, so that a second reply counts as a duplicate and not as stale."""
 
 
 @dataclass(eq=False)
@@ -27,7 +27,7 @@ class Transaction:
     written_at: float = 0.0
     deadline: float = 0.0
     frame: bytes = b""
-    """As it was written first: a repeat is the same bytes."""
+    """The bytes first written; a repeat sends the same ones."""
     reply: Reply | None = None
     answered_at: float = 0.0
 
@@ -78,7 +78,7 @@ def _answers(reply: Reply, request: Request) -> bool:
     if isinstance(reply, Refused):
         return reply.opcode == request.OPCODE
     if isinstance(reply, HelloReply) and isinstance(request, Hello):
-        # One that was recorded names another nonce; a bridge of another version names none.
+        # A replayed reply carries another nonce; a bridge of another version sends none.
         if reply.session == NO_SESSION:
             return reply.version != PROTOCOL_VERSION
         return reply.nonce == request.nonce

@@ -1,4 +1,4 @@
-"""Transactions in real time: whoever waits reads for all, and asks again when its time is over."""
+"""Transactions in real time: one waiting thread reads for all, and each repeats its request after its time-out."""
 
 from __future__ import annotations
 

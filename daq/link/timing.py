@@ -1,4 +1,4 @@
-"""How long to wait for a reply, and how often to ask. Every figure that decides about patience stands here."""
+"""How long to wait for a reply, and how often to repeat a request. All time-outs and retry counts of the link."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ from firmware_protocol.commands import REPLIES, Hello, Request, Sample, Stop
 from firmware_protocol.framing import FRAME_OVERHEAD, MAX_PAYLOAD
 
 REPLY_MARGIN_S = 0.025
-"""Beyond the time on the line: what bridge, adapter (a USB one holds bytes for up to 16 ms) and host may take."""
+"""Time allowed for a reply beyond its time on the line, for bridge, adapter (USB holds bytes for up to 16 ms) and
+host."""
 STOP_MARGIN_S = 0.010
-"""A stop is asked again sooner: a repetition costs nothing."""
+"""The same for a stop, which is repeated sooner because a repetition costs nothing."""
 RETRIES = 8
 """Repetitions of one request. With one frame in ten damaged, one transaction in 10^6 fails for good."""
 HELLO_RETRIES = 40
-"""A greeting moves nothing, so it may take its time, some 2 s: an adapter that resets the bridge when its port is
-opened needs that long, and so does a controller whose machine is busy."""
+"""Repetitions of a `Hello`, some 2 s in all: an adapter that resets the bridge when its port is opened needs that long,
+and so does a controller whose machine is busy. A `Hello` moves nothing, so it can wait."""
 STOP_RETRIES = 50
 STOP_COPIES = 2
-"""A stop is written twice at once: the second copy costs 0.8 ms at 115200 baud, a time-out 20 times that."""
+"""Copies of a stop that are written at once: the second costs 0.8 ms at 115200 baud, a time-out 20 times that."""
 LOCK_STEP_WATCHDOG_S = 10.0
-"""Lock-step keeps no wall time, but a process that says nothing for this long is dead."""
+"""Time (s) of silence after which a process in lock-step counts as dead; lock-step otherwise uses no wall time."""
 CLEAN_TRANSACTIONS = 100
-"""After a repetition the link counts as degraded until this many transactions have gone through at once."""
+"""Transactions without repetition after which a degraded link counts as connected again."""
 
 MAX_FRAME_BYTES = MAX_PAYLOAD + FRAME_OVERHEAD
 
@@ -36,7 +37,7 @@ class LinkTiming:
     """Control period; `Sample` waits for at most one."""
     retries: int = RETRIES
     measured: bool = True
-    """Whether round trips have a meaning; in lock-step they have none."""
+    """Whether round trips are measured; in lock-step their times mean nothing."""
 
     def reply_timeout_s(self, request: Request, bytes_ahead: int) -> float:
         """How long (s) a reply to `request` may take when `bytes_ahead` bytes, its own included, are being sent.

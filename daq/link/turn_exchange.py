@@ -1,4 +1,4 @@
-"""Transactions in lock-step: host and controller take turns, and no clock of this machine decides anything."""
+"""Transactions in lock-step: host and controller take turns, independent of any clock of this machine."""
 
 from __future__ import annotations
 

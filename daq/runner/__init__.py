@@ -1,19 +1,20 @@
 """Runs one experiment: prepares, checks, moves to the start, follows the plan, records, and ends in a known state."""
 
 from daq.runner.arm_control import ArmControl, StoppedError
-from daq.runner.experiment import Arrangement, Outside, RunFaultError, RunResult, run_experiment
-from daq.runner.preparation import Consent, MissingConsentError
-from daq.runner.recorder import Ears
+from daq.runner.experiment import RunFaultError, RunResult, RunSetup, StopRequests, run_experiment
+from daq.runner.preparation import Consent, MissingConsentError, require_not_stopped
+from daq.runner.recorder import RunListener
 
 __all__ = [
     "ArmControl",
-    "Arrangement",
     "Consent",
-    "Ears",
     "MissingConsentError",
-    "Outside",
     "RunFaultError",
+    "RunListener",
     "RunResult",
+    "RunSetup",
+    "StopRequests",
     "StoppedError",
+    "require_not_stopped",
     "run_experiment",
 ]

@@ -11,11 +11,11 @@ from daq.driver import Controller, StopConfirmation
 from daq.safety import Action, Arm, Event, State, advance
 
 _ORDERLY = (Event.ARM, Event.START, Event.FINISHED, Event.DISARM)
-"""Steps of a run that goes as planned: none of them is taken any more once the arm has been halted."""
+"""Events of a run that goes as planned; all are refused once the arm has been halted."""
 
 
 class StoppedError(DaqError):
-    """Somebody has stopped the arm; what was about to go on does not."""
+    """The arm has been stopped; the operation does not continue."""
 
     exit_code = 6
 
@@ -83,7 +83,7 @@ class ArmControl:
 
     @contextmanager
     def frozen_on_error(self) -> Iterator[None]:
-        """Whatever ends the block early, the arm is frozen before anything else is done about it."""
+        """Freezes the arm before anything else when an exception ends the block."""
         try:
             yield
         except BaseException as error:
@@ -109,8 +109,8 @@ class ArmControl:
             raise StoppedError(f"the arm has been stopped: {self._halted}")
 
 
-def told(confirmation: StopConfirmation) -> str:
-    """One line about what became of a stop."""
+def stop_line(confirmation: StopConfirmation) -> str:
+    """One line about the result of a stop."""
     if confirmation.acknowledged:
         return f"the board confirmed: set points are frozen since tick {confirmation.tick}"
     sent = "was sent but NOT CONFIRMED" if confirmation.sent else "could NOT BE DELIVERED"

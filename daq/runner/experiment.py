@@ -20,7 +20,7 @@ from daq.runner.arm_control import ArmControl, StoppedError
 from daq.runner.follower import Ending, Follower
 from daq.runner.gains import GainChange, put_back, set_gains
 from daq.runner.preparation import Consent, Prepared, prepare
-from daq.runner.recorder import Ears, Recorder, ToldOnly
+from daq.runner.recorder import ApproachObserver, Recorder, RunListener
 from daq.safety import Event
 from daq.traces.naming import new_trace_id, trace_path
 from daq.traces.writer import TraceWriter
@@ -32,9 +32,9 @@ ARRIVED_WITHIN = 40.0
 """ADC counts from its set point at which a joint counts as arrived at the start: an assumption, that of a joint at rest
 (gravity and friction leave some counts)."""
 ARRIVAL_TIME = 1.0
-"""s that a joint may take for it after its last set point: an assumption."""
+"""Time (s) that a joint may take to arrive after its last set point: an assumption."""
 PATIENCE_IN_LOCK_STEP = 5.0
-"""s that a fast run waits for the disk; in real time nothing waits."""
+"""Time (s) that a run in lock-step waits for the disk; in real time nothing waits."""
 
 
 class RunFaultError(DaqError):
@@ -56,11 +56,11 @@ class RunResult:
 
 
 @dataclass(frozen=True)
-class Outside:
-    """What the world wants of a run while it goes on.
+class StopRequests:
+    """External stop and interrupt requests, polled during a run.
 
-    ended:       why somebody wants the end; None while nobody does
-    interrupted: whether that was the loss of whoever started the run
+    ended:       reason for ending the run; None while there is none
+    interrupted: whether the reason is that the process which started the run is gone
     """
 
     ended: Callable[[], str | None] = lambda: None
@@ -68,8 +68,8 @@ class Outside:
 
 
 @dataclass(frozen=True)
-class Arrangement:
-    """Everything one run works with."""
+class RunSetup:
+    """Everything that one run needs."""
 
     controller: Controller
     control: ArmControl
@@ -77,14 +77,15 @@ class Arrangement:
     machine: Machine
     limits: Limits
     folder: Path
-    ears: Ears
-    outside: Outside
+    listener: RunListener
+    stop_requests: StopRequests
     robot: str = "ma2000"
     trace_id: str = field(default_factory=new_trace_id)
-    """Of the trace to be made; whoever keeps a list of runs chooses it, and finds the trace after a crash."""
+    """Number of the trace to be made; a caller that keeps a list of runs chooses it, and finds the trace after a
+    crash."""
 
 
-def run_experiment(run: Arrangement, consent: Consent) -> RunResult:
+def run_experiment(run: RunSetup, consent: Consent) -> RunResult:
     """Runs the experiment and returns when its trace is closed.
 
     Nothing has moved and nothing is recorded when this raises SafetyError (a limit, a frozen board, no consent),
@@ -95,11 +96,11 @@ def run_experiment(run: Arrangement, consent: Consent) -> RunResult:
     try:
         prepared = prepare(run.controller, run.spec, run.machine, run.limits, run.folder, consent)
     except SafetyError:
-        run.control.require_not_halted()  # a stop in this very moment is the reason then
+        run.control.require_not_halted()  # a stop at this moment is then the reason
         raise
     with run.control.frozen_on_error():
         run.control.handle(Event.ARM)
-        changes = set_gains(run.controller, run.spec.gains, run.outside.ended)
+        changes = set_gains(run.controller, run.spec.gains, run.stop_requests.ended)
         run.control.handle(Event.START)
         _move_to_start(run, prepared)
         try:
@@ -108,13 +109,19 @@ def run_experiment(run: Arrangement, consent: Consent) -> RunResult:
             raise RunFaultError(f"{error}; the run was ended and the arm frozen") from error
 
 
-def _move_to_start(run: Arrangement, prepared: Prepared) -> None:
+def _move_to_start(run: RunSetup, prepared: Prepared) -> None:
     """Raises StoppedError or RunFaultError when the arm did not get there; it is frozen then."""
-    run.ears.progress(0.0, "moving to the start")
+    run.listener.progress(0.0, "moving to the start")
     approach = Follower(
-        run.controller, run.control, run.machine, run.limits, EVERY_JOINT, ToldOnly(run.ears), run.outside.ended,
+        run.controller,
+        run.control,
+        run.machine,
+        run.limits,
+        EVERY_JOINT,
+        ApproachObserver(run.listener),
+        run.stop_requests.ended,
         every_period=False,
-    )  # fmt: skip
+    )
     ending = approach.follow(prepared.move, lambda _index: None)
     if ending.kind == "finished":
         ending = approach.arrive(prepared.move.moving, ARRIVED_WITHIN, round(ARRIVAL_TIME / run.controller.period_s))
@@ -123,39 +130,41 @@ def _move_to_start(run: Arrangement, prepared: Prepared) -> None:
         raise StoppedError(line) if ending.kind == "stopped" else RunFaultError(line)
 
 
-def _record(run: Arrangement, prepared: Prepared, changes: tuple[GainChange, ...]) -> RunResult:
+def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) -> RunResult:
     record = _trace_record(run)
     writer = TraceWriter(
-        trace_path(run.folder, record), record, prepared.joints,
+        trace_path(run.folder, record),
+        record,
+        prepared.joints,
         attachments={"experiment.json": run.spec.model_dump_json().encode()},
         patience=PATIENCE_IN_LOCK_STEP if run.controller.link.lock_step else 0.0,
-    )  # fmt: skip
-    recorder = Recorder(writer, prepared.joints, run.ears)
+    )
+    recorder = Recorder(writer, prepared.joints, run.listener)
     follower = Follower(
-        run.controller, run.control, run.machine, run.limits, prepared.joints, recorder, run.outside.ended
+        run.controller, run.control, run.machine, run.limits, prepared.joints, recorder, run.stop_requests.ended
     )
     begun = run.controller.link.mark()
     with writer, run.control.frozen_on_error():
         for change in changes:
             follower.tell("gains", change.message)
-        ending = follower.follow(prepared.motion, _progress(run.ears, prepared.motion))
+        ending = follower.follow(prepared.motion, _progress(run.listener, prepared.motion))
         if ending.kind == "finished":
             ending = _finish(run, changes)
         if ending.kind != "finished":
             for change in changes:
-                follower.tell("gains", change.left)
+                follower.tell("gains", change.kept_message)
             if ending.kind != "lost":
                 follower.observe(round(AFTERMATH / run.controller.period_s))
-        outcome = _outcome(ending, run.outside.interrupted())
+        outcome = _outcome(ending, run.stop_requests.interrupted())
         counters = run.controller.link.counters_since(begun).numbers()
         path = writer.close(outcome, counters)
     return RunResult(outcome, ending.cause, path, recorder.samples, recorder.missing, counters)
 
 
-def _finish(run: Arrangement, changes: tuple[GainChange, ...]) -> Ending:
-    """The plan is through: gains back, state idle; unless somebody stops the arm in this very moment."""
+def _finish(run: RunSetup, changes: tuple[GainChange, ...]) -> Ending:
+    """After the plan: gains are put back and the state is idle, unless the arm is stopped at this moment."""
     try:
-        put_back(run.controller, changes, run.outside.ended)
+        put_back(run.controller, changes, run.stop_requests.ended)
         run.control.handle(Event.FINISHED)
         run.control.handle(Event.DISARM)
     except StoppedError as error:
@@ -167,7 +176,7 @@ def _finish(run: Arrangement, changes: tuple[GainChange, ...]) -> Ending:
     return Ending("finished")
 
 
-def _trace_record(run: Arrangement) -> TraceRecord:
+def _trace_record(run: RunSetup) -> TraceRecord:
     controller, now = run.controller, datetime.now(UTC)
     return TraceRecord(
         trace_id=run.trace_id,
@@ -187,14 +196,16 @@ def _trace_record(run: Arrangement) -> TraceRecord:
     )
 
 
-def _progress(ears: Ears, motion: Plan) -> Callable[[int], None]:
+def _progress(listener: RunListener, motion: Plan) -> Callable[[int], None]:
     every = max(1, len(motion) // 200)
 
-    def told(index: int) -> None:
+    def report(index: int) -> None:
         if index % every == 0 or index == len(motion) - 1:
-            ears.progress(index / max(1, len(motion) - 1), f"{index * motion.period:.1f} of {motion.duration:.1f} s")
+            listener.progress(
+                index / max(1, len(motion) - 1), f"{index * motion.period:.1f} of {motion.duration:.1f} s"
+            )
 
-    return told
+    return report
 
 
 def _outcome(ending: Ending, interrupted: bool) -> Outcome:

@@ -12,18 +12,18 @@ from daq.contracts.sample import SampleRow
 from daq.contracts.trace import EventKind
 from daq.driver import BoardSnapshot, Controller, ControllerRestartedError, NoSampleError
 from daq.link import LinkError, RequestRefusedError
-from daq.runner.arm_control import ArmControl, told
+from daq.runner.arm_control import ArmControl, stop_line
 from daq.runner.lag import Lag
 from daq.runner.rows import RowMaker
 from daq.safety import Event, RunningGuards, Verdict
 from daq.trajectories import Plan
 
 RETRIES_LOOKED_AT_EVERY = 50
-"""Ticks between two looks at the link's retries, for events in the trace."""
+"""Ticks between two checks of the link's retries, for events in the trace."""
 
 
 class Observer(Protocol):
-    """Who is told of every row and event: the trace's writer, a live view."""
+    """Receives every row and event: the trace's writer, a live view."""
 
     def row(self, row: SampleRow) -> None:
         """A control period."""
@@ -45,7 +45,7 @@ class Ending:
 class Follower:
     """Sends a plan's set points, one a control period, and takes the samples; the guards judge each.
 
-    ended:        says why somebody outside wants the end; None while nobody does
+    ended:        gives the reason of an external request to end; None while there is none
     every_period: True takes each period once, in order, as a record needs; False takes the newest, which is all that a
                   move needs and what a slow line can do
     """
@@ -188,11 +188,11 @@ class Follower:
     def _halted(
         self, event: Event, told_as: EventKind, ending: Literal["stopped", "fault", "lost"], cause: str
     ) -> Ending:
-        """Freezes first, tells afterwards: nothing that listens may delay it."""
+        """Freezes the arm before it reports, so that no listener can delay the freeze."""
         confirmation = self._control.handle(event, cause)
         self.tell(told_as, cause)
         if confirmation is not None:
-            self.tell("note", told(confirmation))
+            self.tell("note", stop_line(confirmation))
             if not confirmation.acknowledged:
-                cause = f"{cause}; {told(confirmation)}"
+                cause = f"{cause}; {stop_line(confirmation)}"
         return Ending(ending, cause)

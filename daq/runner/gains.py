@@ -23,12 +23,12 @@ class GainChange:
 
     @property
     def message(self) -> str:
-        """What happened, for the trace."""
+        """Text about the change, for the trace."""
         return f"joint {self.joint}: gains {_text(self.during)} for this run, {_text(self.before)} before"
 
     @property
-    def left(self) -> str:
-        """What stays, for the trace."""
+    def kept_message(self) -> str:
+        """Text about gains that were not put back, for the trace."""
         return f"joint {self.joint}: gains stay at {_text(self.during)}, they were {_text(self.before)} before the run"
 
 

@@ -1,4 +1,4 @@
-"""Set points answer what the arm does now: on samples that are too old nothing is sent."""
+"""Holds set points back while samples are too old to act on."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from daq.safety import Verdict
 from daq.safety.findings import NOTHING, Finding
 
 OLDEST_TO_ACT_ON = 0.06
-"""Age (s) of a sample beyond which set points wait: an assumption, three control periods. A host that was kept from its
-work for a moment catches up within that; older samples would let it send many set points at once, in the dark."""
+"""Age (s) of a sample beyond which set points wait: an assumption, three control periods. A host that was held up
+briefly catches up within that time; acting on older samples, it would send many set points at once without seeing the
+arm."""
 LONGEST_BEHIND = 1.0
-"""s that samples may stay too old before the run ends in a fault: an assumption."""
+"""Time (s) for which samples may stay too old before the run ends in a fault: an assumption."""
 
 
 @dataclass

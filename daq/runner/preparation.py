@@ -1,4 +1,4 @@
-"""Everything that is asked and checked before an arm may move. Nothing here changes anything on the board."""
+"""All checks before an arm may move. Nothing here changes anything on the board."""
 
 from __future__ import annotations
 
@@ -21,24 +21,32 @@ from firmware_protocol.commands import StatusFlag
 from firmware_protocol.framing import FRAME_OVERHEAD
 
 LINE_SHARE = 0.6
-"""Share of the line that samples of all joints may take; else only the experiment's joints are recorded."""
+"""Share of the line's capacity that samples of all joints may take; beyond it only the experiment's joints are
+recorded."""
 PERIOD_TOLERANCE = 0.01
-"""By how much (relative) the controller's period may differ from the machine file's."""
+"""Largest relative difference between the controller's period and the machine file's."""
 
 
 @dataclass(frozen=True)
 class Consent:
-    """What the operator has agreed to. A controller with an arm behind it is not moved without `moves_real_arm`."""
+    """The operator's consent. A controller with an arm behind it is not moved without `moves_real_arm`."""
 
     moves_real_arm: bool = False
 
     def __post_init__(self) -> None:
-        """Raises SpecError for what only counts as true."""
+        """Raises SpecError for a value that is merely truthy."""
         require_word(self.moves_real_arm)
+
+    def require(self, controller: Controller) -> None:
+        """Raises MissingConsentError when the controller has a real arm that nobody has agreed to move."""
+        if not controller.identity.simulated and not self.moves_real_arm:
+            raise MissingConsentError(
+                f"{controller.link.url} is a real arm: it moves only with the operator's consent (--yes)"
+            )
 
 
 class MissingConsentError(SafetyError):
-    """A real arm, and nobody has agreed that it may move."""
+    """A real arm would move without the operator's consent."""
 
 
 @dataclass(frozen=True)
@@ -55,10 +63,9 @@ def prepare(
 ) -> Prepared:
     """Looks at the arm, plans, and checks. Raises SafetyError, SpecError, TraceError (no room), LinkError,
     NoSampleError, ControllerRestartedError; nothing has changed on the board then."""
-    _require_consent(controller, consent)
+    consent.require(controller)
     _require_period(controller, machine)
-    if StatusFlag.FROZEN in controller.status().flags:
-        raise SafetyError("the arm has been stopped and holds its posture; `daq reset` ends that")
+    require_not_stopped(controller)
     _require_driven(controller, spec, machine)
     here = _look(controller, machine)
     _require_still(here, machine, limits)
@@ -82,11 +89,10 @@ def recorded_joints(controller: Controller, spec: ExperimentSpec) -> tuple[int, 
     return EVERY_JOINT if both_ways <= room else spec.joints
 
 
-def _require_consent(controller: Controller, consent: Consent) -> None:
-    if not controller.identity.simulated and not consent.moves_real_arm:
-        raise MissingConsentError(
-            f"{controller.link.url} is a real arm: it moves only with the operator's consent (--yes)"
-        )
+def require_not_stopped(controller: Controller) -> None:
+    """Raises SafetyError for an arm that a stop has frozen."""
+    if StatusFlag.FROZEN in controller.status().flags:
+        raise SafetyError("the arm has been stopped and holds its posture; `daq reset` ends that")
 
 
 def _require_period(controller: Controller, machine: Machine) -> None:

@@ -1,4 +1,4 @@
-"""Where rows and events go: into the trace, and to whoever listens."""
+"""Rows and events of a run go into the trace and to a listener."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from daq.contracts.trace import EventKind, TraceEvent
 from daq.traces.writer import TraceWriter
 
 
-class Ears(Protocol):
-    """Who listens while a run goes on. None of it may wait for anybody."""
+class RunListener(Protocol):
+    """Receives progress, rows and events during a run. No method may block."""
 
     def progress(self, fraction: float, text: str) -> None:
-        """How far the run is."""
+        """Reports progress."""
         ...
 
     def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
-        """A recorded control period."""
+        """Receives a recorded control period."""
         ...
 
     def happened(self, event: TraceEvent) -> None:
-        """An event that is in the trace too."""
+        """Receives an event, which is also in the trace."""
         ...
 
 
 @dataclass
 class Recorder:
-    """Everything, recorded and told."""
+    """Records every row and event, and passes it on to the listener."""
 
     writer: TraceWriter
     joints: tuple[int, ...]
-    ears: Ears
+    listener: RunListener
     first: int | None = None
     last: int = 0
     samples: int = 0
@@ -44,31 +44,31 @@ class Recorder:
         self.last = row.tick
         self.samples += 1
         self.writer.sample(row)
-        self.ears.sampled(self.joints, row)
+        self.listener.sampled(self.joints, row)
 
     def event(self, time: float, kind: EventKind, message: str, tick: int | None, joint: int | None = None) -> None:
         """An event. Raises TraceError."""
         event = TraceEvent(time=time, kind=kind, message=message, tick=tick, joint=joint)
         self.writer.event(event)
-        self.ears.happened(event)
+        self.listener.happened(event)
 
     @property
     def missing(self) -> int:
-        """Periods between the first and the last that have no sample."""
+        """Number of periods without a sample between the first and the last."""
         return 0 if self.first is None else self.last - self.first + 1 - self.samples
 
 
 @dataclass
-class ToldOnly:
-    """On the way to the start nothing is recorded, and samples that are missing are nobody's loss."""
+class ApproachObserver:
+    """Observer of the move to the start: passes events on, except missing samples, and records nothing."""
 
-    ears: Ears
+    listener: RunListener
 
     def row(self, _row: SampleRow) -> None:
-        """Nothing."""
+        """Ignored."""
         return
 
     def event(self, time: float, kind: EventKind, message: str, tick: int | None, joint: int | None = None) -> None:
-        """Told."""
+        """Passed on to the listener."""
         if kind != "missing":
-            self.ears.happened(TraceEvent(time=time, kind=kind, message=message, tick=tick, joint=joint))
+            self.listener.happened(TraceEvent(time=time, kind=kind, message=message, tick=tick, joint=joint))

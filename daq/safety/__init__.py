@@ -1,5 +1,5 @@
-"""What keeps a real arm from harm on the host's side. Pure: it judges, the caller acts. It never replaces the
-hardware's own emergency stop."""
+"""Safety checks on the host's side. Pure: they judge, and the caller acts. They never replace the hardware's own
+emergency stop."""
 
 from daq.safety.check_plan import check_move_to_start, check_plan, unchecked
 from daq.safety.findings import Finding, Verdict
@@ -9,6 +9,19 @@ from daq.safety.states import Action, Arm, Event, IllegalEventError, State, adva
 from daq.safety.violation import Violation
 
 __all__ = [
-    "Action", "Arm", "Event", "Finding", "IllegalEventError", "RestGuards", "RunningGuards", "State", "Verdict",
-    "Violation", "advance", "check_move_to_start", "check_plan", "largest_step", "unchecked",
-]  # fmt: skip
+    "Action",
+    "Arm",
+    "Event",
+    "Finding",
+    "IllegalEventError",
+    "RestGuards",
+    "RunningGuards",
+    "State",
+    "Verdict",
+    "Violation",
+    "advance",
+    "check_move_to_start",
+    "check_plan",
+    "largest_step",
+    "unchecked",
+]

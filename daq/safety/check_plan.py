@@ -1,4 +1,4 @@
-"""May a plan be carried out? Judged as a whole, before anything moves."""
+"""Checks a whole plan before anything moves."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from daq.trajectories.kinematics import link_ends
 
 
 def check_plan(plan: Plan, machine: Machine, limits: Limits) -> list[Violation]:
-    """Everything that speaks against carrying out `plan`; an empty list when nothing does.
+    """All violations of `plan`; an empty list when there are none.
 
     Limits that are None are not checked: `unchecked` names them. Speed is that of the planned angles, not of the
     rounded set points. A set point that jumps on purpose is judged by its size against the following-error limit: the
@@ -36,7 +36,7 @@ def check_move_to_start(plan: Plan, machine: Machine, limits: Limits) -> list[Vi
 
 
 def unchecked(machine: Machine, limits: Limits) -> list[str]:
-    """Limits that are not set, one line each: nobody watches them."""
+    """Limits that are not set and so not monitored, one line each."""
     lines = []
     for joint in range(1, len(machine.joints) + 1):
         own = limits.joint(joint)
@@ -61,7 +61,9 @@ def _widened(limits: Limits, plan: Plan, machine: Machine) -> Limits:
     joints = []
     for joint, angle in enumerate(plan.angles[0].tolist(), start=1):
         own = limits.joint(joint)
-        slack = rounding_slack(machine, joint)  # else limits could be crept past, half a posture unit at a time
+        slack = rounding_slack(
+            machine, joint
+        )  # otherwise repeated moves could creep past a limit, half a posture unit at a time
         low = None if own.low is None else min(own.low, angle + slack)
         high = None if own.high is None else max(own.high, angle - slack)
         joints.append(JointLimits(low=low, high=high, speed=own.speed))

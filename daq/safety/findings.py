@@ -22,7 +22,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is to be done after one control period.
+    """The decision after one control period.
 
     hold:     set points stay as they are and the plan's time stands still
     stop:     somebody has stopped the arm on the board; None when nobody has
@@ -36,7 +36,7 @@ class Verdict:
     findings: tuple[Finding, ...] = ()
 
     def __or__(self, other: Verdict) -> Verdict:
-        # Nearly every verdict of a period is the one that finds nothing.
+        # Nearly every verdict finds nothing.
         if other is NOTHING:
             return self
         if self is NOTHING:
@@ -52,7 +52,7 @@ NOTHING = Verdict()
 
 @dataclass(frozen=True)
 class Watched:
-    """The joints in each sample, in its order, with what turns their angles back into counts and posture units."""
+    """The joints of each sample, in its order, with the calibrations that turn angles into counts and posture units."""
 
     joints: tuple[int, ...]
     calibrations: tuple[JointCalibration, ...]

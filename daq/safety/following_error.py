@@ -1,4 +1,4 @@
-"""The arm must follow: set points wait for it, and do not wait for ever (section 6.5 of the source)."""
+"""The following error: set points pause while it is too large, and a pause that lasts is a fault (section 6.5)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Is what we see the arm as it is now? Ticks must go on without long gaps, and the board must not restart.
+"""Checks that samples are current: ticks must continue without long gaps, and the board must not restart.
 
-A link that falls silent is the link's to notice: its budget of retries ends in LinkTimeoutError.
+The link itself notices silence: when its retries are used up it raises LinkTimeoutError.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from daq.safety.findings import NOTHING, Finding, Verdict, Watched
 from firmware_protocol.commands import StatusFlag
 
 LONGEST_SILENCE = 0.2
-"""Time (s) between two samples beyond which the arm was out of sight: an assumption, ten control periods."""
+"""Longest time (s) between two samples: an assumption, ten control periods."""
 
 
 @dataclass
@@ -23,7 +23,7 @@ class Freshness:
     tick: int | None = None
 
     def check(self, row: SampleRow) -> Verdict:
-        """A sample has come."""
+        """The verdict after a sample."""
         last, self.tick = self.tick, row.tick
         if row.status & StatusFlag.RESTARTED.value or (last is not None and row.tick < last):
             line = f"the board has restarted: tick {row.tick}" + ("" if last is None else f" after {last}")

@@ -30,8 +30,9 @@ class RunningGuards:
         self.unexpected_motion = UnexpectedMotion(watched, frozenset(sampled) - frozenset(moving), from_set_point=True)
 
     def check(self, row: SampleRow, planned: Mapping[int, int], expected: Mapping[int, int] | None = None) -> Verdict:
-        """After a sample. `planned`: postures to be sent next, by joint; they may be sent unless the verdict says hold
-        or stop, or trips. `expected`: postures that the sample's period should have taken, None when not known."""
+        """The verdict after a sample. `planned`: postures to be sent next, by joint; they may be sent unless the
+        verdict says hold or stop, or trips. `expected`: postures that the sample's period should have taken, None when
+        not known."""
         verdict = self.freshness.check(row) | _frozen(row) | self.unexpected_motion.check(row)
         return verdict | self.following_error.check(row, planned) | self.missed_set_points.check(row, expected)
 
@@ -45,7 +46,7 @@ class RestGuards:
         self.unexpected_motion = UnexpectedMotion(watched, frozenset(sampled) - frozenset(led), from_set_point=False)
 
     def check(self, row: SampleRow) -> Verdict:
-        """After a sample."""
+        """The verdict after a sample."""
         return self.freshness.check(row) | _frozen(row) | self.unexpected_motion.check(row)
 
 

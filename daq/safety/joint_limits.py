@@ -18,7 +18,7 @@ default gain gravity costs joint 2 about 3 counts; a step without this margin mi
 
 
 def joint_violations(plan: Plan, machine: Machine, limits: Limits) -> list[Violation]:
-    """What speaks against the plan joint by joint."""
+    """Violations of each joint's limits."""
     found: list[Violation] = []
     for joint in range(1, plan.angles.shape[1] + 1):
         found += _posture_violations(plan, joint)

@@ -10,12 +10,13 @@ from daq.safety.findings import NOTHING, Finding, Verdict, Watched
 from firmware_protocol.commands import StatusFlag
 
 LONGEST_RUN = 10
-"""Control periods in a row without a set point taken that are still borne: an assumption, 0.2 s."""
+"""Most control periods in a row in which the controller may miss its set points: an assumption, 0.2 s."""
 
 
 @dataclass
 class MissedSetPoints:
-    """Counts them. One is harmless, set points being absolute; a run of them means an arm that is not under control."""
+    """Counts missed set points. One is harmless, since set points are absolute; a run of them means a loss of
+    control."""
 
     watched: Watched
     missed: int = 0

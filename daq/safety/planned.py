@@ -1,4 +1,4 @@
-"""The motion of an experiment, worked out and allowed: for programs that judge experiments before any is run."""
+"""The planned and checked motion of an experiment, for programs that compare experiments before any is run."""
 
 from __future__ import annotations
 

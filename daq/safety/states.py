@@ -23,17 +23,17 @@ class State(StrEnum):
 
 
 class Event(StrEnum):
-    """What can happen."""
+    """Events that change the state."""
 
     CONNECTED = "connected"
     LINK_LOST = "link lost"
     ARM = "arm"
-    """Somebody wants to move the arm, and the plan has passed every check."""
+    """An operator wants to move the arm, and the plan has passed every check."""
     DISARM = "disarm"
     START = "start"
     FINISHED = "finished"
     STOP = "stop"
-    """From anyone, at any moment."""
+    """A stop was requested. Anyone may request one, at any moment."""
     TRIP = "trip"
     """A guard has found a reason for a fault."""
     RESET = "reset"
@@ -141,5 +141,5 @@ def _reset(arm: Arm) -> Outcome:
 
 
 def _first(arm: Arm, cause: str) -> str:
-    """The first cause is kept: what follows from it would hide it. A fault replaces a stop's."""
+    """Keeps the first cause, which its consequences would hide; a fault replaces the cause of a stop."""
     return arm.cause if arm.state is State.FAULT and arm.cause else cause

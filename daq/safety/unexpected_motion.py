@@ -26,7 +26,7 @@ class UnexpectedMotion:
     seen: dict[int, float] = field(default_factory=dict)
 
     def check(self, row: SampleRow) -> Verdict:
-        """A sample has come."""
+        """The verdict after a sample."""
         trips = []
         for joint, counts in self._strayed(row).items():
             if abs(counts) > STILL_WITHIN:

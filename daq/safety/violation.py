@@ -8,7 +8,7 @@ from typing import Literal
 Rule = Literal["finite", "posture", "range", "speed", "step", "floor", "reach"]
 
 TOLERANCE = 1e-9
-"""Rounding of floating-point numbers is no violation (rad, m)."""
+"""Excess (rad, m) that is attributed to floating-point rounding and is no violation."""
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,11 @@ from daq.trajectories import Plan
 from daq.trajectories.kinematics import link_ends
 
 FINEST_LOOK = math.radians(1.0)
-"""Between set points that are further apart than this (rad, or m) it is looked at in between too."""
+"""Largest distance (rad, or m) between set points that is not subdivided for the check."""
 
 
 def workspace_violations(plan: Plan, machine: Machine, limits: Limits) -> list[Violation]:
-    """What speaks against the plan in space."""
+    """Violations of floor and reach."""
     if limits.floor_height is None and limits.reach is None:
         return []
     time, angles = _looked_at(plan)
@@ -50,7 +50,7 @@ def _largest(values: Floats) -> tuple[int, int, float]:
 
 
 def _looked_at(plan: Plan) -> tuple[Floats, Floats]:
-    """Times (s) and angles (rad) at which the workspace is looked at."""
+    """Times (s) and angles (rad) at which the workspace is checked."""
     change = np.abs(np.diff(plan.angles, axis=0)).max(axis=1, initial=0.0)
     parts = np.maximum(np.ceil(change / FINEST_LOOK), 1).astype(np.int64)
     index = np.repeat(np.arange(len(parts)), parts)

@@ -8,7 +8,25 @@ from daq.teaching.program_plan import Performer, PlannedInstruction, check_progr
 from daq.teaching.recording import RecordedPath, playback
 
 __all__ = [
-    "DEAD_MAN", "JOG_SPEED", "JogCommand", "JogStep", "Jogger", "Performer", "PlannedInstruction", "Program",
-    "RecordedPath", "TeachableArm", "TeachingError", "check_program", "jog", "lead_by_nose", "load_program",
-    "parse_program", "plan_program", "playback", "program_text", "run_program", "save_program",
-]  # fmt: skip
+    "DEAD_MAN",
+    "JOG_SPEED",
+    "JogCommand",
+    "JogStep",
+    "Jogger",
+    "Performer",
+    "PlannedInstruction",
+    "Program",
+    "RecordedPath",
+    "TeachableArm",
+    "TeachingError",
+    "check_program",
+    "jog",
+    "lead_by_nose",
+    "load_program",
+    "parse_program",
+    "plan_program",
+    "playback",
+    "program_text",
+    "run_program",
+    "save_program",
+]

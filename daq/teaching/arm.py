@@ -1,4 +1,4 @@
-"""What teaching needs of an arm: the motor controller has it, and so has whatever stands in for it in a test."""
+"""The arm as teaching uses it: an interface that the motor controller and a test's substitute implement."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from daq.runner import StoppedError
 
 
 class TeachingError(DaqError):
-    """Teaching had to end, or what was taught cannot be used."""
+    """Teaching ended early, or its result cannot be used."""
 
     exit_code = 5
 
@@ -53,10 +53,10 @@ class TeachableArm(Protocol):
         """Writes the gains of a joint."""
         ...
 
-    def stopped(self, cause: str) -> StoppedError:
-        """Freezes the arm, which somebody wants stopped; what is to be raised then says what became of it."""
+    def freeze_for_stop(self, cause: str) -> StoppedError:
+        """Freezes the arm on request; returns the error to raise, which states the result."""
         ...
 
-    def tripped(self, cause: str) -> TeachingError:
-        """Freezes the arm because of a fault; what is to be raised then says what became of it."""
+    def freeze_for_fault(self, cause: str) -> TeachingError:
+        """Freezes the arm because of a fault; returns the error to raise, which states the result."""
         ...

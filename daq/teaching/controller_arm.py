@@ -34,7 +34,7 @@ def require_period(controller: Controller, machine: Machine) -> None:
 class ControllerArm:
     """A `TeachableArm` over the driver, in the states of `ArmControl` like every run.
 
-    ended:        says why somebody outside wants the end; None while nobody does
+    ended:        gives the reason of an external request to end; None while there is none
     every_period: True delivers each period once, in order; False the newest, which a slow line can do
 
     Raises SafetyError for a controller of another period than the machine file's.
@@ -76,9 +76,9 @@ class ControllerArm:
         try:
             snapshot = self._controller.next_snapshot(self._last if self._every_period else None, self.joints)
         except (LinkError, NoSampleError) as error:
-            raise halting.tripped(self._control, str(error), Event.LINK_LOST) from error
+            raise halting.freeze_for_fault(self._control, str(error), Event.LINK_LOST) from error
         except ControllerRestartedError as error:
-            raise self.tripped(str(error)) from error
+            raise self.freeze_for_fault(str(error)) from error
         self._last, self.lateness = snapshot.tick, snapshot.jitter
         return self._rows.row(snapshot)
 
@@ -90,7 +90,7 @@ class ControllerArm:
         try:
             self._controller.set_points(postures)
         except RequestRefusedError as error:
-            raise self.stopped(self._ended() or str(error)) from error
+            raise self.freeze_for_stop(self._ended() or str(error)) from error
 
     def gains(self) -> Mapping[int, Gain]:
         """Joint → (P, I, D)."""
@@ -101,21 +101,21 @@ class ControllerArm:
         self._require_going_on()
         self._controller.set_gains(joint, p, i, d)
 
-    def stopped(self, cause: str) -> StoppedError:
-        """Freezes the arm for whoever wants it stopped."""
-        return halting.stopped(self._control, cause)
+    def freeze_for_stop(self, cause: str) -> StoppedError:
+        """Freezes the arm on request."""
+        return halting.freeze_for_stop(self._control, cause)
 
-    def tripped(self, cause: str) -> TeachingError:
+    def freeze_for_fault(self, cause: str) -> TeachingError:
         """Freezes the arm because of a fault."""
-        return halting.tripped(self._control, cause)
+        return halting.freeze_for_fault(self._control, cause)
 
     def _require_going_on(self) -> None:
         cause = self._ended() or self._control.halted
         if cause is not None:
-            raise self.stopped(cause)
+            raise self.freeze_for_stop(cause)
 
     def _step(self, event: Event) -> None:
         try:
             self._control.handle(event)
-        except StoppedError as error:  # in this very moment: it still says what became of the stop
-            raise self.stopped(self._ended() or self._control.halted or str(error)) from error
+        except StoppedError as error:  # stopped meanwhile: the error still states the result of the stop
+            raise self.freeze_for_stop(self._ended() or self._control.halted or str(error)) from error

@@ -15,7 +15,8 @@ from daq.teaching.program_plan import check_program, plan_program
 
 
 def delete(program: Program, number: int) -> Program:
-    """Without instruction `number` (from 1). Raises SpecError for one that is not there, and for the last one left."""
+    """The program without instruction `number` (from 1). Raises SpecError for one that is not there, and for the last
+    one left."""
     _require(program, number)
     if len(program.instructions) == 1:
         raise SpecError(f"program {program.name}: its only instruction cannot be deleted; delete the file")
@@ -24,9 +25,10 @@ def delete(program: Program, number: int) -> Program:
 
 
 def insert(program: Program, number: int, instruction: Instruction) -> Program:
-    """With another instruction as `number`; those from there on move one back. One past the end adds it there.
+    """The program with another instruction as `number`; those from there on move one back. One past the end adds it
+    there.
 
-    Raises SpecError for a place that is none.
+    Raises SpecError for a place that does not exist.
     """
     _require(program, number, beyond=1)
     before, after = program.instructions[: number - 1], program.instructions[number - 1 :]
@@ -34,7 +36,7 @@ def insert(program: Program, number: int, instruction: Instruction) -> Program:
 
 
 def move(program: Program, number: int, to: int) -> Program:
-    """With instruction `number` as number `to`. Raises SpecError for places that are none."""
+    """The program with instruction `number` moved to place `to`. Raises SpecError for places that do not exist."""
     _require(program, number)
     _require(program, to)
     moved = list(program.instructions)
@@ -43,7 +45,7 @@ def move(program: Program, number: int, to: int) -> Program:
 
 
 def change(program: Program, number: int, fields: Mapping[str, Any]) -> Program:
-    """With other values in instruction `number`; angles of joints that are not named stay.
+    """The program with other values in instruction `number`; angles of joints that are not named stay.
 
     Raises SpecError for a field that such an instruction has not, and for a value that is not allowed.
     """
@@ -62,12 +64,12 @@ def change(program: Program, number: int, fields: Mapping[str, Any]) -> Program:
 
 
 def rename(program: Program, name: str) -> Program:
-    """With another name. Raises SpecError for one that is not allowed."""
+    """The program under another name. Raises SpecError for a name that is not allowed."""
     return _changed(program, name=name)
 
 
 def new_violations(before: Program, after: Program, machine: Machine) -> list[str]:
-    """What speaks against carrying the edited program out and did not before, planned from the machine's rest posture.
+    """Violations of the edited program that the program before did not have, planned from the machine's rest posture.
 
     A program that could not be planned before either (of another machine, or outside the sensors' ranges) is let
     through: it may take several edits to mend. Raises SpecError where it cannot be planned any more, and for a machine

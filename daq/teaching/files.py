@@ -1,4 +1,4 @@
-"""Files of what was taught: there whole or not at all, and on the disk before it is said that they are."""
+"""Writes files of taught programs and paths atomically, and syncs them to the disk before it returns."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from daq.traces import disk
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Writes a text file aside and puts it in its place. Raises SpecError with one line; what was there stays then."""
+    """Writes a text file under another name and renames it. Raises SpecError with one line; the old file then stays."""
     part = path.with_name(path.name + ".part")
     try:
         with part.open("wb") as stream:

@@ -1,23 +1,23 @@
-"""How teaching ends before its time: the arm is frozen first, then one line says why, and what became of the freeze."""
+"""Early end of teaching: the arm is frozen first; then one line states the reason and the result of the freeze."""
 
 from __future__ import annotations
 
 from daq.runner import ArmControl, StoppedError
-from daq.runner.arm_control import told
+from daq.runner.arm_control import stop_line
 from daq.safety import Event
 from daq.teaching.arm import TeachingError
 
 
-def stopped(control: ArmControl, cause: str) -> StoppedError:
-    """Freezes the arm for whoever wants it stopped. Asking twice costs nothing: the board confirms what holds."""
+def freeze_for_stop(control: ArmControl, cause: str) -> StoppedError:
+    """Freezes the arm on request. A second request does no harm: the board confirms its state."""
     return StoppedError(f"the arm has been stopped: {cause}{_frozen(control, Event.STOP, cause)}")
 
 
-def tripped(control: ArmControl, cause: str, event: Event = Event.TRIP) -> TeachingError:
+def freeze_for_fault(control: ArmControl, cause: str, event: Event = Event.TRIP) -> TeachingError:
     """Freezes the arm because of a fault."""
     return TeachingError(f"the arm has been stopped by a fault: {cause}{_frozen(control, event, cause)}")
 
 
 def _frozen(control: ArmControl, event: Event, cause: str) -> str:
     confirmation = control.handle(event, cause)
-    return "" if confirmation is None else f"; {told(confirmation)}"
+    return "" if confirmation is None else f"; {stop_line(confirmation)}"

@@ -20,7 +20,7 @@ from daq.trajectories import control_period, make_plan
 JOG_SPEED = 0.35
 """Highest speed of jogging in rad/s (20 °/s): an assumption. A joint's own limit may be lower."""
 DEAD_MAN = 0.3
-"""Time (s) for which a command moves the arm: an assumption. Whoever holds the key repeats it more often."""
+"""Time (s) for which a command moves the arm: an assumption. While the key is held, commands come more often."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Jogger:
         self._driven: dict[int, float] = {}
 
     def step(self, row: SampleRow, command: JogCommand | None) -> JogStep:
-        """What to send after `row`. Nothing moves without a command, or when it is older than DEAD_MAN."""
+        """The step to send after `row`. Nothing moves without a command, or when it is older than DEAD_MAN."""
         if command is None or row.host_time - command.time > DEAD_MAN:
             return JogStep()
         self._check(command)
@@ -95,7 +95,7 @@ class Jogger:
                 raise SpecError(f"jog: joint {joint}: velocity of {velocity} rad/s: allowed are up to ±{top:g} rad/s")
 
     def _angles(self, row: SampleRow) -> Floats:
-        """Where the set points of all joints are: what was sent last, else what the controller holds."""
+        """Set points of all joints: those sent last, else those that the controller holds."""
         held = zip(self._joints, row.set_point, strict=True)
         return np.array([self._driven.get(joint, angle) for joint, angle in held])
 
@@ -123,9 +123,9 @@ def jog(
             step = jogger.step(row, commands(row))
             verdict = guards.check(row, step.postures) | lag.check(row.tick, arm.lateness)
             if verdict.stop is not None:
-                raise arm.stopped(verdict.stop)
+                raise arm.freeze_for_stop(verdict.stop)
             if verdict.trips:
-                raise arm.tripped("; ".join(verdict.trips))
+                raise arm.freeze_for_fault("; ".join(verdict.trips))
             if step.refused != told:
                 told = step.refused
                 for line in told:

@@ -21,9 +21,9 @@ STILL_WITHIN = 8
 """ADC counts of error up to which the gains of a led joint come back: an assumption, a pull of half a degree. No led
 joint may have moved by more in that time either: set points that follow it leave no error to be seen."""
 STILL_FOR = 0.2
-"""Time (s) for which it must be so without a break: an assumption. A hand that turns round is still for a moment."""
+"""Time (s) for which the error must stay that small: an assumption. A hand that reverses is still for a moment."""
 SHORTEST = 2
-"""Samples that make a path."""
+"""Least number of samples of a path."""
 PATIENCE = 10.0
 """Time (s) that a led arm has to come to rest before its gains come back: an assumption."""
 
@@ -58,9 +58,9 @@ def lead_by_nose(
             if len(rows) >= SHORTEST:
                 keep(_path(rows, arm.joints, joints, control_period(machine)))
     except StoppedError as error:
-        raise StoppedError(f"lead: {error}{_told(limp)}") from error
+        raise StoppedError(f"lead: {error}{_limp_line(limp)}") from error
     except DaqError as error:
-        raise TeachingError(f"lead: {error}{_told(limp)}") from error
+        raise TeachingError(f"lead: {error}{_limp_line(limp)}") from error
     if len(rows) < SHORTEST:
         raise TeachingError(f"lead: {len(rows)} samples are no path, at least {SHORTEST} are needed")
 
@@ -89,7 +89,7 @@ def _lead(
     _restore(arm, machine, guards, limp)
 
 
-def _told(limp: Mapping[int, Gain]) -> str:
+def _limp_line(limp: Mapping[int, Gain]) -> str:
     if not limp:
         return ""
     gains = ",".join(f"{joint}={'/'.join(map(str, gain))}" for joint, gain in limp.items())
@@ -114,9 +114,9 @@ def _measured(arm: TeachableArm, machine: Machine, joints: tuple[int, ...], row:
 def _require_calm(arm: TeachableArm, guards: RestGuards, row: SampleRow) -> None:
     verdict = guards.check(row)
     if verdict.stop is not None:
-        raise arm.stopped(verdict.stop)
+        raise arm.freeze_for_stop(verdict.stop)
     if verdict.trips:
-        raise arm.tripped("; ".join(verdict.trips))
+        raise arm.freeze_for_fault("; ".join(verdict.trips))
 
 
 def _restore(arm: TeachableArm, machine: Machine, guards: RestGuards, limp: dict[int, Gain]) -> None:
@@ -142,7 +142,7 @@ def _restore(arm: TeachableArm, machine: Machine, guards: RestGuards, limp: dict
             return
         sent = _measured(arm, machine, joints, row)
         arm.set_points(sent)
-    raise arm.tripped(f"the arm did not come to rest within {PATIENCE:g} s")
+    raise arm.freeze_for_fault(f"the arm did not come to rest within {PATIENCE:g} s")
 
 
 def _at_rest(arm: TeachableArm, machine: Machine, row: SampleRow, sent: Mapping[int, int]) -> bool:

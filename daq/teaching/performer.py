@@ -18,17 +18,17 @@ from daq.teaching.controller_arm import ControllerArm
 from daq.trajectories import Plan
 
 
-class _Teller:
-    """Of what happens on the way only the alarms are worth a line."""
+class _AlarmReporter:
+    """Observer of a taught motion: reports alarms only."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         self._tell = tell
 
     def row(self, row: SampleRow) -> None:
-        """Not told."""
+        """Ignored."""
 
     def event(self, time: float, kind: EventKind, message: str, tick: int | None, joint: int | None = None) -> None:
-        """One line."""
+        """Reports an alarm in one line."""
         del time, tick, joint
         if kind not in ("start", "end", "note", "ramp_start", "ramp_end"):
             self._tell(message)
@@ -49,13 +49,13 @@ class FollowingPerformer:
         self._controller = controller
         self._control = control
         self._follower = Follower(
-            controller, control, machine, limits, EVERY_JOINT, _Teller(tell), ended, every_period=False
+            controller, control, machine, limits, EVERY_JOINT, _AlarmReporter(tell), ended, every_period=False
         )
         self._ended = ended
         self._arm = ControllerArm(controller, control, machine, ended, every_period=False)
         self._guarded = partial(RunningGuards, machine, limits, self._arm.joints)
         self._guards = self._guarded(moving=self._arm.joints)
-        """While nothing is sent. Joints that were moved last may still be on the way to their set points."""
+        """Guards while nothing is sent. Joints that were moved last may still be on the way to their set points."""
         self._step(Event.ARM)
 
     def follow(self, plan: Plan) -> None:
@@ -65,9 +65,9 @@ class FollowingPerformer:
         self._step(Event.START)
         ending = self._follower.follow(plan, lambda _index: None)
         if ending.kind == "stopped":
-            raise halting.stopped(self._control, ending.cause)
+            raise halting.freeze_for_stop(self._control, ending.cause)
         if ending.kind != "finished":
-            raise halting.tripped(self._control, ending.cause)
+            raise halting.freeze_for_fault(self._control, ending.cause)
         self._guards = self._guarded(moving=plan.moving)
         self._step(Event.FINISHED)
 
@@ -77,9 +77,9 @@ class FollowingPerformer:
         for _ in range(periods):
             verdict = self._guards.check(self._arm.next_sample(), {})
             if verdict.stop is not None:
-                raise self._arm.stopped(verdict.stop)
+                raise self._arm.freeze_for_stop(verdict.stop)
             if verdict.trips:
-                raise self._arm.tripped("; ".join(verdict.trips))
+                raise self._arm.freeze_for_fault("; ".join(verdict.trips))
         self._require_going_on()
 
     def input_is_on(self, line: int) -> bool:
@@ -104,10 +104,10 @@ class FollowingPerformer:
     def _require_going_on(self) -> None:
         cause = self._ended() or self._control.halted
         if cause is not None:
-            raise halting.stopped(self._control, cause)
+            raise halting.freeze_for_stop(self._control, cause)
 
     def _step(self, event: Event) -> None:
         try:
             self._control.handle(event)
         except StoppedError as error:
-            raise halting.stopped(self._control, self._control.halted or str(error)) from error
+            raise halting.freeze_for_stop(self._control, self._control.halted or str(error)) from error

@@ -16,7 +16,7 @@ from daq.teaching.recording import FASTEST_RATE, SLOWEST_RATE, RecordedPath
 from daq.trajectories import MOVE_SPEED
 
 NAME = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}"
-"""Of a program, as a regular expression."""
+"""Permitted names of programs, as a regular expression."""
 
 Speed = Annotated[FiniteFloat, Field(gt=0, le=3)]
 Line = Annotated[int, Field(ge=0, le=7)]
@@ -52,14 +52,14 @@ class PlayPath(_Part):
 
 
 class Wait(_Part):
-    """`duration` s without motion."""
+    """Waits for `duration` s without motion."""
 
     kind: Literal["wait"] = "wait"
     duration: Duration
 
 
 class SetOutput(_Part):
-    """Process output `line` (0–7) on or off."""
+    """Switches process output `line` (0–7) on or off."""
 
     kind: Literal["output"] = "output"
     line: Line
@@ -84,7 +84,7 @@ class Gripper(_Part):
 
 Instruction = Annotated[
     Absolute | Relative | PlayPath | Wait | SetOutput | AwaitInput | Gripper, Field(discriminator="kind")
-]  # fmt: skip
+]
 
 
 class Program(_Part):
@@ -130,7 +130,8 @@ def is_program_name(text: str) -> bool:
 
 
 def require_program_file(path: Path) -> None:
-    """Raises SpecError where a program could not be saved as `path`, whose stem is its name: before there is one."""
+    """Raises SpecError where a program could not be saved as `path`, whose stem is its name; called before it
+    exists."""
     if not is_program_name(path.stem):
         rule = "a name has 1 to 64 letters, digits, _ . or -, and begins with a letter or digit"
         raise SpecError(f"program {path.stem!r}: {rule}")

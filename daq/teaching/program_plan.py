@@ -1,4 +1,4 @@
-"""A program as plans: worked out and checked from end to end before its first motion."""
+"""Plans and checks a whole program before its first motion."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class PlannedInstruction:
 
 
 class Performer(Protocol):
-    """Who carries a program out."""
+    """Carries out a program's instructions."""
 
     def follow(self, plan: Plan) -> None:
         """Plays a plan to its end. Raises a DaqError when it does not get there."""
@@ -80,7 +80,7 @@ def plan_program(program: Program, machine: Machine, start: Sequence[float]) -> 
 
 
 def check_program(planned: Sequence[PlannedInstruction], machine: Machine, limits: Limits) -> list[str]:
-    """Everything that speaks against carrying the program out, one line each. The first motion may come back from
+    """All violations of the program, one line each. The first motion may come back from
     outside the limits, where the arm may have been led."""
     lines = []
     first = True

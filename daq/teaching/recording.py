@@ -13,9 +13,9 @@ from daq.contracts.experiment import Angle, ExperimentSpec, JointNumber, Path
 from daq.teaching.files import write_whole
 
 SLOWEST_RATE = 0.01
-"""Lowest factor by which a path may be played: a minute then takes more than an hour and a half."""
+"""Lowest playback rate: a minute of path then takes more than an hour and a half."""
 FASTEST_RATE = 10.0
-"""Highest factor by which a path may be played faster than it was led: limits decide earlier."""
+"""Highest playback rate; in practice the limits of the arm are lower."""
 
 
 class RecordedPath(BaseModel):

@@ -1,4 +1,4 @@
-"""The largest values that signals may have: far beyond any rig, and small enough to compute with."""
+"""The largest values that signals may have: far beyond any rig, and small enough for arithmetic."""
 
 from __future__ import annotations
 
@@ -12,19 +12,21 @@ from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace, TraceEvent, TraceRecord
 
 LARGEST_POSITION = 1e9
-"""rad or m. A shaft at 10 000 rpm takes eleven days to turn as far, and a float64 resolves 1e-7 rad there."""
+"""Largest position (rad or m). A shaft at 10 000 rpm takes eleven days to turn as far, and a float64 resolves 1e-7 rad
+there."""
 LARGEST_VELOCITY = 1e6
-"""rad/s or m/s. The fastest rotors, of dental drills and turbochargers, turn at 5e4 rad/s."""
+"""Largest velocity (rad/s or m/s). The fastest rotors, of dental drills and turbochargers, turn at 5e4 rad/s."""
 LARGEST_DRIVE = 1e9
-"""V, N·m or N. The largest testing machines press with 1e9 N."""
+"""Largest drive (V, N·m or N). The largest testing machines press with 1e9 N."""
 LARGEST_TIME = 4e9
-"""s, of either sign: time counts from the start of a record or, in the files of some loggers, from 1970."""
+"""Largest time (s), of either sign: time counts from the start of a record or, in the files of some loggers, from
+1970."""
 SMALLEST_STEP = 1e-9
-"""s. MCAP's time stamps count ns."""
+"""Smallest difference (s) between two times; MCAP's time stamps count ns."""
 LARGEST_TICK = 2**53
-"""Control periods, of either sign: the whole numbers that a float64 holds exactly; 285 years of 1 µs."""
+"""Largest tick (control periods), of either sign: the whole numbers that a float64 holds exactly; 285 years of 1 µs."""
 SHORTEST_PERIOD, LONGEST_PERIOD = 1e-6, 86400.0
-"""s of a control period: a loop at 1 MHz, one sample a day."""
+"""Bounds (s) of a control period: a loop at 1 MHz, one sample a day."""
 
 LARGEST = {
     "time": (LARGEST_TIME, "s"),
@@ -65,7 +67,7 @@ def check_trace(trace: Trace, origin: str) -> None:
 
 
 def check_signals(signals: Mapping[str, NDArray[Any] | None], origin: str) -> None:
-    """The same for columns, by their names; those that are None, or have no bound, are passed over."""
+    """The same for columns by name; columns that are None or have no bound are skipped."""
     for name in LARGEST:
         values = signals.get(name)
         outside = None if values is None else first_outside(name, values)

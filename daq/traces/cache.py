@@ -1,4 +1,4 @@
-"""A trace's columns beside its file, so that opening it again needs no decoding. Never needed: delete it at will.
+"""A trace's columns cached beside its file, so that opening it again needs no decoding. The cache may be deleted.
 
 The cache holds the limits that the trace was read within, and the size and the CRC-32 over every byte of the trace file
 it was made from, and is used only when the file still has both and the limits are the same. So a changed file is
@@ -26,13 +26,13 @@ WORTH_IT = 1_000_000
 """Size of a trace file (bytes) below which decoding it is as fast as a cache."""
 
 _VERSION = 2
-"""Raised when a reader refuses, or takes otherwise, what an earlier one took: its caches are then of no use."""
+"""Format version; to be raised when a reader interprets files differently, which makes earlier caches invalid."""
 _PIECE = 1 << 19
-"""Bytes read at a time: they stay in the processor's cache while their checksum is computed."""
+"""Size (bytes) of the pieces that are read: they stay in the processor's cache while their checksum is computed."""
 
 
 def cache_path(path: Path) -> Path:
-    """Where the cache of a trace file is."""
+    """Path of the cache of a trace file."""
     return path.parent / FOLDER / f"{path.name}.npz"
 
 

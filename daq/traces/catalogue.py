@@ -1,4 +1,4 @@
-"""Which traces a folder has: what each says about itself, without reading its samples."""
+"""Lists the traces of a folder from their metadata, without reading samples."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ State = Literal["finished", "recording", "unfinished", "unreadable"]
 """`recording`: a living process writes it; `unfinished`: left by a crash, `salvage` finishes it."""
 
 LAST = "last"
-"""Instead of a number or a name: the newest finished trace."""
+"""Name of the newest finished trace, in place of its number."""
 
 
 class TraceSummary(BaseModel):
-    """One file of a folder of traces. What is not known is None: of an unfinished trace, how long it is."""
+    """One file of a folder of traces. Unknown values are None, such as the duration of an unfinished trace."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     path: Path
     state: State
     size: int
-    """Bytes; 0 where the file system cannot tell it."""
+    """Size (bytes); 0 where it is unknown."""
     trace_id: str | None = None
     created: datetime | None = None
     source: str | None = None
@@ -45,7 +45,7 @@ class TraceSummary(BaseModel):
     outcome: Outcome | None = None
     samples: int | None = None
     duration: float | None = None
-    """s between the first and the last sample."""
+    """Time (s) between the first and the last sample."""
     operator: str | None = None
     notes: str = ""
     problem: str | None = None
@@ -66,7 +66,7 @@ def list_traces(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> tup
         try:
             summaries.append(summary_of(path, limits))
         except FileNotFoundError:
-            continue  # finished, salvaged or deleted in this moment
+            continue  # finished, salvaged or deleted meanwhile
     return tuple(sorted(summaries, key=lambda summary: (_moment(summary), summary.path.name)))
 
 
@@ -104,7 +104,7 @@ def find_trace(folder: Path, wanted: str, limits: TraceLimits = DEFAULT_TRACE_LI
 
     Raises TraceError when there is none, or when several begin so.
     """
-    if os.path.isfile(wanted):  # pathlib's raises for a name that is too long
+    if os.path.isfile(wanted):  # Path.is_file raises for a name that is too long
         return Path(wanted)
     folder = Path(folder)
     summaries = list_traces(folder, limits) if folder.is_dir() else ()

@@ -1,4 +1,4 @@
-"""Traces as plain CSV, for other rigs and other tools, with a TOML beside it for what columns cannot say."""
+"""Traces as plain CSV, for other rigs and tools, with a TOML file beside it for what columns cannot hold."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SIGNALS = ("set_point", "position", "drive", "velocity")
 position is then the integral of the speed, from 0."""
 
 INTEGRATED = "Positions are integrals of the measured speeds, from 0."
-"""What a trace says whose record has no positions."""
+"""Note in a trace whose positions were integrated."""
 
 _COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-6])")
 
@@ -111,14 +111,14 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
             signals[name] = table[:, [header.index(f"{name}_{joint}") for joint in joints]]
     record = _record(path, beside, trace_id_of(data, *([] if beside_data is None else [beside_data])))
     if "position" not in signals:
-        signals["position"] = _travelled(table[:, 0], signals["velocity"])
+        signals["position"] = _integrate(table[:, 0], signals["velocity"])
         bounds.check_signals({"position": signals["position"]}, f"{path}: integrals of the speeds")
         record = record.model_copy(update={"notes": f"{record.notes} {INTEGRATED}".strip()})
     bounds.check_record(record, (), str(path))
     return Trace(record, joints, table[:, 0], **signals)
 
 
-def _travelled(time: Floats, velocity: Floats) -> Floats:
+def _integrate(time: Floats, velocity: Floats) -> Floats:
     """Positions (k, j) from 0 for speeds (k, j), by the trapezoidal rule."""
     steps = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time)[:, None]
     return np.concatenate([np.zeros((1, velocity.shape[1])), np.cumsum(steps, axis=0)])
@@ -299,5 +299,5 @@ def _beside_text(trace: Trace) -> str:
 
 
 def _toml_text(text: str | None) -> str | None:
-    """A TOML string: JSON's escapes are TOML's, but for DEL, which TOML wants escaped."""
+    """A TOML string: as in JSON, except that TOML requires DEL to be escaped."""
     return None if text is None else json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")

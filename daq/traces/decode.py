@@ -1,4 +1,4 @@
-"""Samples and events out of the chunks of a trace, chunk by chunk."""
+"""Decodes samples and events from the chunks of a trace."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from daq.traces import layout
 from daq.traces.scan import UNREADABLE, Scan, payloads, require
 
 Samples = NDArray[Any]
-"""Of one joint, (n,) of `layout.JOINT_SAMPLE_DTYPE`."""
+"""Samples of one joint, (n,) of `layout.JOINT_SAMPLE_DTYPE`."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What the operating system is asked for so that a trace survives: locks, syncs, renames that are all or nothing."""
+"""Operating-system calls that make a trace survive a crash: locks, syncs, atomic renames."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ def open_regular(path: Path) -> IO[bytes]:
 
 
 def size_of(stream: IO[bytes]) -> int:
-    """Bytes of an open file."""
+    """Size (bytes) of an open file."""
     return os.fstat(stream.fileno()).st_size
 
 
 def read_at_most(stream: IO[bytes], most: int, origin: str, limit: str = "file_bytes") -> bytes:
-    """All of a file. Raises TraceError when it has more than `most` bytes, without reading them; OSError."""
+    """The content of a file. Raises TraceError when it has more than `most` bytes, without reading them; OSError."""
     size = size_of(stream)
     if size > most:
         raise TraceError(f"{origin}: has {size} bytes; up to {most} are read (traces.limits.{limit})")
-    return stream.read(size)  # of what it has now: a read of `most` bytes would make room for as many
+    return stream.read(size)  # the present size: a read of `most` bytes would allocate as many
 
 
 def create_locked(path: Path) -> IO[bytes]:

@@ -20,7 +20,7 @@ _FOOTER_BYTES = HEAD.size + 20
 _END_BYTES = _FOOTER_BYTES + len(MCAP0_MAGIC)
 _CRC_BYTES = 4
 _LARGEST_INDEX = 64 << 20
-"""Bytes. Ten hours of six joints have an index of 10 MB."""
+"""Largest index (bytes) that is read. Ten hours of six joints have an index of 10 MB."""
 
 
 def first_metadata(stream: IO[bytes], limits: TraceLimits, origin: str) -> tuple[str, Texts]:

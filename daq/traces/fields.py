@@ -67,32 +67,32 @@ class Fields:
         """A map from text to text, its length before it."""
         inner = Fields(self.raw(self.u32()))
         found: dict[str, str] = {}
-        while inner.left:
+        while inner.remaining:
             key = inner.text()
             found[key] = inner.text()
         return found
 
     def end(self, what: str) -> None:
-        """Nothing may follow: two records that differ in it alone would be the same definition."""
-        if self.left:
-            raise ValueError(f"a {what} has {self.left} bytes after its last field")
+        """Raises ValueError where bytes follow: records that differ only in these would be the same definition."""
+        if self.remaining:
+            raise ValueError(f"a {what} has {self.remaining} bytes after its last field")
 
     @property
-    def left(self) -> int:
-        """Bytes that have not been read."""
+    def remaining(self) -> int:
+        """Number of bytes that have not been read."""
         return len(self._body) - self._position
 
 
 def chunk_of(body: memoryview) -> CompressedChunk:
     """Raises ValueError, as all of these do."""
     fields = Fields(body)
-    fields.raw(16)  # times of the first and the last message: the messages tell them
+    fields.raw(16)  # times of the first and the last message, which the messages state themselves
     size, crc, compression = fields.u64(), fields.u32(), fields.text()
     return CompressedChunk(size, crc, compression, fields.raw(fields.u64()))
 
 
 def metadata_of(body: memoryview) -> Metadata:
-    """A name, and text by text."""
+    """The name and entries of a metadata record."""
     fields = Fields(body)
     return Metadata(name=fields.text(), metadata=fields.texts())
 
@@ -106,7 +106,7 @@ def attachment_of(body: memoryview) -> Attachment:
 
 
 def schema_of(body: memoryview) -> Schema:
-    """What the messages of a channel look like."""
+    """The schema of a channel's messages."""
     fields = Fields(body)
     number, name, encoding = fields.u16(), fields.text(), fields.text()
     schema = Schema(id=number, name=name, encoding=encoding, data=bytes(fields.raw(fields.u32())))

@@ -1,4 +1,4 @@
-"""Uncompressing a chunk into as many bytes as it has declared, and never into more."""
+"""Decompresses a chunk into the number of bytes that it declares, never more."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import zstandard
 from daq.traces.fields import CompressedChunk
 
 INFLATE_ERRORS = (zstandard.ZstdError, RuntimeError)
-"""What the libraries raise on damaged bytes, RuntimeError being lz4's."""
+"""Errors that the libraries raise on damaged bytes; lz4 raises RuntimeError."""
 
 _LEAST_WINDOW = 8 << 20
-"""Bytes of its output that a zstd stream may refer back to, which every decoder has to allow (RFC 8878, 3.1.1.1.2)."""
+"""Window (bytes) that a zstd stream may refer back to and every decoder must support (RFC 8878, 3.1.1.1.2)."""
 _SIZE_UNKNOWN = -1
-"""zstandard's answer where the head of a frame does not tell its size."""
+"""What zstandard returns where a frame's header does not state its size."""
 
 
 def inflate(chunk: CompressedChunk) -> bytes:

@@ -26,7 +26,7 @@ PART_SUFFIX = ".mcap.part"
 JOINT_STATES_TOPIC = "/joint_states"
 EVENTS_TOPIC = "/events"
 JOINT_TOPIC = "/joint/"
-"""Followed by the joint's number, from 1."""
+"""Topic of one joint, followed by its number, from 1."""
 
 JOINT_SCHEMA = "ma2000_daq/msg/JointSample"
 JOINT_STATES_SCHEMA = "foxglove.JointStates"
@@ -40,11 +40,20 @@ END_METADATA = "daq.outcome"
 OPTIONAL_SIGNALS = ("set_point", "error", "drive", "velocity")
 """Signals a sample may lack (NaN)."""
 RECORDED_SIGNALS = ("tick", "host_time", "status", "set_point", "position", "error", "drive", "power_raw")
-"""What a record of the controller holds."""
+"""Signals that a recording of the controller has."""
 
 ALL_SIGNALS = (
-    "time", "position", "set_point", "error", "drive", "velocity", "power_raw", "tick", "host_time", "status",
-)  # fmt: skip
+    "time",
+    "position",
+    "set_point",
+    "error",
+    "drive",
+    "velocity",
+    "power_raw",
+    "tick",
+    "host_time",
+    "status",
+)
 """Columns of a trace."""
 
 _CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
@@ -68,9 +77,9 @@ JOINT_SAMPLE_DTYPE = np.dtype(
 """schemas/JointSample.msg in CDR: a 4-byte header, then every field on its natural boundary, without padding."""
 
 _LEVELS: dict[EventKind, int] = {
-    "limit": 3, "pause": 3, "retry": 3, "missing": 3, "missed_set_point": 3, "restart": 4, "link_lost": 4, "stop": 3,
-    "fault": 4,
-}  # fmt: skip
+    **dict.fromkeys(("limit", "pause", "retry", "missing", "missed_set_point", "stop"), 3),
+    **dict.fromkeys(("restart", "link_lost", "fault"), 4),
+}
 _INFORMATION = 2
 
 

@@ -1,4 +1,4 @@
-"""What a trace says about itself, from its metadata: text that somebody else may have written."""
+"""Reads a trace's own description from its metadata, which another program may have written."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from daq.traces import layout
 
 _JOINT = re.compile(r"[1-9][0-9]?")
 _NUMBER = re.compile(r"[A-Za-z0-9_-]{1,64}")
-"""Of a trace: it becomes part of file names and addresses."""
+"""Permitted number of a trace, which becomes part of file names and addresses."""
 _SHOWN = 40
-"""Characters of a wrong text that an error shows."""
+"""Number of characters of a wrong text that an error message shows."""
 _MOST_SAMPLES = 2**31 - 1
-"""The largest whole number of every database that a catalogue may be kept in; a year and more at 50 Hz."""
+"""Largest number of samples: the largest integer that every supported database holds; more than a year at 50 Hz."""
 
 
 class NewerTraceError(TraceError):
-    """A trace of a newer version of this software, which that version may read."""
+    """A trace written by a newer version of this software."""
 
 
 def record_of(start: dict[str, str], end: dict[str, str] | None, origin: str) -> TraceRecord:
@@ -85,7 +85,7 @@ def extent_of(end: dict[str, str], origin: str) -> tuple[int, float]:
 
 
 def one_line(error: Exception) -> str:
-    """What is wrong, and for pydantic's errors where."""
+    """The error in one line, with the field for pydantic's errors."""
     if isinstance(error, ValidationError):
         first = error.errors()[0]
         return f"{'.'.join(str(part)[:_SHOWN] for part in first['loc'])}: {first['msg']}"

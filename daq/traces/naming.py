@@ -1,4 +1,4 @@
-"""Names of trace files: the moment, the kind of experiment, the first digits of the trace's number."""
+"""Names of trace files: date and time, kind of experiment, first digits of the trace's number."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def new_trace_id() -> str:
 
 
 def trace_id_of(*contents: bytes) -> str:
-    """Twelve hexadecimal digits that stand for what files contain, wherever they lie."""
+    """Twelve hexadecimal digits that depend only on the contents of files, not on where they lie."""
     digest = hashlib.sha256()
     for content in contents:
         digest.update(len(content).to_bytes(8, "big") + content)

@@ -27,15 +27,16 @@ INK = "#222222"
 QUIET = "#8a8a8a"
 SET_POINT = "#555555"
 JOINT_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#A07800", "#4B4B9B")
-"""One a joint: Okabe and Ito's colours, told apart also by the colour-blind; the yellow darkened to show on paper."""
+"""Colours of the joints: those of Okabe and Ito, which colour-blind readers can distinguish; yellow darkened for
+paper."""
 ALARM = "#B00020"
 GAP = "#f3d9a4"
 JOINTS_ABREAST = 3
-"""Joints beside each other; more begin another band, so that the figure still fits a page."""
+"""Joints side by side; further ones go into another band of panels, so that the figure fits a page."""
 
 _ALARMS: frozenset[EventKind] = frozenset({"limit", "restart", "link_lost", "stop", "fault"})
 _UNMARKED: frozenset[EventKind] = frozenset({"start", "end", "note", "gains", "retry", "missing", "missed_set_point"})
-"""Kinds without a line of their own: there may be hundreds, or they say what the axes say."""
+"""Kinds of event that are not marked: there may be hundreds, or they repeat what the axes show."""
 _MOTIONS: frozenset[EventKind] = frozenset({"ramp_start", "ramp_end"})
 """The ends of a motion, whose messages say which motion it is: "sine ends"."""
 
@@ -195,7 +196,8 @@ def _draw(axes: Axes, trace: Trace, row: _Row, column: int) -> None:
 
 
 def _limits(row: _Row, column: int) -> tuple[float, float]:
-    """The same span for every joint, so that they compare by eye; positions each about their own middle."""
+    """Axis limits with the same span for every joint, so that joints can be compared; positions about their own
+    middle."""
     both = [row.measured] if row.wanted is None else [row.measured, row.wanted]
     low, high = np.min([s.min(axis=0) for s in both], axis=0), np.max([s.max(axis=0) for s in both], axis=0)
     if row.title != "position":
@@ -225,10 +227,17 @@ def _head(axes: Axes, trace: Trace, joint: int, column: int) -> None:
         axes.set_title("P {} · I {} · D {}".format(*gains), loc="right", fontsize=8, color=QUIET, pad=14)
     for event in _labelled(trace, column):
         axes.annotate(
-            _mark(event), (event.time, 1.0), xycoords=("data", "axes fraction"),
-            xytext=(0, 2), textcoords="offset points", ha="center", va="bottom", fontsize=6.5,
-            color=ALARM if event.kind in _ALARMS else QUIET, annotation_clip=False,
-        )  # fmt: skip
+            _mark(event),
+            (event.time, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 2),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=6.5,
+            color=ALARM if event.kind in _ALARMS else QUIET,
+            annotation_clip=False,
+        )
 
 
 def _mark(event: TraceEvent) -> str:
@@ -238,7 +247,7 @@ def _mark(event: TraceEvent) -> str:
 
 
 def _labelled(trace: Trace, column: int) -> list[TraceEvent]:
-    """Marked events whose words do not run into the ones before; alarms come first."""
+    """Marked events whose labels do not overlap those before; alarms take precedence."""
     apart = (trace.time[-1] - trace.time[0]) * 0.19
     marked = [e for e in trace.events if e.kind not in _UNMARKED and e.joint in (None, trace.joints[column])]
     labelled: list[TraceEvent] = []
@@ -256,7 +265,7 @@ def _gaps(trace: Trace) -> list[tuple[float, float]]:
 
 
 def _broken_at_gaps(trace: Trace, signal: Floats) -> tuple[Floats, Floats]:
-    """Time and signal with a NaN in every gap, where a line would claim what nobody measured."""
+    """Time and signal with a NaN in every gap, so that no line is drawn where nothing was measured."""
     if trace.tick is None:
         return trace.time, signal
     after = np.flatnonzero(np.diff(trace.tick) > 1) + 1

@@ -52,7 +52,7 @@ def _decoded(path: Path, limits: TraceLimits) -> Trace:
         data = disk.read_at_most(stream, limits.file_bytes, str(path))
     found = scan(data, str(path), limits)
     if path.name.endswith(layout.PART_SUFFIX):
-        # Even where only its name is missing: who wrote it did not live to say that all of it was written.
+        # Even where only the final name is missing: the writer never confirmed that everything was written.
         found.metadata.pop(layout.END_METADATA, None)
     elif found.damage:
         raise TraceError(f"{path}: is damaged after byte {found.good_bytes} of {len(data)}: {found.damage}")

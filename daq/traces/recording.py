@@ -1,4 +1,4 @@
-"""The MCAP side of writing: rows, events and metadata into a stream. Knows nothing of files, threads or disks."""
+"""The MCAP side of writing: rows, events and metadata into a stream. Independent of files, threads and disks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from daq.contracts.trace import Outcome, TraceEvent, TraceRecord
 from daq.traces import layout
 
 ONE_CHUNK_A_FLUSH = 1 << 40
-"""Size (bytes) that no chunk reaches: chunks end where `flush` says, never inside a row."""
+"""Chunk size (bytes) that is never reached: chunks end only at `flush`, never inside a row."""
 
 
 def open_mcap(stream: IO[bytes]) -> Writer:

@@ -1,4 +1,4 @@
-"""Is there a place for a trace, before anything moves?"""
+"""Checks for disk space before anything moves."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from daq.contracts.errors import TraceError
 from daq.traces import disk
 
 BYTES_A_SAMPLE = 400
-"""Of one joint in one control period, generously (docs/traces.md gives the measured figure)."""
+"""Size of one joint's sample, estimated generously (docs/traces.md gives the measured figure)."""
 RESERVE = 20_000_000
-"""Bytes that stay free: the disk is others' too."""
+"""Space (bytes) that stays free for other programs."""
 
 
 def require_room(folder: Path, samples: int, joints: int) -> None:

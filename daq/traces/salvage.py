@@ -26,11 +26,12 @@ from daq.traces.scan import Scan, messages, scan
 NO_SCHEMA = 0
 """MCAP's number of the schema of a channel that has none."""
 SALVAGE_SUFFIX = ".salvage"
-"""Of the new file until it is safe; one that is found was left by a salvage that did not end, and is made again."""
+"""Suffix of the new file until it is complete. One that is found was left by an interrupted salvage and is made
+again."""
 UNREADABLE_SUFFIX = ".unreadable"
-"""Of a part file that holds no trace at all: it is put aside, never deleted."""
+"""Suffix of a part file that holds no trace: it is renamed, never deleted."""
 DAMAGED_SUFFIX = ".damaged"
-"""Of a part file that was salvaged, and holds something that is not in the trace and might be of use to somebody."""
+"""Suffix of a salvaged part file that holds something which is not in the trace and may still be useful."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Salvaged:
 
 @dataclass(frozen=True)
 class _Readable:
-    """Of one part file: its records, the trace in them, and the counters at its end."""
+    """Content of one part file: its records, the trace in them, and the counters at its end."""
 
     found: Scan
     trace: Trace
@@ -84,7 +85,7 @@ def salvage_folder(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> 
             if not disk.is_being_written(part):
                 found.append(salvage(part, limits))
         except FileNotFoundError:
-            continue  # another process salvaged it, or its writer finished it, in this moment
+            continue  # meanwhile salvaged by another process, or finished by its writer
         except OSError as error:
             found.append(Salvaged(part, None, problem=f"{part}: cannot be read: {disk.reason(error)}", kept=part))
         except PutAsideError as error:
@@ -150,7 +151,7 @@ def _salvage_locked(part: Path, data: bytes, limits: TraceLimits) -> Salvaged:
     except BaseException:
         unfinished.unlink(missing_ok=True)
         raise
-    # A power cut may leave zeros behind what was synced: there is nothing in them to keep.
+    # A power cut may leave zeros after the synced part, which hold nothing to keep.
     kept = _put_aside(part, DAMAGED_SUFFIX) if found.others or any(data[found.good_bytes :]) else None
     if kept is None:
         part.unlink()
@@ -159,7 +160,7 @@ def _salvage_locked(part: Path, data: bytes, limits: TraceLimits) -> Salvaged:
 
 
 def _readable(part: Path, data: bytes, limits: TraceLimits) -> _Readable:
-    """What can be read. Raises NewerTraceError when a newer version may read it, else _NoTraceError."""
+    """The readable content. Raises NewerTraceError when a newer version may read it, else _NoTraceError."""
     try:
         found = scan(data, str(part), limits)
         end = found.metadata.pop(layout.END_METADATA, None)
@@ -197,7 +198,7 @@ def _put_aside(part: Path, suffix: str) -> Path:
 
 
 def _counters(start: Texts, end: Texts | None, part: Path) -> dict[str, float]:
-    """What the link had counted, where the recording came to write it down."""
+    """The link's counters, where the recording got as far as writing them."""
     try:
         return record_of(start, end, str(part)).counters
     except TraceError:
@@ -214,7 +215,7 @@ def _refuse_another(path: Path, record: TraceRecord, limits: TraceLimits) -> Non
 
 
 def _copy(found: Scan, writer: Writer) -> None:
-    """Everything but the end, message by message: the copy has an index, which the part file has not."""
+    """Copies everything but the end, message by message, which gives the copy the index that the part file lacks."""
     writer.add_metadata(layout.START_METADATA, found.metadata[layout.START_METADATA])
     for attachment in found.attachments:
         writer.add_attachment(

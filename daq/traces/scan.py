@@ -23,7 +23,7 @@ from daq.traces.inflate import INFLATE_ERRORS, inflate
 HEAD = struct.Struct("<BQ")
 """Opcode and length (bytes) of every record."""
 UNREADABLE = (ValueError, struct.error, *INFLATE_ERRORS)
-"""What reading damaged bytes raises here."""
+"""Errors that reading damaged bytes may raise."""
 
 NOT_IN_CHUNKS = "a chunk holds something else than schemas, channels and whole messages"
 
@@ -38,7 +38,7 @@ _REBUILT = frozenset(
         Opcode.SUMMARY_OFFSET,
     )
 )
-"""Records that say nothing which the others do not say."""
+"""Records whose content follows from the others."""
 _MESSAGE = struct.Struct("<BQHIQQ")
 _CRC = struct.Struct("<I")
 _OURS = (layout.START_METADATA, layout.END_METADATA)
@@ -173,7 +173,7 @@ def _record_at(chunk: bytes, position: int) -> tuple[int, int]:
 
 
 class _Walk:
-    """Puts one record after the other where it belongs, and counts what the limits are about."""
+    """Sorts the records into a `Scan`, and counts them against the limits."""
 
     def __init__(self, found: Scan, whole: memoryview, limits: TraceLimits) -> None:
         self._found = found
@@ -243,14 +243,15 @@ class _Walk:
         self._attached += len(body)
         count = len(self._found.attachments) + 1
         require(count, self._limits.attachments, "there are more than {} attachments", "attachments")
-        require(self._attached, self._limits.attachment_bytes, "attachments have more than {} bytes",
-                "attachment_bytes")  # fmt: skip
+        require(
+            self._attached, self._limits.attachment_bytes, "attachments have more than {} bytes", "attachment_bytes"
+        )
         if len(body) < _CRC.size or zlib.crc32(body[: -_CRC.size]) != _CRC.unpack(body[-_CRC.size :])[0]:
             raise ValueError("an attachment does not match its checksum")
         self._found.attachments.append(fields.attachment_of(body))
 
     def _take_definition(self, opcode: int, body: memoryview) -> None:
-        """Some writers repeat the same one in every chunk."""
+        """Stores a schema or a channel; some writers repeat them in every chunk."""
         if opcode == Opcode.SCHEMA:
             schema = fields.schema_of(body)
             if self._found.schemas.setdefault(schema.id, schema) != schema:

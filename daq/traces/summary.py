@@ -10,7 +10,7 @@ from daq.contracts.figures import JointFigureSet
 from daq.contracts.trace import Floats, Trace
 
 RISE_FROM, RISE_TO = 0.1, 0.9
-"""Rise time is counted between these shares of the way, as is usual in control."""
+"""Shares of the step between which rise time is measured, as is usual in control."""
 
 
 def joint_figures(trace: Trace) -> list[JointFigureSet]:

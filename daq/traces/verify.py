@@ -1,4 +1,4 @@
-"""Is a trace what it claims to be? Checksums, ticks, gaps, events, outcome, and whether its signals agree."""
+"""Verifies a trace: checksums, ticks, gaps, events, outcome, and whether its signals agree."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ Level = Literal["error", "warning", "note"]
 
 MISSING_COUNTER = "missing_samples"
 COUNTS_OFF = 1.0
-"""ADC counts that set point − position may differ from the error: one rounding between posture units and counts."""
+"""Tolerance (ADC counts) between set point − position and the error: one rounding between posture units and counts."""
 PERIODS_OFF = 0.01
-"""Control periods that time may differ from tick times period: time is the board's own."""
+"""Tolerance (control periods) between time and tick · period; time is the board's own."""
 
 
 class Finding(BaseModel):

@@ -21,7 +21,7 @@ from daq.traces.naming import part_path
 from daq.traces.recording import Recording
 
 SYNC_INTERVAL = 0.8
-"""s between syncs. At most 1.2 s of a record may be lost, which leaves a slow disk 0.4 s for one sync."""
+"""Time (s) between syncs. At most 1.2 s of a record may be lost, which leaves a slow disk 0.4 s for one sync."""
 QUEUE_LENGTH = 16384
 """Samples and events that may wait for the disk: five minutes at 50 Hz."""
 ROWS_A_CHUNK = 2000
@@ -87,7 +87,7 @@ class TraceWriter:
 
     @property
     def failure(self) -> TraceError | None:
-        """What went wrong, once something has."""
+        """The first error; None while there is none."""
         return self._failure
 
     def sample(self, row: SampleRow) -> None:
@@ -210,7 +210,7 @@ class TraceWriter:
 
     def _finish(self, close: _Close) -> None:
         if self._failure is not None:
-            # Samples were refused: what was taken is kept, but nobody shall call it finished.
+            # Samples were refused: those accepted are kept, but the trace must not count as finished.
             return self._sync()
         self._recording.finish(close.outcome, close.counters)
         disk.sync(self._stream)

@@ -6,6 +6,17 @@ from daq.trajectories.presets import PRESETS, Preset, preset
 from daq.trajectories.set_points import Mark, Plan, PlanPreview, control_period, make_plan, snapped
 
 __all__ = [
-    "MOVE_SPEED", "PRESETS", "Mark", "Plan", "PlanPreview", "Preset", "control_period", "make_plan", "plan",
-    "plan_move", "preset", "snapped", "start_angles",
-]  # fmt: skip
+    "MOVE_SPEED",
+    "PRESETS",
+    "Mark",
+    "Plan",
+    "PlanPreview",
+    "Preset",
+    "control_period",
+    "make_plan",
+    "plan",
+    "plan_move",
+    "preset",
+    "snapped",
+    "start_angles",
+]

@@ -10,7 +10,7 @@ from daq.trajectories.piece import Piece, require_sampled, sample_times, smooth_
 from daq.trajectories.set_points import Mark
 
 PEAK_SPEED = 1.5
-"""Highest speed of a cubic that starts and ends at rest, in units of its mean speed."""
+"""Ratio of the highest speed to the mean speed of a cubic that starts and ends at rest."""
 
 
 def cubic(move: Cubic, amplitudes: Floats, period: float) -> Piece:

@@ -16,7 +16,7 @@ MOVE_SPEED = 0.25
 """Highest speed of a slow move in rad/s: an assumption, under half that of the source's ramp."""
 
 NO_WAY = 1e-9
-"""rad (or m) below which there is no way to go: a millionth of an ADC count."""
+"""Distance (rad, or m) below which nothing moves: a millionth of an ADC count."""
 
 
 def plan_move(machine: Machine, start: Sequence[float], target: Sequence[float], speed: float = MOVE_SPEED) -> Plan:

@@ -13,7 +13,7 @@ from daq.trajectories.piece import Piece, require_sampled, sample_times, smooth_
 from daq.trajectories.set_points import Mark
 
 LEAST_PART = 0.01
-"""Part of its period that the lowest sine must have in the duration: of less no change is seen."""
+"""Least share of its period that the lowest sine must complete within the duration; less would not be visible."""
 FADE = 0.1
 """Fraction of the duration over which the sum is faded in, and out again, by half a cosine."""
 

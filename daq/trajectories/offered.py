@@ -10,7 +10,7 @@ from daq.trajectories.presets import PRESETS
 GENERAL = "diagnostic"
 SINGLE = ("ramp", "diagnostic-a", "diagnostic-b", "diagnostic-c", "diagnostic-d", "diagnostic-e")
 ELSEWHERE = (40.0, 35.0, -50.0)
-"""Degrees from the rest posture: the second posture of the diagnostic set."""
+"""Second posture of the diagnostic set, in degrees from the rest posture."""
 
 
 def offered_experiments() -> tuple[OfferedExperiment, ...]:
@@ -29,10 +29,12 @@ def _slow(speed: float) -> OfferedExperiment:
     size = math.radians(1.5 * speed)
     amplitude = {1: size, 2: -size, 3: size}
     moves = (
-        Cubic(amplitude=there, duration=3.0), Pause(duration=0.5),
-        SlowRamp(amplitude=amplitude, speed=math.radians(speed), reversals=3), Pause(duration=0.5),
+        Cubic(amplitude=there, duration=3.0),
+        Pause(duration=0.5),
+        SlowRamp(amplitude=amplitude, speed=math.radians(speed), reversals=3),
+        Pause(duration=0.5),
         Cubic(amplitude=back, duration=3.0),
-    )  # fmt: skip
+    )
     name = f"slow-reversals-{speed:g}"
     spec = ExperimentSpec(
         trajectory=Sequence(segments=tuple(Segment(move=m) for m in moves)), joints=(1, 2, 3), hold=0.5, name=name

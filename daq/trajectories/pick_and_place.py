@@ -13,14 +13,15 @@ from daq.trajectories.piece import Piece, periods_in, require_sampled, sample_ti
 from daq.trajectories.set_points import Mark
 
 LEAST_LIFT = 0.25
-"""Of the last link's length: the least height of the lift-off and set-down points (Paul 1972, in section 3.7.2)."""
+"""Share of the last link's length that is the least height of the lift-off and set-down points (Paul 1972, in section
+3.7.2)."""
 ORDERS = (4, 3, 4)
 """Orders of the polynomials of picking (3.54), travelling (3.45) and placing (3.54)."""
 CLOSE = 1e-6
-"""m within which the arm's end must come to a lifted point: a thousandth of what the sensors tell."""
+"""Distance (m) within which the arm's end must reach a lifted point: a thousandth of the sensors' resolution."""
 ITERATIONS = 50
 LARGEST_TURN = 0.2
-"""rad of one step of the iteration."""
+"""Largest change (rad) of a joint in one step of the iteration."""
 
 
 def pick_and_place(
@@ -42,7 +43,8 @@ def pick_and_place(
     columns = [joint - 1 for joint in joints]
     end = start.copy()
     end[columns] += amplitudes
-    postures = (start, lifted(machine, start, joints, move.lift), lifted(machine, end, joints, move.lift), end)
+    lift_off, set_down = (lift_posture(machine, posture, joints, move.lift) for posture in (start, end))
+    postures = (start, lift_off, set_down, end)
     knots = np.stack([posture[columns] - start[columns] for posture in postures])
     time = sample_times(float(durations.sum()), period)
     marks = (
@@ -82,7 +84,7 @@ def polynomials(knots: Floats, durations: Floats) -> list[Floats]:
         rows += [row((0, 0.0, derivative, 1.0)), row((2, 1.0, derivative, 1.0))]
         rows += [row((p, 1.0, derivative, 1.0), (p + 1, 0.0, derivative, -1.0)) for p in (0, 1)]
         wanted += [np.zeros(knots.shape[1])] * 4
-    # Durations that differ by many orders would leave columns of very different sizes.
+    # Durations that differ by orders of magnitude would give columns of very different sizes.
     matrix = np.stack(rows)
     sizes_of_rows = np.abs(matrix).max(axis=1, keepdims=True)
     found = np.linalg.solve(matrix / sizes_of_rows, np.stack(wanted) / sizes_of_rows)
@@ -111,7 +113,7 @@ def last_link(machine: Machine) -> float:
     return length
 
 
-def lifted(machine: Machine, posture: Floats, joints: tuple[int, ...], height: float) -> Floats:
+def lift_posture(machine: Machine, posture: Floats, joints: tuple[int, ...], height: float) -> Floats:
     """The posture (all joints, rad) near `posture` whose end is `height` m above it, moving `joints` alone.
 
     Newton's method on the forward kinematics, least squares where joints are too many. Raises SpecError where these

@@ -12,9 +12,9 @@ from daq.contracts.trace import Floats
 from daq.trajectories.set_points import Booleans, Mark
 
 TIME_TOLERANCE = 1e-9
-"""Periods by which a duration may miss a whole number of them and still count as whole."""
+"""Deviation (periods) within which a duration counts as a whole number of periods."""
 LONGEST = 4 * 3600.0
-"""Longest plan in s; more is taken for a slip of the pen."""
+"""Longest plan (s); a longer one is taken for a typing error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +47,14 @@ def periods_in(duration: float, period: float) -> int:
 def require_sampled(duration: float, period: float, what: str, least: int = 1) -> None:
     """Raises SpecError for a time shorter than `least` control periods: set points cannot show it.
 
-    Two are the least of an oscillation (Nyquist); of anything else one, or it would be a step.
+    An oscillation needs at least two (Nyquist), any other motion one; with less it would be a step.
     """
     if duration < (least - TIME_TOLERANCE) * period:
         shortest = f"{least * period * 1e3:g} ms" + (" (two control periods)" if least == 2 else " (a control period)")
-        raise SpecError(f"{what}: {duration:g} s is too short for a set point every {period * 1e3:g} ms: "
-                        f"allowed are {shortest} and more")  # fmt: skip
+        raise SpecError(
+            f"{what}: {duration:g} s is too short for a set point every {period * 1e3:g} ms: "
+            f"allowed are {shortest} and more"
+        )
 
 
 def sample_times(duration: float, period: float) -> Floats:

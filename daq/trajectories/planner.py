@@ -36,7 +36,7 @@ from daq.trajectories.pause import pause
 from daq.trajectories.pick_and_place import pick_and_place
 from daq.trajectories.piece import Piece, smooth_piece
 from daq.trajectories.ramp import ramp
-from daq.trajectories.sequence import joined, spread
+from daq.trajectories.sequence import join_pieces, spread
 from daq.trajectories.set_points import Mark, Plan, control_period, make_plan, snapped
 from daq.trajectories.sine import sine
 from daq.trajectories.slow_ramp import slow_ramp
@@ -45,7 +45,7 @@ from daq.trajectories.step import step
 from daq.trajectories.via import via
 
 Relative = Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | Pause
-"""Motions that say where to go from where they begin, whatever the machine."""
+"""Motions relative to their start, independent of the machine."""
 
 
 def start_angles(spec: ExperimentSpec, machine: Machine) -> tuple[float, ...]:
@@ -112,7 +112,7 @@ def _with_repeats(spec: ExperimentSpec, motion: Piece, period: float) -> Piece:
         if spec.repeats > 1:
             pieces.append(smooth_piece(np.zeros((0, count)), (Mark(0, "note", f"repeat {repeat} of {spec.repeats}"),)))
         pieces += [settle, motion, hold]
-    return joined(pieces, count, period)
+    return join_pieces(pieces, count, period)
 
 
 def _piece(
@@ -121,7 +121,7 @@ def _piece(
     if isinstance(move, Path):
         return path(move, joints, start, within, period)
     if isinstance(move, Sequence):
-        return joined((_segment_piece(segment, joints, period) for segment in move.segments), len(joints), period)
+        return join_pieces((_segment_piece(segment, joints, period) for segment in move.segments), len(joints), period)
     return _simple_piece(move, joints, period)
 
 

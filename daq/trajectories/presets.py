@@ -85,7 +85,7 @@ def _fast_and_saturating() -> list[Segment]:
     segments = []
     for size in (3.0, -3.0, 7.5, -7.5, -7.5, 7.5):
         segments += [_segment(Step(amplitude=math.radians(size))), _segment(Pause(duration=0.58))]
-    # Joint 2 is the slow one: about 43 °/s is all that its drive can do.
+    # Joint 2 is the slowest: its drive reaches about 43 °/s.
     segments += _there_and_back((15.0, 9.0, 15.0), 0.22, 0.78)
     segments += _there_and_back((30.0, 18.0, 30.0), 0.42, 0.58)
     return segments + _there_and_back((30.0,), 0.70, 0.0, 2)

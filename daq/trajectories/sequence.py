@@ -11,7 +11,7 @@ from daq.trajectories.piece import Piece, periods_in
 from daq.trajectories.set_points import Mark
 
 
-def joined(pieces: Iterable[Piece], joints: int, period: float) -> Piece:
+def join_pieces(pieces: Iterable[Piece], joints: int, period: float) -> Piece:
     """One piece from several on the same `joints` joints. Raises SpecError when it grows longer than LONGEST."""
     offsets = [np.zeros((0, joints))]
     jumps = [np.zeros(0, dtype=np.bool_)]

@@ -31,7 +31,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class JointPreview:
-    """What one joint will do: angles in rad, speed in rad/s between set points, steps made on purpose left out."""
+    """Motion of one joint: angles in rad, speed in rad/s between set points; intended steps are left out."""
 
     joint: int
     moves: bool
@@ -52,7 +52,7 @@ class PlanPreview:
     set_points: int
     joints: tuple[JointPreview, ...]
     marks: tuple[tuple[float, str, str], ...]
-    """(time in s, kind, message)."""
+    """Marks as (time in s, kind, message)."""
 
     def as_data(self) -> dict[str, object]:
         """Plain data for JSON."""

@@ -13,7 +13,7 @@ from daq.transport.url import TransportError
 
 READ_SIZE = 4096
 WRITE_TIMEOUT_S = 0.5
-"""A port that takes no byte for this long is given up: the largest frame needs 5 ms."""
+"""Time after which a port that accepts no byte counts as failed; the largest frame needs 5 ms."""
 
 
 class ChannelError(TransportError):
@@ -25,7 +25,7 @@ class ByteChannel(Protocol):
 
     @property
     def description(self) -> str:
-        """Where it leads, for people."""
+        """Description of the far end, for messages."""
         ...
 
     def read(self, timeout_s: float) -> bytes:
@@ -64,7 +64,7 @@ class DescriptorChannel:
 
     @property
     def description(self) -> str:
-        """Where it leads."""
+        """Description of the far end."""
         return self._description
 
     def read(self, timeout_s: float) -> bytes:

@@ -1,4 +1,4 @@
-"""From a port URL to an open channel, again and again: what a connection needs that outlives one of its channels."""
+"""From a port URL to an open channel: an endpoint outlives its channels and can open new ones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from daq.transport.url import MockPort, PortBusyError, PortUrl, SerialPort, TcpP
 
 CONNECT_TIMEOUT_S = 3.0
 BITS_PER_BYTE = 10
-"""On the line: start bit, eight data bits, stop bit."""
+"""Bits that a byte takes on the line: start bit, eight data bits, stop bit."""
 
 
 class Endpoint(Protocol):
@@ -22,7 +22,7 @@ class Endpoint(Protocol):
 
     @property
     def url(self) -> str:
-        """As the user wrote it."""
+        """Port URL as the user wrote it."""
         ...
 
     @property
@@ -32,7 +32,7 @@ class Endpoint(Protocol):
 
     @property
     def bytes_per_second(self) -> float:
-        """What the line carries in one direction."""
+        """Capacity of the line in one direction."""
         ...
 
     @property

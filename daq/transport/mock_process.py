@@ -15,7 +15,7 @@ from typing import IO
 from daq.transport.url import MockPort, TransportError
 
 START_TIMEOUT_S = 30.0
-"""Generous: the first import of the physics engine from a cold disk takes seconds."""
+"""Longest time for a mock to start: the first import of the physics engine from a cold disk takes seconds."""
 END_TIMEOUT_S = 3.0
 LAST_WORDS = 500
 """Characters of the mock's error output that are shown when it does not start."""
@@ -26,9 +26,9 @@ class MockProcess:
     """A running mock. It ends when its standard input does, so it never outlives its owner, however that ends."""
 
     url: str
-    """Where its line is, as a port URL."""
+    """Port URL of its line."""
     control: str | None
-    """Where its faults are switched."""
+    """URL of its control port, where faults are switched."""
     _process: subprocess.Popen[bytes] = field(repr=False)
 
     def check_running(self) -> None:

@@ -1,4 +1,5 @@
-"""Pseudo-terminals are numbered anew: a moment after a mock has ended, its name may be that of somebody's shell."""
+"""Identity of pseudo-terminals. Their numbers are reused: the name of a mock that has ended may soon belong to a
+shell."""
 
 from __future__ import annotations
 
@@ -11,16 +12,16 @@ from pathlib import Path
 from daq.transport.url import TransportError
 
 NUMBERED = re.compile(r"/dev/pts/[0-9]+")
-"""A link to one, which whoever made it points to its new number, is a name of its own."""
+"""Names of numbered pseudo-terminals. A symbolic link is excluded: its owner keeps it pointing to the right one."""
 
 
 @dataclass(frozen=True)
 class Terminal:
-    """One pseudo-terminal, as long as it lives.
+    """One pseudo-terminal between its creation and its end.
 
-    Args:
-        number: of the device; it comes again. made: its time of creation, ns.
-        holder: process at its other end, by number and start, ticks; None where nobody may know.
+    number: device number, which the system reuses
+    made:   time of creation (ns)
+    holder: process at its other end, by number and start (clock ticks); None where that cannot be known
     """
 
     number: int
@@ -77,5 +78,6 @@ def _index(about: Path) -> int | None:
 
 
 def _start(process: Path) -> int:
-    """When a process was started, ticks: its number comes again, too (proc(5), field 22, counted behind its name)."""
+    """Start time (clock ticks) of a process, since its number is reused too (proc(5), field 22, counted after its
+    name)."""
     return int((process / "stat").read_text().rpartition(")")[2].split()[19])

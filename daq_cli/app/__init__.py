@@ -1,1 +1,1 @@
-"""What every subcommand stands on: the command itself, its context, its output, and what a person is asked."""
+"""What every subcommand shares: the command itself, its context, its output, and the questions to a person."""

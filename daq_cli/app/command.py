@@ -1,4 +1,4 @@
-"""The `daq` command: global options, the list of subcommands, and what every error ends with."""
+"""The `daq` command: its global options, and the exit code and message of every error."""
 
 from __future__ import annotations
 
@@ -11,25 +11,31 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SpecError
 from daq_cli.app.context import Invocation
 from daq_cli.app.lazy import HERE, LazyGroup
 from firmware_protocol.errors import ProtocolError
 
-EXIT_PROGRAM_FAULT = 1
-EXIT_WRONG_INPUT = 2
-WRONG_NAMES = frozenset({
-    errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS,
-})  # fmt: skip
-"""What the operating system says of files that were named wrongly; the rest is its own trouble."""
+WRONG_NAMES = frozenset(
+    {
+        errno.ENAMETOOLONG,
+        errno.ENOENT,
+        errno.ENOTDIR,
+        errno.EISDIR,
+        errno.ELOOP,
+        errno.EACCES,
+        errno.EPERM,
+        errno.EROFS,
+    }
+)
+"""Errors of the operating system that a wrong file name causes; every other one is a fault of the computer."""
 LONGEST_LINE = 800
-"""Characters of an error; a command line may hold a megabyte."""
-EXIT_INTERRUPTED = 130
-"""As shells report a process that Ctrl-C has ended."""
+"""Most characters of an error that are printed: a command line may hold a megabyte."""
 
 SERVER_VARIABLE = "DAQ_SERVER"
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
-"""What typer raises for a command line that it does not understand; it has no public name there."""
+"""The exception of typer for a command line that it does not understand, which has no public name."""
 
 app = typer.Typer(
     name="daq",
@@ -83,7 +89,7 @@ def options(
 
 
 def main() -> None:
-    """Entry point: errors that are the user's end in one line on standard error and a documented exit code."""
+    """Entry point: a user's error ends in one line on standard error and a documented exit code."""
     _print_whatever_files_are_called()
     try:
         exit_code = app(prog_name="daq", standalone_mode=False)
@@ -91,22 +97,22 @@ def main() -> None:
     except DaqError as error:
         fail(str(error), error.exit_code)
     except ProtocolError as error:
-        fail(str(error), EXIT_WRONG_INPUT)
+        fail(str(error), exit_codes.WRONG_INPUT)
     except UsageError as error:
         _show_usage_error(error)
     except (KeyboardInterrupt, typer.Abort):
-        fail("interrupted", EXIT_INTERRUPTED)
+        fail("interrupted", exit_codes.INTERRUPTED)
     except MemoryError:
-        fail("the computer has not enough memory for this", EXIT_PROGRAM_FAULT)
+        fail("the computer has not enough memory for this", exit_codes.PROGRAM_FAULT)
     except BrokenPipeError:
         # `daq traces ls | head`: whoever read has enough. Python would complain at exit.
         _drop_output()
-        raise SystemExit(EXIT_PROGRAM_FAULT) from None
+        raise SystemExit(exit_codes.PROGRAM_FAULT) from None
     except OSError as error:
         # Where nobody knew better: a name that is too long, a folder that may not be read, a full disk.
         file = "" if error.filename is None else f"{error.filename}: "
         _drop_output()
-        code = EXIT_WRONG_INPUT if error.errno in WRONG_NAMES else EXIT_PROGRAM_FAULT
+        code = exit_codes.WRONG_INPUT if error.errno in WRONG_NAMES else exit_codes.PROGRAM_FAULT
         fail(f"{file}{error.strerror or error}", code)
     # typer hands back either an exit code or what the command returned.
     raise SystemExit(exit_code if isinstance(exit_code, int) else 0)
@@ -120,7 +126,7 @@ def _flush() -> None:
 
 
 def _drop_output() -> None:
-    """What could not be written is not tried again at exit, where Python would complain in its own words."""
+    """Discards output that could not be written, which Python would try again at exit, with a message of its own."""
     try:
         _flush()
     except OSError:
@@ -128,23 +134,25 @@ def _drop_output() -> None:
 
 
 def _print_whatever_files_are_called() -> None:
-    """Names of files need not be UTF-8, nor terminals able to show a degree sign: neither may end a command."""
+    """Lets a command print file names that are not UTF-8, and degree signs on terminals that lack them."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="surrogateescape" if sys.stdout.encoding.lower() == "utf-8" else "replace")
 
 
 def _show_usage_error(error: Any) -> NoReturn:
-    """A command line that cannot be understood: one line, and where help is; the help itself where nothing was said."""
+    """Ends with one line on what is wrong with the command line and where help is; without any words, with the help
+    itself."""
     message = error.format_message().strip()
     if type(error).__name__ == "NoArgsIsHelpError":
         print(message, file=sys.stderr)
-        raise SystemExit(EXIT_WRONG_INPUT)
+        raise SystemExit(exit_codes.WRONG_INPUT)
     path = "daq" if error.ctx is None else error.ctx.command_path
-    fail(f"{message} (see `{path} --help`)", EXIT_WRONG_INPUT)
+    fail(f"{message} (see `{path} --help`)", exit_codes.WRONG_INPUT)
 
 
 def fail(message: str, exit_code: int) -> NoReturn:
-    """One line on standard error, then the end. A long one is cut in its middle: what is allowed stands at the end."""
+    """Ends with one line on standard error. A long one is cut in its middle, because what is allowed stands at its
+    end."""
     line = " ".join(message.split())
     if len(line) > LONGEST_LINE:
         line = f"{line[: LONGEST_LINE // 2]} … {line[-LONGEST_LINE // 2 :]}"

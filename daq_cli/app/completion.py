@@ -1,4 +1,4 @@
-"""What a shell offers after the tab key. Asked anew at every key, so nothing heavy is imported here."""
+"""What a shell offers after the tab key. It asks at every press, so nothing heavy is imported here."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ from pathlib import Path
 
 import typer
 
-PRESETS = (
-    "ramp", "diagnostic", "diagnostic-a", "diagnostic-b", "diagnostic-c", "diagnostic-d", "diagnostic-e", "held-out",
-)  # fmt: skip
+PRESETS = ("ramp", "diagnostic", *(f"diagnostic-{letter}" for letter in "abcde"), "held-out")
 """Names of `daq.trajectories.presets`, which would load numpy; a test keeps the two alike."""
 JOINTS = ("1-3", "1", "2", "3", "4", "5", "6", "1-2", "2-3", "1-6")
 SUFFIXES = (".mcap", ".csv")
@@ -24,12 +22,12 @@ def presets(incomplete: str) -> list[str]:
 
 
 def joints(incomplete: str) -> list[str]:
-    """Joints as they are typed most."""
+    """The selections of joints that are typed most."""
     return [text for text in JOINTS if text.startswith(incomplete)]
 
 
 def effects(incomplete: str) -> list[str]:
-    """The effect after the last comma: every name that everyone shares."""
+    """Names of effects for the word after the last comma."""
     from daq.contracts.effects import effect_names
 
     before, comma, begun = incomplete.rpartition(",")
@@ -38,7 +36,8 @@ def effects(incomplete: str) -> list[str]:
 
 
 def traces(ctx: typer.Context, incomplete: str) -> Iterator[str]:
-    """`last`, the newest traces of the folder first, by their files, and what lies where the word points to."""
+    """`last`, the files of the folder of traces with the newest first, and the files of the folder that the word
+    names."""
     if "last".startswith(incomplete):
         yield "last"
     folder = Path(ctx.params.get("folder") or _configured_folder())
@@ -49,7 +48,7 @@ def traces(ctx: typer.Context, incomplete: str) -> Iterator[str]:
 
 
 def _configured_folder() -> str:
-    """The folder that ./daq.toml names; the settings themselves would take a third of a second to read."""
+    """The folder of traces in ./daq.toml, read directly: loading the settings takes a third of a second."""
     try:
         section = tomllib.loads(Path(os.environ.get("DAQ_CONFIG", CONFIGURATION)).read_text("utf-8"))["traces"]
         return str(Path(section["folder"]).expanduser())

@@ -1,9 +1,8 @@
-"""What every subcommand needs: the settings, the port, the consent to move a real arm, and how results are printed."""
+"""What every subcommand needs: the settings, the port, the service, and how results are printed."""
 
 from __future__ import annotations
 
 import json
-import os
 import sys
 from dataclasses import dataclass, field
 from functools import cache, cached_property
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from daq.config import Settings
-    from daq.contracts.machine import Machine
     from daq.contracts.trace_limits import TraceLimits
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")]
@@ -26,7 +24,7 @@ YesOption = Annotated[bool, typer.Option("--yes", help="Consent to moving a real
 
 @cache
 def console() -> Console:
-    """For people: progress, questions, remarks, on standard error. Results go to standard output.
+    """The console for people: progress, questions and remarks on standard error. Results go to standard output.
 
     Text is printed as it is: square brackets in a path or a message are no markup.
     """
@@ -36,12 +34,12 @@ def console() -> Console:
 
 
 def printable(text: str) -> str:
-    """Text of a file that somebody else may have made, without what would command the terminal."""
+    """Text of a file that somebody else may have made, without control characters for the terminal."""
     return "".join(sign if sign.isprintable() or sign == "\n" else "\N{REPLACEMENT CHARACTER}" for sign in text)
 
 
 def print_table(table: Table, width: int | None = None) -> None:
-    """A table of results on standard output, its text as it is."""
+    """Prints a table of results on standard output; brackets in its text are no markup."""
     from rich.console import Console
 
     Console(highlight=False, markup=False, width=width).print(table)
@@ -49,15 +47,20 @@ def print_table(table: Table, width: int | None = None) -> None:
 
 @dataclass
 class Invocation:
-    """One call of `daq`: what was said before the subcommand. Settings are read when they are first needed."""
+    """One call of `daq`: the options before the subcommand. Settings are read when they are first needed."""
 
     config_file: Path | None = None
     port_option: str | None = None
     server: str | None = None
     """URL of a service that has the robot; None for a robot at this computer."""
     server_by_default: bool = False
-    """Whether it is DAQ_SERVER that says so, and not the command line."""
-    told: bool = field(default=False, repr=False)
+    """Whether `server` comes from DAQ_SERVER, and not from the command line."""
+    _mock_announced: bool = field(default=False, repr=False)
+
+    @property
+    def stops_here(self) -> bool:
+        """Whether a stop goes to what this computer moves, too: always, unless the command line names a service."""
+        return self.server is None or self.server_by_default
 
     @cached_property
     def settings(self) -> Settings:
@@ -68,39 +71,13 @@ class Invocation:
 
     @property
     def port(self) -> str:
-        """The port of the command line or the configuration; the mock by default, which is then said aloud."""
+        """The port of the command line or the configuration; the mock by default, which is announced once."""
         if self.port_option is not None:
             return self.port_option
-        if self.settings.robot.port is None and not self.told:
-            self.told = True
+        if self.settings.robot.port is None and not self._mock_announced:
+            self._mock_announced = True
             console().print("No robot is configured: using the mock controller (no arm moves). See `daq config show`.")
         return self.settings.port
-
-    @cached_property
-    def machine(self) -> Machine:
-        """The robot's machine file with the limits that hold for it: configured here, or at the server.
-
-        Raises SpecError, ServiceError, ServiceNotReachedError.
-        """
-        if self.server is None:
-            return self.settings.machine()
-        from daq_cli.robot.remote.robot import remote_robot
-
-        with remote_robot(self) as robot:
-            return robot.machine()
-
-    def find_trace(self, folder: Path, wanted: str) -> Path:
-        """The file of a trace: by path, number, name or `last`, in `folder`; at the server, fetched into `folder`.
-
-        Raises TraceError, ServiceError, ServiceNotReachedError.
-        """
-        if self.server is None or os.path.isfile(wanted):
-            from daq.traces.catalogue import find_trace
-
-            return find_trace(folder, wanted, self.trace_limits)
-        from daq_cli.robot.remote.traces import fetched_trace
-
-        return fetched_trace(self, folder, wanted)
 
     @property
     def memory_map_text(self) -> str | None:
@@ -116,23 +93,23 @@ class Invocation:
 
     @property
     def trace_folder(self) -> Path:
-        """Where traces are kept."""
+        """The configured folder of traces."""
         return self.settings.traces.folder
 
     @property
     def trace_limits(self) -> TraceLimits:
-        """How large a trace may be that is read."""
+        """The largest trace that is read."""
         return self.settings.traces.limits
 
 
 def invocation(context: typer.Context) -> Invocation:
-    """The invocation that the callback made."""
+    """The invocation of this call, made from the global options."""
     found = context.find_object(Invocation)
     assert found is not None
     return found
 
 
 def print_json(data: Any) -> None:
-    """Data on standard output, as one JSON document."""
+    """Prints data on standard output as one JSON document."""
     json.dump(data, sys.stdout, indent=2, ensure_ascii=False, default=str)
     sys.stdout.write("\n")

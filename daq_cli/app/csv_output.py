@@ -1,4 +1,4 @@
-"""Traces as CSV: never over a TOML that is somebody else's."""
+"""Traces as CSV, which never overwrite a TOML file that belongs to something else."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ if TYPE_CHECKING:
     from daq.contracts.trace import Trace
 
 WRITTEN = frozenset({"source", "joints", "created"})
-"""What every TOML has that was written beside a CSV; one by hand, such as a configuration, has not all of it."""
+"""Fields of every TOML file that was written beside a CSV; another one, such as a configuration, lacks some of them."""
 
 
 def write_csv(trace: Trace, path: Path) -> Path:
-    """The CSV and the TOML beside it. Raises SpecError as `check_csv` does, TraceError when they cannot be written."""
+    """Writes the CSV and the TOML beside it. Raises SpecError as `check_csv` does, TraceError when they cannot be
+    written."""
     from daq.traces.csv_table import export_csv
 
     check_csv(path)
@@ -24,14 +25,14 @@ def write_csv(trace: Trace, path: Path) -> Path:
 
 
 def check_csv(path: Path) -> None:
-    """Raises SpecError when the TOML beside a CSV would replace one that is not a CSV's: a machine, a configuration."""
+    """Raises SpecError when the TOML beside the CSV would replace another one, such as a machine or a configuration."""
     from pydantic import ValidationError
 
     from daq.traces.csv_table import Beside, toml_path
 
     toml = toml_path(path)
     if toml == path:
-        raise SpecError(f"{path}: a .toml is put beside the CSV, under this very name; name a .csv file")
+        raise SpecError(f"{path}: a .toml of this name is put beside the CSV; name a .csv file")
     if not toml.exists():
         return
     try:
@@ -39,4 +40,4 @@ def check_csv(path: Path) -> None:
     except (SpecError, ValidationError):
         found = Beside()
     if not found.model_fields_set >= WRITTEN:
-        raise SpecError(f"{path}: {toml} would be replaced, and is no trace's; give the CSV another name or folder")
+        raise SpecError(f"{path}: {toml} would be replaced, which is no trace's; give the CSV another name or folder")

@@ -16,7 +16,7 @@ LEFT, RIGHT = "\x1b[D", "\x1b[C"
 
 
 @contextmanager
-def keys() -> Iterator[Keyboard]:
+def open_keyboard() -> Iterator[Keyboard]:
     """The terminal's keys, one by one; its mode is put back at the end. Raises SpecError without a terminal.
 
     Ctrl-C stays a signal: it must stop the arm whatever this program does.
@@ -33,7 +33,7 @@ def keys() -> Iterator[Keyboard]:
 
 
 class Keyboard:
-    """Keys that have been pressed since the last look."""
+    """Reads keys that have been pressed since the last look."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor

@@ -12,37 +12,50 @@ SUBCOMMANDS: dict[str, tuple[str, str]] = {
     "run": ("daq_cli.commands.run", "Run an experiment and record its trace."),
     "stop": ("daq_cli.commands.stop", "Stop every moving robot, at once."),
     "reset": ("daq_cli.commands.reset", "End the freeze of a stop; nothing moves."),
-    "status": ("daq_cli.commands.status", "What the robot and its link say now."),
-    "ports": ("daq_cli.commands.ports", "Serial ports that could be a robot."),
+    "status": ("daq_cli.commands.status", "Show posture, state and link of the robot."),
+    "ports": ("daq_cli.commands.ports", "List serial ports that may lead to a robot."),
     "gains": ("daq_cli.commands.gains", "Show or set the controller's PID gains."),
-    "io": ("daq_cli.commands.process_io", "Process inputs and outputs, and the gripper."),
-    "teach": ("daq_cli.commands.teach", "Jog, lead by the nose, steps, and playing back."),
-    "calibrate": ("daq_cli.commands.calibrate", "Find what the machine really does."),
+    "io": ("daq_cli.commands.process_io", "Show and switch process signals, and the gripper."),
+    "teach": ("daq_cli.commands.teach.motion", "Jog the arm, lead it, make steps, and play back."),
+    "calibrate": ("daq_cli.commands.calibrate", "Measure what the machine really does."),
     "serve": ("daq_cli.commands.serve", "Serve experiments and traces to people and programs."),
-    "queue": ("daq_cli.commands.queue", "The queue of a server's robot: show, pause, resume."),
-    "token": ("daq_cli.commands.token", "Tokens of the service: make, list, revoke."),
-    "backup": ("daq_cli.commands.backup", "Everything that a service keeps, in one file."),
+    "queue": ("daq_cli.commands.queue", "Show, pause and resume the queue of a server's robot."),
+    "token": ("daq_cli.commands.token", "Make, list and revoke tokens of the service."),
+    "backup": ("daq_cli.commands.backup", "Save everything that a service keeps in one file."),
     "restore": ("daq_cli.commands.restore", "Bring a backup back."),
     "traces": ("daq_cli.commands.traces", "List, show, plot, convert and verify traces."),
     "config": ("daq_cli.commands.config", "Show and check the configuration."),
     "mock": ("daq_cli.commands.mock", "Start a mock controller that others can connect to."),
-    "fit": ("daq_cli.commands.fit", "A model's parameters from traces."),
-    "validate": ("daq_cli.commands.validate", "What must move for a model to explain traces."),
-    "sensitivity": ("daq_cli.commands.sensitivity", "Which parameter moves which joint's response, and when."),
-    "simulate": ("daq_cli.commands.simulate", "What a model does where a trace was recorded."),
-    "compare": ("daq_cli.commands.compare", "Several models beside the same traces."),
+    "fit": ("daq_cli.commands.fit", "Fit a model's parameters to traces."),
+    "validate": ("daq_cli.commands.validate", "Validate a model against traces (Σλ²)."),
+    "sensitivity": ("daq_cli.commands.sensitivity", "Show which parameter moves which joint, and when."),
+    "simulate": ("daq_cli.commands.simulate", "Simulate recorded traces with a model."),
+    "compare": ("daq_cli.commands.compare", "Compare models on the same traces."),
     "diagnose": ("daq_cli.commands.diagnose", "Name the effect that a model lacks, add it, show the gap shrink."),
-    "design": ("daq_cli.commands.design", "Experiments that make parameters best known."),
-    "thesis": ("daq_cli.commands.thesis", "The 1991 source reproduced, ours beside the published."),
-    "blind": ("daq_cli.commands.blind", "Effects hidden in the mock, diagnosed blindly, scored."),
-    "demo": ("daq_cli.commands.demo", "The ramp step on the mock, from command to plot."),
+    "design": ("daq_cli.commands.design", "Propose experiments that determine parameters best."),
+    "thesis": ("daq_cli.commands.thesis", "Reproduce the 1991 source beside its published results."),
+    "blind": ("daq_cli.commands.blind", "Hide effects in the mock, diagnose blindly, and score."),
+    "demo": ("daq_cli.commands.demo", "Run the ramp step on the mock, from command to plot."),
 }
 
-HERE = frozenset({
-    "ports", "serve", "token", "backup", "restore", "config", "mock", "simulate", "sensitivity", "design", "thesis",
-    "blind", "demo",
-})  # fmt: skip
-"""Subcommands that are about this computer alone: `--server` is refused, DAQ_SERVER does not concern them."""
+HERE = frozenset(
+    [
+        "ports",
+        "serve",
+        "token",
+        "backup",
+        "restore",
+        "config",
+        "mock",
+        "simulate",
+        "sensitivity",
+        "design",
+        "thesis",
+        "blind",
+        "demo",
+    ]
+)
+"""Subcommands about this computer alone: `--server` is refused, and DAQ_SERVER is ignored."""
 
 
 class LazyGroup(typer.core.TyperGroup):
@@ -54,12 +67,12 @@ class LazyGroup(typer.core.TyperGroup):
             self.add_command(typer.core.TyperCommand(name, help=line))
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """In the order of the table, which is the order of use."""
+        """Names in the order of the table."""
         del ctx
         return list(SUBCOMMANDS)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """The command that `args` names, imported now."""
+        """Imports the command that `args` names."""
         if args and args[0] in SUBCOMMANDS:
             module = import_module(SUBCOMMANDS[args[0]][0])
             command = typer.main.get_command(module.app)
@@ -70,7 +83,7 @@ class LazyGroup(typer.core.TyperGroup):
 
 
 def _without_rich(command: Any) -> None:
-    """Help of every level looks alike, and none of it loads rich."""
+    """Makes the help of every level look alike; none of it loads rich."""
     command.rich_markup_mode = None
     for sub in getattr(command, "commands", {}).values():
         _without_rich(sub)

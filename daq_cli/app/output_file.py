@@ -1,4 +1,4 @@
-"""Files that hold what took long to make: their folder is looked at first, and they are whole or not there."""
+"""Files of results: their folder is checked before the computation, and a file is written whole or not at all."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from daq.contracts.errors import SpecError
 
 
 def check_folder(path: Path, what: str) -> None:
-    """Before anything is computed: raises SpecError, which begins with `what`, when `path` cannot be made."""
+    """Raises SpecError, which begins with `what`, when `path` could not be written. Called before anything is
+    computed."""
     folder = path.absolute().parent
     if not folder.is_dir():
         raise SpecError(f"{what} {path}: there is no folder {folder}; make it first")
@@ -23,9 +24,9 @@ def check_folder(path: Path, what: str) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A file beside `path` to write to. At the end it is brought to the disk and takes the place of `path` in one step.
+    """Yields a file beside `path` to write to. At the end it is synced to the disk and replaces `path` in one step.
 
-    What was there stays as it was until then, and when the block raises. Raises SpecError when it cannot be written.
+    The old file stays until then, and stays when the block raises. Raises SpecError when the file cannot be written.
     """
     from daq.traces import disk
 

@@ -1,20 +1,23 @@
-"""Ctrl-C, Ctrl-Z and a polite kill while an arm moves: each of them stops the arm."""
+"""Ctrl-C, Ctrl-Z and SIGTERM while an arm moves: each of them stops the arm."""
 
 from __future__ import annotations
 
 import signal
+import threading
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Self
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGTSTP)
-"""SIGTSTP is Ctrl-Z: an arm does not go on moving behind a terminal that has been put aside."""
+"""Signals that stop the arm. SIGTSTP is Ctrl-Z: an arm must not go on moving while its program is suspended."""
 PRESSES_TO_LEAVE = 3
-"""Ctrl-C so often leaves, even when the acquisition process no longer answers."""
+"""Number of presses of Ctrl-C that end the program even when the acquisition process does not answer."""
 
 
 class StopKeys:
-    """While entered, every such signal calls what `stops` was given; one that came before is made up for then."""
+    """Within the block, every such signal calls the function given to `stops`; an earlier signal calls it when it is
+    given."""
 
     def __init__(self) -> None:
         self._stop: Callable[[], None] | None = None
@@ -22,7 +25,7 @@ class StopKeys:
         self._before: dict[int, object] = {}
 
     def stops(self, stop: Callable[[], None]) -> None:
-        """What a signal does: it must be quick, and must bear being called again and again."""
+        """Sets the function that a signal calls: it must be quick, and may be called repeatedly."""
         self._stop = stop
         if self._presses:
             stop()
@@ -44,3 +47,26 @@ class StopKeys:
             self._stop()
         if self._presses >= PRESSES_TO_LEAVE:
             raise KeyboardInterrupt
+
+
+class StopThread(ABC):
+    """A thread that does what a stop key asks for, where that takes longer than a signal handler may: at a service."""
+
+    def __init__(self) -> None:
+        self.pressed = False
+        self._wake = threading.Event()
+        self._thread = threading.Thread(target=self._wait, name="stop-keys", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def press(self) -> None:
+        """A key that stops was pressed. Called by a signal handler, so it is quick, and may be called again."""
+        if not self.pressed:  # a signal that interrupts this one finds its lock taken, and need not wake again
+            self.pressed = True
+            self._wake.set()
+
+    @abstractmethod
+    def _wait(self) -> None:
+        """The thread: waits for `_wake`."""

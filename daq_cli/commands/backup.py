@@ -15,21 +15,21 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def backup(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(help="Where the backup goes, a .zip file that is not there yet.")],
+    file: Annotated[Path, typer.Argument(help="The .zip file to write; it must not exist yet.")],
     json: JsonOption = False,
 ) -> None:
-    """Copy the service's database, traces, models and results into one file; the service may go on meanwhile."""
-    from daq_cli.models.model_progress import shown_progress
+    """Copy the service's database, traces, models and results into one file, also while the service runs."""
+    from daq_cli.app.progress import shown_progress
     from server.backup.places import places_of
     from server.backup.write import back_up
     from server.clock import SystemClock
 
     places = places_of(invocation(context).settings)
-    with shown_progress("backup") as tell:
-        made = back_up(places, file, SystemClock().utc(), tell)
+    with shown_progress("backup") as progress:
+        made = back_up(places, file, SystemClock().utc(), progress)
     if json:
-        print_json({"file": file, **made.model_dump(mode="json", exclude={"files"}), "bytes": made.size,
-                    "traces": made.count("traces"), "models": made.count("models")})  # fmt: skip
+        counted = {"bytes": made.size, "traces": made.count("traces"), "models": made.count("models")}
+        print_json({"file": file, **made.model_dump(mode="json", exclude={"files"}), **counted})
         return
     for name in made.left_out:
         console().print(f"left out, deleted meanwhile: {name}", markup=False)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from daq_cli.app.context import JsonOption, console, print_json
@@ -21,32 +22,34 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def blind(
     context: typer.Context,
-    folder: Annotated[Path, typer.Option(help="Where everything is kept; a trial that was broken off goes on there.")],
-    seeds: Annotated[str | None, typer.Option(help="Numbers of arms: FIRST:LAST, or with commas.")] = None,
-    cases: Annotated[int | None, typer.Option(min=1, help="No more than so many of them, kinds mixed.")] = None,
+    folder: Annotated[Path, typer.Option(help="Folder that keeps everything; an interrupted trial continues there.")],
+    seeds: Annotated[str | None, typer.Option(help="Numbers of the arms: FIRST:LAST, or a list with commas.")] = None,
+    cases: Annotated[int | None, typer.Option(min=1, help="Take at most so many of them, of mixed kinds.")] = None,
     kinds: Annotated[
-        str, typer.Option(help="Of clean, single, open-set, pair, shared, wrong-priors.")
+        str, typer.Option(help="Kinds of arms: clean, single, open-set, pair, shared, wrong-priors.")
     ] = "clean,single,open-set",
     loads: Annotated[
         str, typer.Option(help="Loads that the arms carry, in turn: nominal, light, heavy.")
     ] = "nominal,nominal,nominal,light,heavy",
     experiment: Annotated[
-        Literal["diagnostic", "ramp"], typer.Option(help="The 55 s set, or the ramp step alone, 8 s.")
+        Literal["diagnostic", "ramp"], typer.Option(help="The diagnostic set of 55 s, or the ramp step alone, 8 s.")
     ] = "diagnostic",
     acquire: Annotated[
-        bool, typer.Option("--acquire", help="Let the diagnosis ask for experiments: 60 s more at most.")
+        bool, typer.Option("--acquire", help="Let the diagnosis ask for further experiments, 60 s at most.")
     ] = False,
     registration: Annotated[
-        Path | None, typer.Option(help="A registered trial: its cases, its experiments, seeds that its commit draws.")
+        Path | None,
+        typer.Option(help="Run a registered trial: its cases and experiments, with seeds drawn from its commit."),
     ] = None,
-    run: Annotated[str, typer.Option(help="Which of the registered trial's runs.")] = "diagnostic",
-    shard: Annotated[str, typer.Option(help="I/K: of K processes that share the folder, the I-th.")] = "1/1",
-    processes: Annotated[int, typer.Option(min=1, help="Cases at once.")] = 1,
+    run: Annotated[str, typer.Option(help="Name of the run of the registered trial.")] = "diagnostic",
+    shard: Annotated[str, typer.Option(help="I/K: this is process I of K that share the folder.")] = "1/1",
+    processes: Annotated[int, typer.Option(min=1, help="Number of cases worked on at the same time.")] = 1,
     until: Annotated[
-        Literal["detect", "record", "diagnose", "score"], typer.Option(help="The last stage to do.")
+        Literal["detect", "record", "diagnose", "score"], typer.Option(help="Last stage to carry out.")
     ] = "score",
     hashes: Annotated[
-        bool, typer.Option("--hashes", help="Print what a registration has to hold; run nothing.")
+        bool,
+        typer.Option("--hashes", help="Print the hashes and versions that a registration must hold, and run nothing."),
     ] = False,
     json: JsonOption = False,
 ) -> None:
@@ -79,7 +82,7 @@ def blind(
     _show(campaign, folder, as_json=json)
     if left:
         console().print(f"{left} cases are not done; the same command goes on with them")
-        raise typer.Exit(5)
+        raise typer.Exit(exit_codes.FAULT)
 
 
 def _asked_for(context: typer.Context, option: str) -> bool:
@@ -95,7 +98,7 @@ def _chosen(seeds: str, kinds: str, loads: str, cases: int | None) -> list[int]:
 
 
 def _registered(path: Path, run: str) -> tuple[list[int], Literal["diagnostic", "ramp"], bool, dict[str, str]]:
-    """Seeds, experiment, whether more may be asked for, and where all that comes from."""
+    """Seeds, experiment, whether more experiments may be asked for, and the registration that says so."""
     from daq_cli.trial.registered import read_registration
 
     registration, commit = read_registration(path, run)

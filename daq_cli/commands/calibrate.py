@@ -8,14 +8,16 @@ from typing import Annotated
 import typer
 
 from daq_cli.app import completion
-from daq_cli.app.context import JsonOption, YesOption, invocation, print_json
+from daq_cli.app.consent import Consent
+from daq_cli.app.context import JsonOption, YesOption, print_json
+from daq_cli.robot.access import robot_of
 
-app = typer.Typer(add_completion=False, help="Find what the machine really does.", no_args_is_help=True)
+app = typer.Typer(add_completion=False, help="Measure what the machine really does.", no_args_is_help=True)
 
 
 @app.callback()
 def calibrations() -> None:
-    """Find what the machine really does."""
+    """Measure what the machine really does."""
 
 
 @app.command()
@@ -30,26 +32,27 @@ def gain(
             help="Use this trace instead of moving: a file, a number, `last`.", autocompletion=completion.traces
         ),
     ] = None,
-    folder: Annotated[Path | None, typer.Option(help="Where the trace goes (default: configured folder).")] = None,
+    folder: Annotated[Path | None, typer.Option(help="Folder for the trace (default: the configured one).")] = None,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Find the actual proportional gain from errors and powers at several postures, as the source did (section 6.5)."""
+    """Measure the actual proportional gain from errors and powers at several postures, as the 1991 source did
+    (section 6.5)."""
     from daq.calibration import gain_experiment, gains_from_trace
     from daq.contracts.experiment import parse_joints
     from daq.traces.reader import read_trace
-    from daq_cli.robot.run_result import acquire_whole
+    from daq_cli.robot.experiment import acquire_complete
 
-    call = invocation(context)
+    robot = robot_of(context)
     wanted = parse_joints(joints)
-    place = folder or call.trace_folder
+    place = folder or robot.call.trace_folder
     if trace is None:
-        path = acquire_whole(call, gain_experiment(wanted), call.machine, place, yes).trace
+        path = acquire_complete(robot, gain_experiment(wanted), robot.machine, place, Consent(yes)).trace
     else:
-        path = call.find_trace(place, trace)
-    measured = read_trace(path, call.trace_limits)
-    # counts and radians of a trace belong to the calibration that it was made with, whatever is configured by now
-    machine = measured.record.machine or call.machine
+        path = robot.find_trace(place, trace)
+    measured = read_trace(path, robot.call.trace_limits)
+    # Counts and radians of a trace belong to the calibration that it was made with, whatever is configured by now.
+    machine = measured.record.machine or robot.machine
     found = [one for one in gains_from_trace(measured, machine) if one.joint in wanted]
     if json:
         print_json({"trace": path, "gains": [one.as_data() for one in found]})

@@ -8,7 +8,7 @@ import typer
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import shipped_machines
-from daq_cli.app.context import JsonOption, console, invocation, print_json, print_table
+from daq_cli.app.context import JsonOption, console, print_json, print_table
 from daq_cli.models.model_input import (
     MODEL_HELP,
     EffectFileOption,
@@ -18,8 +18,9 @@ from daq_cli.models.model_input import (
     model_labels,
     read_model,
     read_traces,
-)  # fmt: skip
-from daq_cli.robot.remote.jobs import numbers_of, require_no_programs
+)
+from daq_cli.models.service_jobs import NamedTraces, service_jobs
+from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,29 +47,26 @@ def compare(
 
     A trace counts as held out when none of the models says that it was fitted to it.
     """
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
     from model.comparison.compare import compare
     from model.comparison.difference import differences
 
-    call = invocation(context)
-    require_no_programs(effect_file, call)
-    load_effects(effect_file)
-    models, traces = _told_apart(names)
+    robot = robot_of(context)
+    load_effects(effect_file, robot)
+    models, traces = _models_and_traces(names)
     if len(models) < 2:
         raise SpecError(f"{len(models)} model named: name at least two models (.json, .toml, ma2000), then traces")
-    found = read_traces(call, folder, traces)
+    found = read_traces(robot, folder, traces)
     read = [read_model(name) for name in models]
-    if call.server is not None:
-        from daq_cli.robot.remote.compare import compare_at_server
-
-        there = compare_at_server(call, models, read, numbers_of(call, traces, found), report)
-        _tell(there.models, there.differences, as_json=json)
+    if (jobs := service_jobs(robot)) is not None:
+        there = jobs.compare(models, read, NamedTraces(traces, found), report)
+        _print_result(there.models, there.differences, as_json=json)
         return
     held_out = _held_out(read, [t.record.trace_id for t in found])
-    with shown_progress("comparing") as tell:
-        comparison = compare(list(zip(model_labels(models), read, strict=True)), found, held_out, progress=tell)
+    with shown_progress("comparing") as progress:
+        comparison = compare(list(zip(model_labels(models), read, strict=True)), found, held_out, progress=progress)
     differing = differences(read)
-    _tell(comparison.models, differing, as_json=json)
+    _print_result(comparison.models, differing, as_json=json)
     if report is not None:
         from model.reports.comparison_report import comparison_report
         from model.reports.page import write_report
@@ -76,8 +74,8 @@ def compare(
         console().print(f"report: {write_report(comparison_report(comparison, differing), report)}")
 
 
-def _told_apart(names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Models are what ends in .json or .toml and machines that ship; everything else is a trace."""
+def _models_and_traces(names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Splits names into models (.json, .toml, and machines that ship) and traces (everything else)."""
     models = [n for n in names if n.endswith((".json", ".toml")) or n in shipped_machines()]
     return models, [n for n in names if n not in models]
 
@@ -87,22 +85,19 @@ def _held_out(models: Sequence[Model], traces: Sequence[str]) -> list[str] | Non
     return [trace for trace in traces if trace not in fitted] if fitted else None
 
 
-def _tell(models: Sequence[ModelAgreement], differing: Sequence[ParameterDifference], *, as_json: bool) -> None:
+def _print_result(models: Sequence[ModelAgreement], differing: Sequence[ParameterDifference], *, as_json: bool) -> None:
     from daq_cli.models.agreement_table import agreement_data, print_agreement
     from model.reports.units import squared
 
     if as_json:
-        print_json({
-            "models": agreement_data(models),
-            "mean_squared_error": _errors(models),
-            "differences": [d.model_dump(mode="json") for d in differing],
-        })  # fmt: skip
+        data = [difference.model_dump(mode="json") for difference in differing]
+        print_json({"models": agreement_data(models), "mean_squared_error": _errors(models), "differences": data})
         return
     print_agreement(models)
     unit = squared(joint.unit for model in models for trace in model.traces for joint in trace.joints)
     for label, by_kind in _errors(models).items():
-        told = ", ".join(f"{kind.replace('_', ' ')} {e:.4g} {unit}" for kind, e in by_kind.items() if e is not None)
-        print(f"{label}: mean squared error summed over the joints, {told}")
+        text = ", ".join(f"{kind.replace('_', ' ')} {e:.4g} {unit}" for kind, e in by_kind.items() if e is not None)
+        print(f"{label}: mean squared error summed over the joints, {text}")
     _print_differences(differing, [model.label for model in models])
 
 

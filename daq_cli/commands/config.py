@@ -11,7 +11,7 @@ app = typer.Typer(add_completion=False, help="Show and check the configuration."
 
 @app.command()
 def show(context: typer.Context, json: JsonOption = False) -> None:
-    """Show every setting, as a daq.toml that says the same, and where it was looked for."""
+    """Show every setting as a daq.toml, and the places where a configuration was looked for."""
     from daq.config import config_files, load_settings
     from daq.config.toml_text import settings_text
 
@@ -27,7 +27,7 @@ def show(context: typer.Context, json: JsonOption = False) -> None:
 
 @app.command()
 def check(context: typer.Context, json: JsonOption = False) -> None:
-    """Check the configuration, the machine file, the memory map and the port; one line says what is wrong."""
+    """Check the configuration, the machine file, the memory map and the port; an error is one line."""
     from daq.config import load_settings
     from daq.config.robot_files import load_memory_map
     from daq.safety import unchecked

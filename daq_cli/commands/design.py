@@ -1,4 +1,4 @@
-"""`daq design`: experiments that make a model's parameters best known, and what a proposed one would add."""
+"""`daq design`: experiments that determine a model's parameters best, and what a given one would add."""
 
 from __future__ import annotations
 
@@ -30,27 +30,32 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def design(
     model: Annotated[str, typer.Argument(help=MODEL_HELP)],
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the experiments, one .json each.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder to write the experiments to, one .json file each.")
+    ] = None,
     judge: Annotated[
-        list[Path] | None, typer.Option(help="Say what this experiment (.json) would add, instead. May be repeated.")
+        list[Path] | None,
+        typer.Option(help="Judge this experiment (.json) instead of proposing some. May be repeated."),
     ] = None,
     parameters: Annotated[
-        str | None, typer.Option(help="What is to be known: names or patterns (default: all uncertain).")
+        str | None, typer.Option(help="Parameters to be determined: names or patterns (default: all uncertain ones).")
     ] = None,
-    experiments: Annotated[int, typer.Option(min=1, max=50, help="How many to propose.")] = 4,
-    duration: Annotated[float, typer.Option(min=1.0, max=600.0, help="Of each, in s.")] = 12.0,
-    candidates: Annotated[int, typer.Option(min=1, max=10_000, help="Experiments to choose from.")] = 60,
-    seed: Annotated[int, typer.Option(min=0, help="Of the candidates.")] = 0,
+    experiments: Annotated[int, typer.Option(min=1, max=50, help="Number of experiments to propose.")] = 4,
+    duration: Annotated[float, typer.Option(min=1.0, max=600.0, help="Length of each experiment in s.")] = 12.0,
+    candidates: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Number of random experiments to choose from.")
+    ] = 60,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random experiments.")] = 0,
     report: ReportOption = None,
     effect_file: EffectFileOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Propose experiments within the machine's limits that make chosen parameters best known (D-optimal).
+    """Propose experiments within the machine's limits that determine chosen parameters best (D-optimal).
 
     Nothing is run: `daq run spec FILE` runs a proposed experiment.
     """
     from daq.safety.planned import planned
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
     from model.design.information import information_gain
     from model.design.search import DesignOptions
     from model.design.search import design as search
@@ -64,7 +69,7 @@ def design(
         return planned(spec, chosen.machine)
 
     if judge:
-        from daq_cli.models.spec_file import read_spec
+        from daq_cli.robot.experiment import read_spec
 
         specs = [read_spec(p) for p in judge]
         gain = information_gain(chosen, specs, plan, options=options, fitted=_fitted(model, parameters))
@@ -74,9 +79,9 @@ def design(
             _print_gain(gain)
         _report(report, chosen, specs, gain, "The experiments were given, and judged by this model.")
         return
-    with shown_progress("designing") as tell:
+    with shown_progress("designing") as progress:
         search_options = DesignOptions(experiments=experiments, duration=duration, candidates=candidates, seed=seed)
-        found = search(chosen, plan, search_options, options, tell)
+        found = search(chosen, plan, search_options, options, progress)
     files = [] if out is None else _written(found.specs, out)
     if json:
         print_json(found.model_dump(mode="json") | {"files": files})
@@ -99,10 +104,14 @@ def _print_design(found: DesignedExperiments, files: Sequence[Path]) -> None:
 
 
 def _report(
-    path: Path | None, model: Model, specs: Sequence[ExperimentSpec], gain: InformationGain, how: str,
+    path: Path | None,
+    model: Model,
+    specs: Sequence[ExperimentSpec],
+    gain: InformationGain,
+    how: str,
     nats: Sequence[float] | None = None,
-) -> None:  # fmt: skip
-    """The page of these experiments, where one is asked for."""
+) -> None:
+    """Writes the report on these experiments, if one is wanted."""
     if path is None:
         return
     from daq.safety.planned import planned
@@ -117,7 +126,7 @@ def _report(
 
 
 def _fitted(model: str, parameters: str | None) -> FitResult | None:
-    """What a fit of motion already knows, where the model is of one and the parameters are those it found."""
+    """The result of the fit that the model comes from, if its parameters are the ones to be known."""
     from model.fitting.result import is_result, load_result
 
     if not model.endswith(".json") or parameters is not None or not is_result(Path(model)):

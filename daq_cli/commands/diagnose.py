@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq.contracts.carried_load import carrying
+from daq.contracts import exit_codes
 from daq_cli.app import completion
-from daq_cli.app.context import Invocation, JsonOption, YesOption, console, invocation, print_json
+from daq_cli.app.consent import Consent
+from daq_cli.app.context import JsonOption, YesOption, console, print_json
 from daq_cli.app.output_file import replacing
-from daq_cli.models.held_load import check_held
 from daq_cli.models.model_input import (
     MODEL_HELP,
     EffectFileOption,
@@ -25,9 +25,9 @@ from daq_cli.models.model_input import (
     machine_of,
     read_model,
     read_traces,
-)  # fmt: skip
-from daq_cli.robot.remote.jobs import numbers_of, require_no_programs
-from daq_cli.robot.run_result import EXIT_CODES
+)
+from daq_cli.models.service_jobs import NamedTraces, service_jobs
+from daq_cli.robot.access import RobotAccess, robot_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,73 +53,73 @@ def diagnose(
     effects: Annotated[
         str | None,
         typer.Option(
-            help="Candidates: backlash,coulomb and so on (default: every effect known).",
+            help="Candidate effects, such as backlash,coulomb (default: every effect of the library).",
             autocompletion=completion.effects,
         ),
     ] = None,
     joints: Annotated[
         str | None,
-        typer.Option(help="Look on these joints only: 1-3, 2 (default: all).", autocompletion=completion.joints),
+        typer.Option(help="Examine these joints only: 1-3, 2 (default: all).", autocompletion=completion.joints),
     ] = None,
-    load: Annotated[float | None, typer.Option(min=0.0, help="The load that the arm carried, kg.")] = None,
-    most: Annotated[int, typer.Option(min=1, max=10, help="Effects to add at most, one after the other.")] = 3,
+    load: Annotated[float | None, typer.Option(min=0.0, help="Load that the arm carried, in kg.")] = None,
+    most: Annotated[
+        int, typer.Option(min=1, max=10, help="Largest number of effects to add, one after the other.")
+    ] = 3,
     out: Annotated[Path | None, OutOption] = None,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     effect_file: EffectFileOption = None,
     acquire: Annotated[
-        bool, typer.Option("--acquire", help="Run the experiment that tells what is left, and diagnose again.")
+        bool, typer.Option("--acquire", help="Run the experiment that the diagnosis asks for, and diagnose again.")
     ] = False,
-    budget: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Robot time for --acquire, s.")] = 60.0,
+    budget: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Robot time for --acquire in s.")] = 60.0,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
     """Find where a model and traces disagree, name the effect that is missing, add it, and show the gap shrink."""
-    from daq_cli.models.diagnose_acquire import acquired
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
+    from daq_cli.models.acquire_loop import diagnose_and_acquire
+    from model.discrepancy.carried_load import require_load_held
     from model.discrepancy.workflow import diagnose as run_diagnosis
     from server.jobs.asking import asker
 
-    call = invocation(context)
-    require_no_programs(effect_file, call)
-    load_effects(effect_file)
+    robot = robot_of(context)
+    load_effects(effect_file, robot)
     options = _options(effects, joints, most)
-    fitted_to = read_traces(call, folder, traces)
-    held = read_traces(call, folder, holdout) if holdout else []
-    begin = _beginning(call, fitted_to, traces, model, load)
+    fitted_to = read_traces(robot, folder, traces)
+    held = read_traces(robot, folder, holdout) if holdout else []
+    begin = _beginning(robot, fitted_to, traces, model, load)
     check_made_for(begin.machine, [*fitted_to, *held], [*traces, *(holdout or [])])
     if load is not None:
-        check_held(begin, fitted_to)
+        require_load_held(begin, fitted_to)
     failure: DaqError | None = None
 
     def once(traces: Sequence[Trace], ask: Asker) -> Diagnosis:
-        with shown_progress("diagnosing") as tell:
-            return run_diagnosis(begin, traces, held, options, tell, ask=ask)
+        with shown_progress("diagnosing") as progress:
+            return run_diagnosis(begin, traces, held, options, progress, ask=ask)
 
-    if call.server is not None and not acquire:
-        from daq_cli.robot.remote.diagnose import diagnose_at_server
-
-        wanted = (numbers_of(call, traces, fitted_to), numbers_of(call, holdout or [], held))
-        found = diagnose_at_server(call, begin, *wanted, options, out, report)
+    if not acquire and (jobs := service_jobs(robot)) is not None:
+        named, held_out = NamedTraces(traces, fitted_to), NamedTraces(holdout or [], held)
+        found = jobs.diagnose(begin, named, held_out, options, out, report)
         _save(found, out)
-        _tell(found, out, None, as_json=json)
+        _print_result(found, out, None, as_json=json)
         return
     if acquire:
-        ended = acquired(call, begin.machine, fitted_to, folder, budget, yes, once)
+        ended = diagnose_and_acquire(robot, begin.machine, fitted_to, folder, budget, Consent(yes), once)
         found, fitted_to, failure = ended.found, ended.traces, ended.failure
     else:
         found = once(fitted_to, asker(begin.machine))
     _save(found, out)
     page = None if report is None else _written(found, fitted_to, held, report)
-    _tell(found, out, page, as_json=json)
+    _print_result(found, out, page, as_json=json)
     if failure is not None:
         raise failure
     if found.acquired and (outcome := found.acquired[-1].outcome) != "complete":
-        raise typer.Exit(EXIT_CODES[outcome])
+        raise typer.Exit(exit_codes.OF_OUTCOME[outcome])
 
 
 def _save(found: Diagnosis, out: Path | None) -> None:
-    """The model, where it is wanted; before anything else is made of the answer, which may fail."""
+    """Writes the model, if it is wanted, before the report is made, which may fail."""
     from model.machine_model.model_file import save_model
 
     if out is not None:
@@ -127,8 +127,8 @@ def _save(found: Diagnosis, out: Path | None) -> None:
             save_model(found.model_after, part)
 
 
-def _tell(found: Diagnosis, out: Path | None, page: Path | None, *, as_json: bool) -> None:
-    """The answer, and where the model and the page are."""
+def _print_result(found: Diagnosis, out: Path | None, page: Path | None, *, as_json: bool) -> None:
+    """Prints the answer, and where the model and the report are."""
     from daq_cli.models.diagnosis_text import answer_text
 
     if as_json:
@@ -148,32 +148,24 @@ def _options(effects: str | None, joints: str | None, most: int) -> DiagnosisOpt
 
     return DiagnosisOptions(
         effects=None if effects is None else effect_names(effects),
-        joints=None if joints is None else tuple(parse_joints(joints)), most_steps=most,
-    )  # fmt: skip
+        joints=None if joints is None else tuple(parse_joints(joints)),
+        most_steps=most,
+    )
 
 
 def _beginning(
-    call: Invocation, traces: Sequence[Trace], names: Sequence[str], model: str | None, load: float | None
+    robot: RobotAccess, traces: Sequence[Trace], names: Sequence[str], model: str | None, load: float | None
 ) -> Model:
-    """The model that is doubted, with the load that was carried. names: what the command line calls the traces."""
+    """The model to be examined, with the load that was carried. names: what the command line calls the traces."""
+    from model.discrepancy.carried_load import with_load
     from model.machine_model.model import base_model
 
-    begin = base_model(machine_of(traces, call, names)) if model is None else read_model(model)
+    begin = base_model(machine_of(traces, robot, names)) if model is None else read_model(model)
     return begin if load is None else with_load(begin, load)
 
 
-def with_load(model: Model, kilograms: float) -> Model:
-    """The model of the same machine with another load at its end. Raises SpecError as `carrying` does."""
-    from model.machine_model.model import Model
-
-    machine = carrying(model.machine, kilograms, "given with --load")
-    values = {name: value for name, value in model.values.items() if name != "load.mass"}
-    fields = {name: getattr(model, name) for name in type(model).model_fields}
-    return Model(**{**fields, "machine": machine, "values": values})
-
-
 def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], path: Path) -> Path:
-    """The page, with what the models before and after make of every trace where a simulation can follow it."""
+    """Writes the report; where the traces can be simulated, it compares the models before and after on every trace."""
     from daq.contracts.machine import NoController
     from model.comparison.compare import compare
     from model.reports.diagnosis_report import LABELS, diagnosis_report

@@ -1,4 +1,4 @@
-"""`daq fit`: a model's parameters from traces, with what the traces cannot tell."""
+"""`daq fit`: a model's parameters from traces, and which of them the traces do not determine."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from daq_cli.app import completion
-from daq_cli.app.context import Invocation, JsonOption, console, invocation, print_json
+from daq_cli.app.context import JsonOption, console, print_json
 from daq_cli.app.output_file import replacing
 from daq_cli.models.effect_choice import bounds, patterns, with_effects
 from daq_cli.models.model_input import (
@@ -27,7 +27,8 @@ from daq_cli.models.model_input import (
     read_traces,
 )
 from daq_cli.models.parameter_table import print_parameters
-from daq_cli.robot.remote.jobs import numbers_of, require_no_programs
+from daq_cli.models.service_jobs import NamedTraces, service_jobs
+from daq_cli.robot.access import RobotAccess, robot_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,12 +43,13 @@ app = typer.Typer(add_completion=False)
 EffectsOption = Annotated[
     str | None,
     typer.Option(
-        help="Effects beside rigid bodies and motors: viscous,coulomb:2-3 or none (default: the machine's).",
+        help="Effects besides rigid bodies and motors, such as viscous,coulomb:2-3, or none (default: the machine's).",
         autocompletion=completion.effects,
     ),
 ]
 ParametersOption = Annotated[
-    str | None, typer.Option(help="What to find: names or patterns such as *.mass,joint2.* (default: all uncertain).")
+    str | None,
+    typer.Option(help="Parameters to fit: names or patterns such as *.mass,joint2.* (default: all uncertain ones)."),
 ]
 
 
@@ -56,71 +58,91 @@ def fit(
     context: typer.Context,
     traces: TracesArgument,
     out: Annotated[Path, OutOption],
-    model: Annotated[str | None, typer.Option(help=f"Begin from this one. {MODEL_HELP}")] = None,
-    machine: Annotated[str | None, typer.Option(help="Machine file or name (default: the traces').")] = None,
+    model: Annotated[str | None, typer.Option(help=f"The model to start from. {MODEL_HELP}")] = None,
+    machine: Annotated[
+        str | None, typer.Option(help="Machine file or name of a machine (default: that of the traces).")
+    ] = None,
     effects: EffectsOption = None,
     effect_file: EffectFileOption = None,
     parameters: ParametersOption = None,
-    hold: Annotated[str | None, typer.Option(help="Names or patterns to leave as they are.")] = None,
-    bound: Annotated[list[str] | None, typer.Option(help="name=low:high, instead of the model's own bounds.")] = None,
+    hold: Annotated[str | None, typer.Option(help="Parameters to hold at their values: names or patterns.")] = None,
+    bound: Annotated[
+        list[str] | None,
+        typer.Option(help="Bounds of a parameter, name=low:high, instead of the model's own. May be repeated."),
+    ] = None,
     holdout: HoldoutOption = None,
-    no_priors: Annotated[bool, typer.Option("--no-priors", help="Leave expected deviations out.")] = False,
+    no_priors: Annotated[
+        bool, typer.Option("--no-priors", help="Fit without the expected deviations of the parameters.")
+    ] = False,
     method: Annotated[
-        Literal["least_squares", "nelder_mead"], typer.Option(help="nelder_mead is the source's hill climbing.")
+        Literal["least_squares", "nelder_mead"],
+        typer.Option(help="nelder_mead is the hill climbing of the 1991 source."),
     ] = "least_squares",
-    starts: Annotated[int, typer.Option(min=1, max=100, help="Searches, from different beginnings.")] = 1,
-    seed: Annotated[int, typer.Option(min=0, help="Of the beginnings.")] = 0,
-    open_loop: Annotated[bool, typer.Option("--open-loop", help="Apply the recorded drive.")] = False,
+    starts: Annotated[int, typer.Option(min=1, max=100, help="Number of fits from different starting values.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the starting values.")] = 0,
+    open_loop: Annotated[
+        bool, typer.Option("--open-loop", help="Apply the recorded drive instead of closing the loop.")
+    ] = False,
     torques: Annotated[
-        bool, typer.Option("--torques", help="Compare torques instead of motion: no simulation, needs the drive.")
+        bool,
+        typer.Option(
+            "--torques", help="Compare torques instead of motion: nothing is simulated, and the drive must be recorded."
+        ),
     ] = False,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Find the parameters with which a model best repeats traces, and name what the traces cannot tell."""
-    from daq_cli.models.model_progress import shown_progress
+    """Find the parameters with which a model best reproduces traces, and name those that the traces do not
+    determine."""
+    from daq_cli.app.progress import shown_progress
     from model.comparison.compare import compare
     from model.fitting.fit import fit as run_fit
     from model.fitting.options import FitOptions
-    from model.simulation.simulate import Options
+    from model.simulation.prepared import Options
 
     if torques and (method != "least_squares" or starts > 1 or seed or open_loop):
         raise SpecError("--torques: --method, --starts, --seed and --open-loop are of a fit of motion; leave them out")
-    call = invocation(context)
-    require_no_programs(effect_file, call)
-    load_effects(effect_file)
-    fitted_to = read_traces(call, folder, traces)
-    held = read_traces(call, folder, holdout or []) if holdout else []
-    begin = _beginning(call, fitted_to, model, machine, effects)
+    robot = robot_of(context)
+    if torques:
+        robot.require_local("--torques: is computed here, not by a service; fetch the traces, then leave --server out")
+    load_effects(effect_file, robot)
+    fitted_to = read_traces(robot, folder, traces)
+    held = read_traces(robot, folder, holdout or []) if holdout else []
+    begin = _beginning(robot, fitted_to, model, machine, effects)
     loop: Literal["open", "closed"] | None = "open" if open_loop else None
     options = FitOptions(
-        parameters=patterns(parameters), held=patterns(hold) or (), bounds=bounds(bound or []),
-        use_priors=not no_priors, method=method, starts=starts, seed=seed, loop=loop,
-    )  # fmt: skip
-    if call.server is not None:
-        from daq_cli.robot.remote.fit import fit_at_server
-
-        if torques:
-            raise SpecError("--torques: is computed here, not by a service; fetch the traces, then leave --server out")
-        wanted = (numbers_of(call, traces, fitted_to), numbers_of(call, holdout or [], held))
-        done = fit_at_server(call, begin, *wanted, options, out, report)
+        parameters=patterns(parameters),
+        held=patterns(hold) or (),
+        bounds=bounds(bound or []),
+        use_priors=not no_priors,
+        method=method,
+        starts=starts,
+        seed=seed,
+        loop=loop,
+    )
+    if (jobs := service_jobs(robot)) is not None:
+        named, held_out = NamedTraces(traces, fitted_to), NamedTraces(holdout or [], held)
+        done = jobs.fit(begin, named, held_out, options, out, report)
         _save(done, out, quiet=json)
-        _tell(done, done.models, out, as_json=json)
+        _print_result(done, done.models, out, as_json=json)
         return
     if torques:
         from daq_cli.models.fit_torques import fit_recorded_torques
 
         fit_recorded_torques(begin, fitted_to, held, options, out, as_json=json, report=report)
         return
-    with shown_progress("fitting") as tell:
-        found = run_fit(begin, fitted_to, options, lambda f, text: tell(0.9 * f, text))
+    with shown_progress("fitting") as progress:
+        found = run_fit(begin, fitted_to, options, lambda f, text: progress(0.9 * f, text))
         _save(found, out, quiet=json)
         comparison = compare(
-            [("before", begin), ("fitted", found.model)], [*fitted_to, *held], [t.record.trace_id for t in held],
-            options=Options(loop=loop or "closed"), progress=lambda f, text: tell(0.9 + 0.1 * f, text),
-        )  # fmt: skip
-    _tell(found, comparison.models, out, as_json=json)
+            [("before", begin), ("fitted", found.model)],
+            [*fitted_to, *held],
+            [t.record.trace_id for t in held],
+            options=Options(loop=loop or "closed"),
+            progress=lambda f, text: progress(0.9 + 0.1 * f, text),
+        )
+    _print_result(found, comparison.models, out, as_json=json)
     if report is not None:
         from model.reports.fit_report import fit_report
         from model.reports.page import write_report
@@ -129,7 +151,7 @@ def fit(
 
 
 def _save(found: FitResult, out: Path, *, quiet: bool) -> None:
-    """The model, and where it is; before anything else is made of it, which may fail."""
+    """Writes the model and says where, before the comparison is made, which may fail."""
     with replacing(out) as part:
         found.save(part)
     if not quiet:
@@ -137,9 +159,9 @@ def _save(found: FitResult, out: Path, *, quiet: bool) -> None:
 
 
 def _beginning(
-    call: Invocation, traces: Sequence[Trace], model: str | None, machine: str | None, effects: str | None
+    robot: RobotAccess, traces: Sequence[Trace], model: str | None, machine: str | None, effects: str | None
 ) -> Model:
-    """The model that the search begins from."""
+    """The model that the fit starts from."""
     from model.machine_model.model import base_model
 
     if model is not None and machine is not None:
@@ -147,13 +169,13 @@ def _beginning(
     if model is not None:
         begin = read_model(model)
         return begin if effects is None else with_effects(begin, effects)
-    chosen = machine_of(traces, call) if machine is None else load_machine(machine)
+    chosen = machine_of(traces, robot) if machine is None else load_machine(machine)
     if effects is None:
         return base_model(chosen)
     return with_effects(base_model(chosen, friction=False), effects)
 
 
-def _tell(found: FitResult, agreement: Sequence[ModelAgreement], out: Path, *, as_json: bool) -> None:
+def _print_result(found: FitResult, agreement: Sequence[ModelAgreement], out: Path, *, as_json: bool) -> None:
     if as_json:
         _print_json(found, agreement, out)
     else:
@@ -163,17 +185,19 @@ def _tell(found: FitResult, agreement: Sequence[ModelAgreement], out: Path, *, a
 def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path) -> None:
     from daq_cli.models.agreement_table import agreement_data
 
-    print_json({
-        "model": found.model.identity,
-        "file": out,
-        "parameters": [p.model_dump(mode="json") for p in found.parameters],
-        "undetermined": [c.model_dump(mode="json") for c in found.identifiability.undetermined],
-        "agreement": agreement_data(agreement),
-        "whitened_mean_square": found.whitened_mean_square,
-        "converged": found.converged,
-        "evaluations": found.evaluations,
-        "seconds": found.seconds,
-    })  # fmt: skip
+    print_json(
+        {
+            "model": found.model.identity,
+            "file": out,
+            "parameters": [p.model_dump(mode="json") for p in found.parameters],
+            "undetermined": [c.model_dump(mode="json") for c in found.identifiability.undetermined],
+            "agreement": agreement_data(agreement),
+            "whitened_mean_square": found.whitened_mean_square,
+            "converged": found.converged,
+            "evaluations": found.evaluations,
+            "seconds": found.seconds,
+        }
+    )
 
 
 def _print(found: FitResult, agreement: Sequence[ModelAgreement]) -> None:

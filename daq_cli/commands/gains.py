@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq.contracts.limp import limp_line, require_no_jump
-from daq_cli.app.consent import require_consent
-from daq_cli.app.context import JsonOption, YesOption, console, invocation, print_json
+from daq_cli.app.consent import Consent
+from daq_cli.app.context import JsonOption, YesOption, console, print_json
 from daq_cli.app.quantities import parse_gains
-from daq_cli.robot.local_robot import connected
+from daq_cli.robot.access import robot_of
 from firmware_protocol.requests import SetGains
+
+if TYPE_CHECKING:
+    from daq.contracts.experiment import Gain
 
 app = typer.Typer(add_completion=False, help="Show or set the controller's PID gains.", no_args_is_help=True)
 
@@ -19,15 +21,7 @@ app = typer.Typer(add_completion=False, help="Show or set the controller's PID g
 @app.command()
 def show(context: typer.Context, json: JsonOption = False) -> None:
     """P, I and D of every joint (0-20; not the physical gains)."""
-    call = invocation(context)
-    if call.server is None:
-        with connected(call) as controller:
-            found = controller.gains()
-    else:
-        from daq_cli.robot.remote.robot import remote_robot
-
-        with remote_robot(call) as robot:
-            found = robot.gains().gains
+    found = robot_of(context).gains()
     if json:
         print_json({joint: dict(zip("pid", gain, strict=True)) for joint, gain in found.items()})
         return
@@ -45,25 +39,11 @@ def set_gains(
     wanted = parse_gains(gains)
     for joint, gain in wanted.items():
         SetGains(joint, *gain)  # raises outside its range: all or nothing is written
-    call = invocation(context)
-    if call.server is not None:
-        from daq_cli.robot.remote.control import set_gains_at_server
-
-        set_gains_at_server(call, wanted, yes)
-        return
-    with connected(call) as controller:
-        require_consent(
-            call.port,
-            simulated=controller.identity.simulated,
-            consent=yes,
-            what="its gains will change",
-            refused="its gains change",
-        )
-        readings = controller.next_snapshot().joints
-        require_no_jump({joint: reading.error for joint, reading in readings}, wanted)
-        for joint, (p, i, d) in wanted.items():
-            controller.set_gains(joint, p, i, d)
-            print(f"joint {joint}: P {p}  I {i}  D {d}, read back")
-        limp = limp_line(controller.gains())
-    if limp:
+    consent = Consent(yes, what="its gains will change", refused="its gains change")
+    if limp := robot_of(context).set_gains(wanted, consent, _print_written):
         console().print(limp)
+
+
+def _print_written(joint: int, gain: Gain) -> None:
+    p, i, d = gain
+    print(f"joint {joint}: P {p}  I {i}  D {d}, read back")

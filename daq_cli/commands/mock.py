@@ -12,7 +12,7 @@ app = typer.Typer(add_completion=False)
 
 @app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []})
 def mock(context: typer.Context) -> None:
-    """Start the mock controller; all options are its own: `daq mock --help`."""
+    """Start the mock controller; `daq mock --help` lists its own options."""
     # The mock is reached through a port, never by a call: this process becomes it.
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, "-m", "mock_controller", *context.args])

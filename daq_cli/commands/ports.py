@@ -23,5 +23,5 @@ def ports(json: JsonOption = False) -> None:
     if not found:
         print("no serial port found; the mock needs none (`daq --port mock:// …`)")
     for port in found:
-        told = ", ".join(text for text in (port.description, port.maker, port.serial_number) if text)
-        print(f"{port.url}  {told}")
+        shown = ", ".join(text for text in (port.description, port.maker, port.serial_number) if text)
+        print(f"{port.url}  {shown}")

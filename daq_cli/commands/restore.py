@@ -1,4 +1,4 @@
-"""`daq restore`: a backup, back to where the configuration has everything."""
+"""`daq restore`: a backup, brought back to the configured places."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def restore(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(help="A file that `daq backup` has made.")],
-    check: Annotated[bool, typer.Option("--check", help="Read every byte of it, and change nothing.")] = False,
+    file: Annotated[Path, typer.Argument(help="A file that `daq backup` made.")],
+    check: Annotated[bool, typer.Option("--check", help="Read every byte of the backup, and change nothing.")] = False,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Put aside what is there: into folders before-restore-….")
+        bool, typer.Option("--overwrite", help="Move existing data aside, into folders before-restore-….")
     ] = False,
     json: JsonOption = False,
 ) -> None:
     """Bring back the database, traces, models and results of a backup. The service must not run."""
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
     from server.backup.manifest import verify
     from server.backup.places import places_of
     from server.backup.restore import restore as bring_back
@@ -34,19 +34,19 @@ def restore(
         raise SpecError(f"{file}: is no file, so no backup")
     put_aside: list[str] = []
     if check:
-        with shown_progress("checking") as tell:
-            found = verify(file, tell)
+        with shown_progress("checking") as progress:
+            found = verify(file, progress)
         what = "is as it was written"
     else:
         places = places_of(invocation(context).settings)
-        with shown_progress("restore") as tell:
-            done = bring_back(file, places, SystemClock().utc(), tell, overwrite=overwrite)
+        with shown_progress("restore") as progress:
+            done = bring_back(file, places, SystemClock().utc(), progress, overwrite=overwrite)
         put_aside = [str(folder) for folder in done.put_aside]
         found, what = done.manifest, "was brought back"
     if json:
         counted = {"bytes": found.size, "traces": found.count("traces"), "models": found.count("models")}
-        told = found.model_dump(mode="json", exclude={"files"})
-        print_json({"file": file, "restored": not check, "put_aside": put_aside, **told, **counted})
+        manifest = found.model_dump(mode="json", exclude={"files"})
+        print_json({"file": file, "restored": not check, "put_aside": put_aside, **manifest, **counted})
         return
     for folder in put_aside:
         console().print(f"put aside what was there: {folder}", markup=False)

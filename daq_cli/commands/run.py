@@ -1,4 +1,4 @@
-"""`daq run`: one subcommand a kind of trajectory, its options made from the kind's own fields."""
+"""`daq run`: one subcommand for each kind of trajectory, with options made from the fields of that kind."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from daq.contracts.experiment import ExperimentSpec, parse_joints, parse_spec
 from daq_cli.app import completion
 from daq_cli.app.context import JsonOption, YesOption, invocation, print_json
 from daq_cli.app.quantities import parse_angle, parse_gains, parse_per_joint_angles
+from daq_cli.robot.access import robot_of
+from daq_cli.robot.experiment import RunOptions, carry_out
 
 app = typer.Typer(add_completion=False, help="Run an experiment and record its trace.", no_args_is_help=True)
 
@@ -45,36 +47,36 @@ _IN_SHORT = {
     "pick-and-place": "4-3-4: lifted off, over, and set down.",
 }
 _HELP = {
-    "duration": "Seconds.",
-    "period": "Seconds.",
-    "dwell": "Seconds on each step.",
+    "duration": "Duration of the motion in s.",
+    "period": "Period of the sine in s.",
+    "dwell": "Time on each step in s.",
     "steps": "Number of steps one way.",
-    "back": "Down again afterwards.",
-    "reversals": "Changes of direction.",
-    "cycles": "Periods of the sine.",
+    "back": "Go down again afterwards.",
+    "reversals": "Number of changes of direction.",
+    "cycles": "Number of periods of the sine.",
     "lowest": "Lowest frequency in Hz.",
     "highest": "Highest frequency in Hz.",
     "tones": "Number of sines.",
-    "seed": "Of the phases.",
-    "lift": "Metres of the lift-off and set-down points above the ends.",
-    "pick": "Seconds up to the lift-off point.",
-    "travel": "Seconds from the lift-off to the set-down point.",
-    "place": "Seconds down from the set-down point.",
+    "seed": "Seed of the phases.",
+    "lift": "Height of the lift-off and set-down points above the ends in m.",
+    "pick": "Time up to the lift-off point in s.",
+    "travel": "Time from the lift-off to the set-down point in s.",
+    "place": "Time down from the set-down point in s.",
 }
 _ANGLES = {"phase": "degrees", "speed": "degrees/s"}
 
 JointsOption = Annotated[str, typer.Option(help="Joints that move: 1-3, 1,3 or 2.", autocompletion=completion.joints)]
 StartOption = Annotated[str | None, typer.Option(help="Start angles, such as 1=180,2=45 (degrees).")]
 GainsOption = Annotated[str | None, typer.Option(help="Gains P/I/D, such as 1=2/0/0,2=2/0/0 (each 0-20).")]
-SettleOption = Annotated[float, typer.Option(help="Seconds held before the motion, recorded.")]
-HoldOption = Annotated[float, typer.Option(help="Seconds held after the motion, recorded.")]
-RepeatsOption = Annotated[int, typer.Option(help="How often the motion is made.")]
-RecordOption = Annotated[str | None, typer.Option(help="Joints to record (default: all the line has room for).")]
+SettleOption = Annotated[float, typer.Option(help="Time at rest before the motion in s, recorded.")]
+HoldOption = Annotated[float, typer.Option(help="Time at rest after the motion in s, recorded.")]
+RepeatsOption = Annotated[int, typer.Option(help="Number of times that the motion is made.")]
+RecordOption = Annotated[str | None, typer.Option(help="Joints to record (default: as many as the line has room for).")]
 NameOption = Annotated[str | None, typer.Option(help="A name for the experiment.")]
 OperatorOption = Annotated[str | None, typer.Option(help="Who runs it.")]
-NotesOption = Annotated[str, typer.Option(help="Anything worth knowing later.")]
-FolderOption = Annotated[Path | None, typer.Option(help="Where the trace goes (default: configured folder).")]
-DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Check and show the motion; connect to nothing.")]
+NotesOption = Annotated[str, typer.Option(help="Remarks that are kept with the trace.")]
+FolderOption = Annotated[Path | None, typer.Option(help="Folder for the trace (default: the configured one).")]
+DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Only check and show the motion; connect to nothing.")]
 
 COMMON: dict[str, tuple[Any, Any]] = {
     "joints": (JointsOption, "1-3"),
@@ -100,16 +102,18 @@ def _option(name: str, field: FieldInfo) -> tuple[Any, Any]:
     """Type and default of the option that stands for a field of a trajectory."""
     default = field.get_default()
     if name == "amplitude":
-        return Annotated[str, typer.Option(help="Degrees, or one a joint: 1=21.6,2=-10.")], f"{_degrees(default)}"
+        return Annotated[
+            str, typer.Option(help="Amplitude in degrees, or one for each joint: 1=21.6,2=-10.")
+        ], f"{_degrees(default)}"
     if name == "points":
-        text = "Degrees from the start, a point after the other: 10;20 or, one a joint, 1=10,2=5;1=20,2=0."
+        text = "Points in degrees from the start, one after the other: 10;20 or, for each joint, 1=10,2=5;1=20,2=0."
         return Annotated[str, typer.Option(help=text)], inspect.Parameter.empty
     if name == "times":
         return Annotated[
-            str, typer.Option(help="Seconds at which the points are passed: 1,2.5.")
+            str, typer.Option(help="Times in s at which the points are passed: 1,2.5.")
         ], inspect.Parameter.empty
     if name in _ANGLES:
-        return Annotated[str, typer.Option(help=f"In {_ANGLES[name]}.")], f"{_degrees(default)}"
+        return Annotated[str, typer.Option(help=f"{name.capitalize()} in {_ANGLES[name]}.")], f"{_degrees(default)}"
     kind = field.annotation
     if NoneType in get_args(kind):
         raise TypeError(f"trajectory field {name}: optional fields have no option")
@@ -155,16 +159,8 @@ def spec_from_options(trajectory: dict[str, Any], values: dict[str, Any], operat
 
 
 def _carry_out(context: typer.Context, spec: ExperimentSpec, values: dict[str, Any]) -> None:
-    from daq_cli.robot.run_result import carry_out
-
-    carry_out(
-        invocation(context),
-        spec,
-        folder=values["folder"],
-        dry_run=values["dry_run"],
-        consent=values["yes"],
-        as_json=values["json"],
-    )
+    options = RunOptions(values["folder"], values["dry_run"], values["yes"], values["json"])
+    carry_out(robot_of(context), spec, options)
 
 
 def _command(kind: type[BaseModel]) -> Callable[..., None]:
@@ -201,7 +197,7 @@ def from_file(
     json: JsonOption = False,
 ) -> None:
     """Run an experiment from a file: any kind, also paths and sequences."""
-    from daq_cli.models.spec_file import read_spec
+    from daq_cli.robot.experiment import read_spec
 
     _carry_out(context, read_spec(file), {"folder": folder, "dry_run": dry_run, "yes": yes, "json": json})
 
@@ -210,7 +206,7 @@ def from_file(
 def by_name(
     context: typer.Context,
     name: Annotated[
-        str, typer.Argument(help="Name of a preset; none lists them.", autocompletion=completion.presets)
+        str, typer.Argument(help="Name of a preset; without one, all are listed.", autocompletion=completion.presets)
     ] = "",
     folder: FolderOption = None,
     dry_run: DryRunOption = False,
@@ -239,5 +235,5 @@ def diagnostic(
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Run the set of about 55 s that tells hidden effects apart (the preset of that name)."""
+    """Run the preset `diagnostic`: about 55 s of motion that tells hidden effects apart."""
     by_name(context, "diagnostic", folder, dry_run, yes, json)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq.contracts.errors import SpecError
-from daq_cli.app.context import JsonOption, console, invocation, print_json, print_table
+from daq_cli.app.context import JsonOption, console, print_json, print_table
 from daq_cli.app.output_file import check_folder, replacing
 from daq_cli.models.effect_choice import patterns
 from daq_cli.models.model_input import (
@@ -22,6 +22,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
+from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
@@ -33,7 +34,7 @@ PICTURES = (".png", ".svg", ".pdf")
 
 
 def _file(path: Path | None) -> Path | None:
-    """Refuses another kind of file, and one that cannot be made, before anything is computed."""
+    """Refuses a file of another kind, or one that cannot be written, before anything is computed."""
     if path is not None:
         if path.suffix not in (".csv", *PICTURES):
             raise SpecError(f"--output {path}: curves are written as .csv, or as a picture ({', '.join(PICTURES)})")
@@ -55,29 +56,29 @@ def sensitivity(
         Path | None, typer.Option("--output", "-o", callback=_file, help="The curves: .csv, or .png, .svg, .pdf.")
     ] = None,
     open_loop: Annotated[
-        bool, typer.Option("--open-loop", help="Apply the recorded drive: no controller makes up for a change.")
+        bool, typer.Option("--open-loop", help="Apply the recorded drive, so that no controller makes up for a change.")
     ] = False,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     effect_file: EffectFileOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Show how each joint's reading changes along a trace when a parameter is off by what may be expected.
+    """Show how each joint's reading changes along a trace when a parameter is off by its expected deviation.
 
     The change is exact to first order, and each parameter changes alone. A parameter whose curve stays within the noise
     of a reading cannot be found from this trace; two whose curves have one shape cannot be told apart.
     """
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
     from model.analysis.sensitivity import sensitivity_curves
-    from model.simulation.simulate import Options
+    from model.simulation.prepared import Options
     from model.validation.names import names_to_validate
 
     load_effects(effect_file)
-    (read,) = read_traces(invocation(context), folder, [trace])
+    (read,) = read_traces(robot_of(context), folder, [trace])
     chosen = read_model(model)
     names = names_to_validate(chosen, patterns(parameters))
-    with shown_progress("sensitivities") as tell:
-        tell(0.0, f"{len(names)} parameters")
+    with shown_progress("sensitivities") as progress:
+        progress(0.0, f"{len(names)} parameters")
         found = sensitivity_curves(chosen, read, names, options=Options(loop="open" if open_loop else "closed"))
     if json:
         print_json(found.model_dump(mode="json"))

@@ -15,7 +15,9 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def serve(
     context: typer.Context,
-    host: Annotated[str | None, typer.Option(help="Address to listen at (default: configured, 127.0.0.1).")] = None,
+    host: Annotated[
+        str | None, typer.Option(help="Address to listen at (default: the configured one, else 127.0.0.1).")
+    ] = None,
     port: Annotated[int | None, typer.Option(min=0, max=65535, help="Port to listen at; 0 for any free one.")] = None,
 ) -> None:
     """Serve experiments, traces and the dashboard to people and programs."""
@@ -32,10 +34,10 @@ def serve(
     from server.serve import serve as run
 
     robot = settings.robot.model_copy(update={"port": call.port})
-    run(settings.model_copy(update={"server": section, "robot": robot}), _tell)
+    run(settings.model_copy(update={"server": section, "robot": robot}), _announce)
 
 
-def _tell(address: str) -> None:
+def _announce(address: str) -> None:
     from server.page import NOT_BUILT, is_built
 
     log = logging.getLogger("server")

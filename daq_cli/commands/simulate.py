@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq.contracts.errors import SpecError
-from daq_cli.app.context import JsonOption, console, invocation, print_json
+from daq_cli.app.context import JsonOption, console, print_json
 from daq_cli.app.csv_output import check_csv, write_csv
 from daq_cli.app.output_file import check_folder
 from daq_cli.models.model_input import (
@@ -22,12 +22,13 @@ from daq_cli.models.model_input import (
     model_label,
     read_model,
     read_traces,
-)  # fmt: skip
+)
+from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
     from model.machine_model.model import Model
-    from model.simulation.simulate import Options
+    from model.simulation.prepared import Options
 
 app = typer.Typer(add_completion=False)
 
@@ -47,25 +48,24 @@ def simulate(
         bool, typer.Option("--open-loop", help="Apply the recorded drive instead of closing the loop.")
     ] = False,
     no_rounding: Annotated[
-        bool, typer.Option("--no-rounding", help="Leave readings and power unrounded, as no board does.")
+        bool, typer.Option("--no-rounding", help="Leave readings and drive unrounded, unlike a real board.")
     ] = False,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
     effect_file: EffectFileOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Simulate traces from their recorded set points, and show what is left between measured and simulated.
+    """Simulate traces from their recorded set points, and show the difference between measured and simulated.
 
-    Nothing is fitted. A machine is taken as its file has it, with the friction it states.
+    Nothing is fitted. A machine is taken as its file describes it, with the friction stated there.
     """
+    from daq_cli.app.progress import shown_progress
     from daq_cli.models.agreement_table import agreement_data, print_agreement
-    from daq_cli.models.model_progress import shown_progress
     from model.comparison.compare import compare
-    from model.simulation.simulate import Options
+    from model.simulation.prepared import Options
 
-    call = invocation(context)
     load_effects(effect_file)
-    found = read_traces(call, folder, traces)
+    found = read_traces(robot_of(context), folder, traces)
     if output is not None and len(found) != 1:
         raise SpecError(f"--output {output}: is for one trace, {len(found)} are named")
     if output is not None:
@@ -74,8 +74,8 @@ def simulate(
             check_csv(output)
     chosen = read_model(model)
     options = Options(loop="open" if open_loop else "closed", quantise=not no_rounding)
-    with shown_progress("simulating") as tell:
-        comparison = compare([(model_label(model), chosen)], found, options=options, progress=tell)
+    with shown_progress("simulating") as progress:
+        comparison = compare([(model_label(model), chosen)], found, options=options, progress=progress)
     if json:
         print_json({"model": chosen.identity, "agreement": agreement_data(comparison.models)[0]})
     else:
@@ -91,7 +91,7 @@ def simulate(
 
 
 def _simulated(model: Model, trace: Trace, options: Options) -> Trace:
-    """The trace that the model would have left."""
+    """The trace that the model would have recorded."""
     from daq.contracts.trace import Trace
     from model.simulation.simulate import simulate
 
@@ -107,9 +107,15 @@ def _simulated(model: Model, trace: Trace, options: Options) -> Trace:
         }
     )
     made = Trace(
-        record, run.joints, trace.time, run.at_samples(run.reading), error=run.at_samples(run.error),
-        drive=run.at_samples(run.drive), velocity=run.at_samples(run.velocity), tick=trace.tick,
-    )  # fmt: skip
+        record,
+        run.joints,
+        trace.time,
+        run.at_samples(run.reading),
+        error=run.at_samples(run.error),
+        drive=run.at_samples(run.drive),
+        velocity=run.at_samples(run.velocity),
+        tick=trace.tick,
+    )
     if trace.set_point is None:
         return replace(made, error=None)
     return replace(made, set_point=trace.set_point[:, columns])

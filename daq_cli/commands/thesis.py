@@ -1,4 +1,4 @@
-"""`daq thesis`: the 1991 source reproduced, ours beside the published."""
+"""`daq thesis`: the 1991 source reproduced, with our numbers beside the published ones."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq_cli.app import completion
-from daq_cli.app.context import Invocation, JsonOption, console, invocation, print_json
+from daq_cli.app.context import Invocation, JsonOption, console, print_json
 from daq_cli.models.model_input import ReportOption, read_traces
+from daq_cli.robot.access import robot_access, robot_of
 
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
@@ -27,27 +28,32 @@ def thesis(
             help="Use this trace of the ramp instead of a new one. May be repeated.", autocompletion=completion.traces
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the mock's noise.")] = 1991,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the mock's noise.")] = 1991,
     nelder_mead: Annotated[
-        bool, typer.Option("--nelder-mead/--no-nelder-mead", help="Fit as the source did, too; takes minutes.")
+        bool,
+        typer.Option(
+            "--nelder-mead/--no-nelder-mead", help="Fit by Nelder-Mead too, as the source did; this takes minutes."
+        ),
     ] = True,
-    folder: Annotated[Path | None, typer.Option(help="Keep the new trace here (default: it is not kept).")] = None,
+    folder: Annotated[
+        Path | None, typer.Option(help="Folder that keeps the new trace (default: it is not kept).")
+    ] = None,
     report: ReportOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Reproduce the source: its sums recomputed, its four models fitted, its figures and control runs.
+    """Reproduce the 1991 source: recompute its sums, fit its four models, and repeat its figures and control runs.
 
-    The trace is of the mock's arm, which has the complete friction of table 7.9, recorded in lock-step as any
-    experiment is; the measured traces of 1991 are lost.
+    The trace comes from the mock, whose arm has the complete friction of table 7.9, recorded in lock-step; the traces
+    measured in 1991 are lost.
     """
-    from daq_cli.models.model_progress import shown_progress
+    from daq_cli.app.progress import shown_progress
     from model.thesis.reproduction import reproduce_thesis
     from model.thesis.text import as_text
 
-    traces = read_traces(invocation(context), folder, trace) if trace else [recorded_ramp(seed, folder)]
-    with shown_progress("reproducing") as tell:
+    traces = read_traces(robot_of(context), folder, trace) if trace else [recorded_ramp(seed, folder)]
+    with shown_progress("reproducing") as progress:
         found = reproduce_thesis(
-            traces, ("nelder_mead", "least_squares") if nelder_mead else ("least_squares",), progress=tell
+            traces, ("nelder_mead", "least_squares") if nelder_mead else ("least_squares",), progress=progress
         )
     if json:
         print_json(found.model_dump(mode="json"))
@@ -65,10 +71,12 @@ def recorded_ramp(seed: int, folder: Path | None = None) -> Trace:
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import load_machine
     from daq.traces.reader import read_trace
-    from daq_cli.robot.run_result import acquire_whole
+    from daq_cli.app.consent import Consent
+    from daq_cli.robot.experiment import acquire_complete
 
     spec = ExperimentSpec(name="thesis-ramp", notes="made by `daq thesis`")
-    call = Invocation(port_option=f"mock://?seed={seed}&lock_step=1")
+    robot = robot_access(Invocation(port_option=f"mock://?seed={seed}&lock_step=1"))
     with TemporaryDirectory() as temporary:
-        finished = acquire_whole(call, spec, load_machine("ma2000"), folder or Path(temporary), consent=False)
+        place = folder or Path(temporary)
+        finished = acquire_complete(robot, spec, load_machine("ma2000"), place, Consent(False))
         return read_trace(finished.trace)

@@ -1,4 +1,4 @@
-"""`daq token`: who may use the service from elsewhere."""
+"""`daq token`: who may use the service from another computer."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from daq_cli.app.context import Invocation, JsonOption, console, invocation, pri
 if TYPE_CHECKING:
     from server.access.tokens import TokenStore
 
-app = typer.Typer(add_completion=False, help="Tokens of the service: make, list, revoke.", no_args_is_help=True)
+app = typer.Typer(add_completion=False, help="Make, list and revoke tokens of the service.", no_args_is_help=True)
 
-NameArgument = Annotated[str, typer.Argument(help="Whose it is: a person or a program.")]
+NameArgument = Annotated[str, typer.Argument(help="Owner of the token: a person or a program.")]
 
 
 @app.command()
@@ -23,7 +23,8 @@ def add(
     context: typer.Context,
     name: NameArgument,
     role: Annotated[
-        Literal["viewer", "operator"], typer.Option(help="A viewer may look, and stop the robot.")
+        Literal["viewer", "operator"],
+        typer.Option(help="A viewer may look, and stop the robot; an operator may also move it."),
     ] = "viewer",
 ) -> None:
     """Make a token. It is shown this once; only its hash is kept."""
@@ -49,7 +50,7 @@ def ls(context: typer.Context, json: JsonOption = False) -> None:
 
 @app.command()
 def revoke(context: typer.Context, name: NameArgument) -> None:
-    """Revoke a token: it opens nothing any more, within two seconds."""
+    """Revoke a token; within two seconds it is no longer accepted."""
     from server.clock import SystemClock
 
     _require_name(name)

@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq.contracts.errors import SpecError, TraceError
+from daq.contracts import exit_codes
 from daq_cli.app import completion
-from daq_cli.app.context import Invocation, JsonOption, console, invocation, print_json, print_table, printable
+from daq_cli.app.context import JsonOption, console, print_json, print_table, printable
+from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from daq.contracts.trace import Trace, TraceRecord
-    from daq.traces.catalogue import TraceSummary
     from daq.traces.salvage import Salvaged
 
 app = typer.Typer(add_completion=False, help="List, show, plot, convert and verify traces.", no_args_is_help=True)
@@ -28,31 +26,26 @@ TraceArgument = Annotated[
 ]
 FolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (default: the configured one).")]
 
-EXIT_NOT_TRUSTWORTHY = 5
 SHOWN_DIGITS = 8
-"""Of a trace's number in the list, which then fits into 80 columns; the beginning of a number names the trace."""
-
-
-def _folder(call: Invocation, folder: Path | None) -> Path:
-    return folder or call.trace_folder
+"""Digits of a trace's number in the list, so that it fits into 80 columns; they suffice to name the trace."""
 
 
 def _path(context: typer.Context, wanted: str, folder: Path | None) -> Path:
-    call = invocation(context)
-    return call.find_trace(_folder(call, folder), wanted)
+    robot = robot_of(context)
+    return robot.find_trace(folder or robot.call.trace_folder, wanted)
 
 
 def _read(context: typer.Context, wanted: str, folder: Path | None) -> tuple[Path, Trace]:
     from daq.traces.reader import read_trace
 
     path = _path(context, wanted, folder)
-    return path, read_trace(path, invocation(context).trace_limits)
+    return path, read_trace(path, robot_of(context).call.trace_limits)
 
 
 @app.command("ls")
 def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOption = False) -> None:
     """List traces, the oldest first."""
-    summaries, place = _summaries(invocation(context), folder)
+    summaries, place = robot_of(context).list_traces(folder)
     if json:
         print_json([summary.model_dump(mode="json") for summary in summaries])
         return
@@ -80,18 +73,6 @@ def list_all(context: typer.Context, folder: FolderOption = None, json: JsonOpti
     print_table(table)
 
 
-def _summaries(call: Invocation, folder: Path | None) -> tuple[Sequence[TraceSummary], str]:
-    """Traces and where they are."""
-    if call.server is not None:
-        from daq_cli.robot.remote.traces import summaries_at_server
-
-        return summaries_at_server(call), call.server
-    from daq.traces.catalogue import list_traces
-
-    place = _folder(call, folder)
-    return list_traces(place, call.trace_limits) if place.is_dir() else (), str(place)
-
-
 def joints_text(joints: tuple[int, ...]) -> str:
     """`1-3` where joints follow each other, else `1,3`."""
     if len(joints) > 1 and joints == tuple(range(joints[0], joints[-1] + 1)):
@@ -110,8 +91,8 @@ def show(
     figures = joint_figures(found)
     if json:
         data = found.record.model_dump(mode="json", exclude={"machine", "memory_map"})
-        print_json({"path": path, "record": data, "samples": len(found), "missing": found.missing,
-                    "joints": [figure.model_dump() for figure in figures]})  # fmt: skip
+        joints = [figure.model_dump() for figure in figures]
+        print_json({"path": path, "record": data, "samples": len(found), "missing": found.missing, "joints": joints})
         return
     record = found.record
     what = record.spec.trajectory.kind if record.spec else "import"
@@ -150,8 +131,9 @@ def print_figures(trace: Trace) -> None:
         rise = "–" if one.rise_time is None else f"{one.rise_time:.2f} s"
         drive = "–" if one.largest_drive is None else f"{one.largest_drive:.1f} {trace.record.drive_unit or ''}"
         cells = (one.start, one.end, one.overshoot)
-        table.add_row(str(one.joint), *(_angle(value, one.unit) for value in cells), rise,
-                      _angle(one.largest_error, one.unit), _angle(one.final_error, one.unit), drive)  # fmt: skip
+        errors = (one.largest_error, one.final_error)
+        start, end, overshoot, largest, final = (_angle(value, one.unit) for value in (*cells, *errors))
+        table.add_row(str(one.joint), start, end, overshoot, rise, largest, final, drive)
     print_table(table)
 
 
@@ -171,11 +153,11 @@ def plot(
     folder: FolderOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Draw a trace: set point and position, error and drive of every joint."""
+    """Plot a trace: set point and position, error and drive of every joint."""
     from daq.traces.plot import plot_trace
 
     path, found = _read(context, trace, folder)
-    _tell_file(path, plot_trace(found, output or path.with_suffix(".png")), as_json=json)
+    _print_file(path, plot_trace(found, output or path.with_suffix(".png")), as_json=json)
 
 
 @app.command("export")
@@ -183,19 +165,19 @@ def export(
     context: typer.Context,
     trace: TraceArgument = "last",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="A .csv file; a .toml is put beside it.")
+        Path | None, typer.Option("--output", "-o", help="The .csv file to write; a .toml file is put beside it.")
     ] = None,
     folder: FolderOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Write a trace as plain CSV, with a TOML file for what columns cannot say."""
+    """Write a trace as plain CSV, with a TOML file for the data that have no column."""
     from daq_cli.app.csv_output import write_csv
 
     path, found = _read(context, trace, folder)
-    _tell_file(path, write_csv(found, output or path.with_suffix(".csv")), as_json=json)
+    _print_file(path, write_csv(found, output or path.with_suffix(".csv")), as_json=json)
 
 
-def _tell_file(made_from: Path, file: Path, *, as_json: bool) -> None:
+def _print_file(made_from: Path, file: Path, *, as_json: bool) -> None:
     if as_json:
         print_json({"trace": made_from, "file": file})
     else:
@@ -215,38 +197,23 @@ def import_(
     folder: FolderOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Take in a trace of another rig or tool."""
-    from daq.traces.csv_table import import_csv
-    from daq.traces.naming import trace_path
-    from daq.traces.store import write_trace
-
-    call = invocation(context)
-    if call.server is not None:
-        from daq_cli.robot.remote.traces import upload
-
-        upload(call, file, as_json=json)
-        return
-    place = _folder(call, folder)
-    found = import_csv(file, call.trace_limits)
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise TraceError(f"{place}: cannot be made: {error.strerror}") from error
-    made = write_trace(found, trace_path(place, found.record))
+    """Import a trace of another rig or tool."""
+    robot = robot_of(context)
+    made = robot.import_trace(file, folder)
     if json:
-        print_json({"trace": found.record.trace_id, "made_from": file, "file": made, "server": None})
+        print_json({"trace": made.trace, "made_from": file, "file": made.file, "server": robot.call.server})
     else:
-        print(made)
+        print(made.text)
 
 
 @app.command("verify")
 def check(
     context: typer.Context, trace: TraceArgument = "last", folder: FolderOption = None, json: JsonOption = False
 ) -> None:
-    """Check a trace from its checksums to its signals; ends with 5 when it is not to be trusted."""
+    """Check a trace, from its checksums to its signals; the exit code is 5 when it cannot be trusted."""
     from daq.traces.verify import verify
 
-    found = verify(_path(context, trace, folder), invocation(context).trace_limits)
+    found = verify(_path(context, trace, folder), robot_of(context).call.trace_limits)
     if json:
         print_json(found.model_dump(mode="json") | {"trustworthy": found.trustworthy})
     else:
@@ -254,7 +221,7 @@ def check(
             print(printable(f"{finding.level}: {finding.message}"))
         print("trustworthy" if found.trustworthy else "NOT to be trusted")
     if not found.trustworthy:
-        raise typer.Exit(EXIT_NOT_TRUSTWORTHY)
+        raise typer.Exit(exit_codes.FAULT)
 
 
 @app.command()
@@ -262,10 +229,9 @@ def salvage(context: typer.Context, folder: FolderOption = None, json: JsonOptio
     """Finish the traces that a crash left without an end; they are marked as interrupted."""
     from daq.traces.salvage import salvage_folder
 
-    call = invocation(context)
-    if call.server is not None:
-        raise SpecError("--server: `daq traces salvage` is for this computer's traces; a service salvages its own")
-    results = salvage_folder(_folder(call, folder), call.trace_limits)
+    robot = robot_of(context)
+    robot.require_local("--server: `daq traces salvage` is for this computer's traces; a service salvages its own")
+    results = salvage_folder(folder or robot.call.trace_folder, robot.call.trace_limits)
     if json:
         print_json([vars(result) for result in results])
         return
@@ -274,7 +240,7 @@ def salvage(context: typer.Context, folder: FolderOption = None, json: JsonOptio
     if not results:
         console().print("nothing to salvage")
     if any(result.path is None for result in results):
-        raise typer.Exit(EXIT_NOT_TRUSTWORTHY)
+        raise typer.Exit(exit_codes.FAULT)
 
 
 def _salvage_line(result: Salvaged) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq_cli.app.context import JsonOption, console, invocation, print_json, print_table
+from daq_cli.app.context import JsonOption, console, print_json, print_table
 from daq_cli.models.effect_choice import patterns
 from daq_cli.models.model_input import (
     MODEL_HELP,
@@ -19,7 +19,8 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
-from daq_cli.robot.remote.jobs import numbers_of, require_no_programs
+from daq_cli.models.service_jobs import NamedTraces, service_jobs
+from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,41 +51,44 @@ def validate(
     effect_file: EffectFileOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Validate a model by distortion: Σλ² says whether expected deviations explain what the model misses.
+    """Validate a model by distortion: Σλ² says whether expected parameter deviations explain the model's errors.
 
-    The time-domain form says of every parameter how it would have to vary with time, and what that goes with.
+    The time-domain form shows how every parameter would have to vary with time, and with what that correlates.
     """
-    from daq_cli.models.model_progress import shown_progress
-    from model.simulation.simulate import Options
+    from daq_cli.app.progress import shown_progress
+    from model.simulation.prepared import Options
     from model.validation.conventions import in_convention
     from model.validation.fidelity import validate_by_distortion
     from model.validation.names import names_to_validate
     from model.validation.time_domain import vary_in_time
 
-    call = invocation(context)
-    require_no_programs(effect_file, call)
-    load_effects(effect_file)
-    found = read_traces(call, folder, traces)
+    robot = robot_of(context)
+    load_effects(effect_file, robot)
+    found = read_traces(robot, folder, traces)
     chosen = read_model(model)
-    if call.server is not None:
-        from daq_cli.robot.remote.validate import validate_at_server
-
-        numbers = numbers_of(call, traces, found)
-        done = validate_at_server(call, chosen, model, numbers, patterns(parameters), output, damping_ratio, report)
-        _tell(done.fidelity, done.three_sigma, done.time_domain, chosen.machine, as_json=json)
+    if (jobs := service_jobs(robot)) is not None:
+        named = NamedTraces(traces, found)
+        done = jobs.validate(chosen, model, named, patterns(parameters), output, damping_ratio, report)
+        _print_result(done.fidelity, done.three_sigma, done.time_domain, chosen.machine, as_json=json)
         return
     names = names_to_validate(chosen, patterns(parameters))
-    with shown_progress("validating") as tell:
+    with shown_progress("validating") as progress:
         fidelity = validate_by_distortion(
-            chosen, found, names, outputs=output, damping_ratio=damping_ratio, curve_points=CURVE_POINTS,
-            options=Options(quantise=False), progress=lambda f, text: tell(0.7 * f, text),
-        )  # fmt: skip
+            chosen,
+            found,
+            names,
+            outputs=output,
+            damping_ratio=damping_ratio,
+            curve_points=CURVE_POINTS,
+            options=Options(quantise=False),
+            progress=lambda f, text: progress(0.7 * f, text),
+        )
         in_time = []
         for number, trace in enumerate(found):
-            tell(0.7 + 0.3 * number / len(found), f"variation with time: {trace.record.trace_id}")
+            progress(0.7 + 0.3 * number / len(found), f"variation with time: {trace.record.trace_id}")
             in_time.append(vary_in_time(chosen, trace, names))
     three = in_convention(fidelity, chosen, "three_sigma")
-    _tell(fidelity, three, in_time, chosen.machine, as_json=json)
+    _print_result(fidelity, three, in_time, chosen.machine, as_json=json)
     if report is not None:
         from model.reports.page import write_report
         from model.reports.validation_report import validation_report
@@ -93,15 +97,15 @@ def validate(
         console().print(f"report: {write_report(page, report)}")
 
 
-def _tell(
+def _print_result(
     fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], machine: Machine, *, as_json: bool
 ) -> None:
     if as_json:
-        print_json({
-            "fidelity": fidelity.model_dump(mode="json"),
-            "three_sigma": {"sum_of_contributions": three.sum_of_contributions},
-            "time_domain": [one.model_dump(mode="json") for one in in_time],
-        })  # fmt: skip
+        three_sigma = {"sum_of_contributions": three.sum_of_contributions}
+        time_domain = [one.model_dump(mode="json") for one in in_time]
+        print_json(
+            {"fidelity": fidelity.model_dump(mode="json"), "three_sigma": three_sigma, "time_domain": time_domain}
+        )
     else:
         _print(fidelity, three, in_time, machine)
 
@@ -142,10 +146,8 @@ def _print_in_time(one: TimeDomain, machine: Machine) -> None:
         table.add_column(name, justify="left" if name in ("parameter", "goes with") else "right")
     for v in one.parameters:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in v.against if c.significant][:2]
-        table.add_row(
-            v.name, f"{v.deviation:.3g}", f"{v.expected:.3g}", f"{100 * v.significant:.0f} %",
-            f"{100 * v.alone_constant:.0f} %", f"{100 * v.alone_varying:.0f} %", ", ".join(strongest),
-        )  # fmt: skip
+        shares = (f"{100 * share:.0f} %" for share in (v.significant, v.alone_constant, v.alone_varying))
+        table.add_row(v.name, f"{v.deviation:.3g}", f"{v.expected:.3g}", *shares, ", ".join(strongest))
     print_table(table, 160)
     for j in one.joints:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in j.against if c.significant][:3]

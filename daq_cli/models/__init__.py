@@ -1,1 +1,1 @@
-"""What the commands about models share: their input, their tables, and the words of a diagnosis."""
+"""What the commands on models share: their input, their tables, and the text of a diagnosis."""

@@ -1,4 +1,4 @@
-"""Models beside measurements as a table on standard output."""
+"""The agreement of models with measurements, as a table on standard output."""
 
 from __future__ import annotations
 
@@ -37,8 +37,5 @@ def agreement_data(models: Sequence[ModelAgreement]) -> list[dict[str, Any]]:
 def _figures(one: JointAgreement) -> tuple[str, ...]:
     factor, unit = shown_unit(one.unit)
     rmse, largest, least = (with_unit(f"{v * factor:.4f}", unit) for v in (one.rmse, one.largest, one.floor))
-    counts, floor = one.counts, one.floor_counts
-    return (
-        str(one.joint), rmse, "–" if counts is None else f"{counts:.2f}", largest, least,
-        "–" if floor is None else f"{floor:.2f}",
-    )  # fmt: skip
+    counts, floor = ("–" if value is None else f"{value:.2f}" for value in (one.counts, one.floor_counts))
+    return str(one.joint), rmse, counts, largest, least, floor

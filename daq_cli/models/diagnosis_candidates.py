@@ -1,27 +1,28 @@
-"""The candidates of a diagnosis for a terminal: what fits have shown, and below it what probes only promise."""
+"""The candidates of a diagnosis for a terminal: those that were fitted, and below them those that were only probed."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from model.discrepancy.candidates.candidate_order import in_order
+from model.discrepancy.diagnosis import in_order
+from model.effects.names import effect_on
 
 if TYPE_CHECKING:
     from model.discrepancy.diagnosis import Candidate, Step
 
 FITTED = 5
-"""Fitted candidates that are listed; what the step names always is."""
+"""Fitted candidates that are listed; those that the step names always are."""
 PROBED = 2
-"""Candidates that were only probed: what they promise is not comparable with what fits have shown."""
+"""Probed candidates that are listed: few, because their estimates are not comparable with those of fits."""
 COLUMN = 10
-"""Width of the evidence."""
+"""Width of the column of evidence."""
 
 
 def candidates_lines(step: Step, earlier: Sequence[Step] = ()) -> list[str]:
     """The list of a step, a line each; empty where nothing was tried (what the controller's own numbers prove).
 
-    earlier: the steps before. What they have fitted and refused is no promise any more.
+    earlier: the steps before; a probe of a candidate that they fitted is not listed again.
     """
     if not step.candidates:
         return []
@@ -36,26 +37,6 @@ def candidates_lines(step: Step, earlier: Sequence[Step] = ()) -> list[str]:
     if more := len(fitted) + len(probed) - len(shown) - len(promising):
         lines.append(f"{'':{COLUMN}}  and {more} more")
     return lines
-
-
-def best_of(candidates: Sequence[Candidate], significant: float | None) -> str:
-    """How near the best candidate has come to the evidence that is needed; empty where that is not known."""
-    if not candidates or significant is None:
-        return ""
-    fitted, probed = in_order(candidates)
-    best = (fitted or probed)[0]
-    count = "the only candidate" if len(candidates) == 1 else f"the best of {len(candidates)} candidates"
-    shown = "" if fitted else " (by its probe; none was worth a fit)"
-    return (
-        f"{count}, {effect_on(best.effect, best.joints)}, comes to {best.evidence:.0f} of the {significant:g} of "
-        f"evidence that are needed{shown}"
-    )
-
-
-def effect_on(effect: str, joints: Sequence[int]) -> str:
-    """An effect in words: backlash on joint 2."""
-    on = f" on joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))}" if joints else ""
-    return f"{effect.replace('_', ' ')}{on}"
 
 
 def _line(candidate: Candidate) -> str:

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from daq_cli.models.diagnosis_candidates import best_of, candidates_lines, effect_on
-from model.discrepancy.explanation.notes import is_warning
-from model.discrepancy.localisation.clear_shape import clear_shape
+from daq_cli.models.diagnosis_candidates import candidates_lines
+from model.discrepancy.explanation.renderer import best_tried, sentence, what_is_left
+from model.effects.names import effect_on
 from model.reports.units import shown_unit
 
 if TYPE_CHECKING:
-    from model.discrepancy.diagnosis import Diagnosis, FoundValue, NextExperiment, RemainingShape, SignalError, Step
+    from model.discrepancy.diagnosis import Diagnosis, FoundValue, NextExperiment, SignalError, Step
 
 WIDTH = 100
 INDENT = 9
@@ -27,8 +27,9 @@ VERDICTS = {
 def answer_text(found: Diagnosis) -> str:
     """The whole answer."""
     lines = _filled(VERDICTS[found.verdict], _headline(found), len(VERDICTS[found.verdict]) + 2)
-    for note in filter(is_warning, found.notes):
-        lines += ["", *_filled("WARNING", note)]
+    warnings = {number for number, note in enumerate(found.notes_data) if note.warning}
+    for number in sorted(warnings):
+        lines += ["", *_filled("WARNING", found.notes[number])]
     for number, step in enumerate(found.steps, start=1):
         lines += ["", *([f"step {number} of {len(found.steps)}"] if len(found.steps) > 1 else [])]
         lines += _step(step, found.steps[: number - 1])
@@ -38,8 +39,8 @@ def answer_text(found: Diagnosis) -> str:
         lines += ["", *left]
     if found.next_experiment is not None:
         lines += ["", *_filled("ask", _asked(found.next_experiment))]
-    for note in found.notes:
-        lines += [] if is_warning(note) else ["", *_filled("note", note)]
+    for number, note in enumerate(found.notes):
+        lines += [] if number in warnings else ["", *_filled("note", note)]
     lines += ["", f"Took {found.seconds:.1f} s, for {found.robot_seconds:.0f} s of motion"]
     return "\n".join(lines)
 
@@ -71,39 +72,19 @@ def _step(step: Step, earlier: Sequence[Step]) -> list[str]:
 
 def _without_steps(found: Diagnosis) -> list[str]:
     """The proof of an answer in which nothing was added: what is left, what was tried against it, the errors."""
-    places = [] if found.where is None else [found.where.summary]
-    if found.verdict == "unknown-effect":
-        named = found.where is not None and found.where.joint is not None
-        places = [place for place in places if named and place not in found.summary] + [found.summary]
-    lines = [line for k, place in enumerate(places) for line in _filled("" if k else "where", place)]
-    if best := best_of(found.candidates, found.significant):
-        lines += _filled("what", best)
+    unknown = found.verdict == "unknown-effect"
+    place = found.summary if unknown else "" if found.where is None else found.where.summary
+    lines = _filled("where", place) if place else []
+    if found.candidates and found.significant is not None:
+        lines += _filled("what", best_tried(found.candidates, found.significant))
     return lines + _errors(found.rmse_fit, found.rmse_holdout, "model as given → with its tolerances fitted (noise)")
 
 
 def _left(found: Diagnosis) -> list[str]:
-    """What none of the known effects explains, unless it was said already."""
-    told = found.verdict == "unknown-effect"
-    lines = _filled("left", found.summary) if told and found.steps else []
-    if found.remaining:
-        clear = clear_shape(found.remaining)
-        shape = _shape(clear or found.remaining[0], clear=clear is not None)
-        if not (told and _share(clear or found.remaining[0]) in found.summary):
-            lines += _filled("" if lines else "left", shape)
-    return lines
-
-
-def _shape(shape: RemainingShape, *, clear: bool) -> str:
-    torques = [t for t in shape.torque if t is not None]
-    told = (
-        f"a torque at joint {shape.joint} of {min(torques):.3g} to {max(torques):.3g} {shape.torque_unit} against "
-        f"{shape.against} would explain {_share(shape)}"
-    )
-    return told if clear else f"no clear shape: the best, {told}"
-
-
-def _share(shape: RemainingShape) -> str:
-    return f"{100 * shape.explained:.0f} % of what is left"
+    """What none of the known effects explains; the summary of an unknown effect says it already."""
+    if found.verdict == "unknown-effect":
+        return _filled("left", found.summary) if found.steps else []
+    return _filled("left", sentence(what_is_left(found.remaining))) if found.remaining else []
 
 
 def _shown(step: Step) -> list[str]:
@@ -130,11 +111,11 @@ def _errors(fitted: Sequence[SignalError], held: Sequence[SignalError], columns:
 
 
 def _removed(share: float) -> str:
-    """Noise scatters: an error a little below its floor is no more than all of it."""
+    """What was removed of the held-out variance beyond noise: all of it, where the error is below its floor."""
     if share < 0:
         return f"the held-out variance beyond noise has grown by {-100 * share:.1f} %"
-    told = "all" if share >= 1.0 else f"{100 * share:.1f} %"
-    return f"{told} of the held-out variance beyond noise is gone"
+    gone = "all" if share >= 1.0 else f"{100 * share:.1f} %"
+    return f"{gone} of the held-out variance beyond noise is gone"
 
 
 def _error(e: SignalError) -> str:
@@ -143,11 +124,11 @@ def _error(e: SignalError) -> str:
 
 
 def _asked(experiment: NextExperiment) -> str:
-    told = f"{experiment.name}, {experiment.duration:.1f} s on the arm: {experiment.reason}"
+    asked = f"{experiment.name}, {experiment.duration:.1f} s on the arm: {experiment.reason}"
+    if not experiment.separates or experiment.differs_at is not None:  # the reason gives the separation already
+        return asked
     apart = f"{experiment.predicted_separation:.1f} standard deviations"
-    if not experiment.separates or apart in experiment.reason:
-        return told
-    return f"{told}; it would tell {' and '.join(experiment.separates)} apart by {apart}"
+    return f"{asked} It would tell {' and '.join(experiment.separates)} apart by {apart}."
 
 
 def _value(value: FoundValue) -> str:

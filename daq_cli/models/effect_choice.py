@@ -16,10 +16,10 @@ NO_EFFECT = "none"
 
 
 def with_effects(model: Model, text: str) -> Model:
-    """The model with the effects of `viscous,coulomb:2-3` besides its own; `none` adds none.
+    """Adds effects written as `viscous,coulomb:2-3` to a model; `none` adds none.
 
-    A name may be cut short as long as it names one effect. Without joints an effect acts on every joint, or on the
-    machine where it belongs to that. Raises SpecError with one line.
+    A name may be abbreviated as long as it is unique. Without joints an effect acts on every joint it can act on, or on
+    the whole machine. Raises SpecError with one line.
     """
     from model.effects.library import effect
 
@@ -46,7 +46,7 @@ def _joints_of(name: str, model: Model) -> tuple[int, ...]:
 
 
 def effect_name(text: str) -> str:
-    """The one effect that `text` begins. Raises SpecError with those it could be."""
+    """The one effect whose name begins with `text`. Raises SpecError, which lists the effects that it could be."""
     from model.effects.library import library
 
     name = text.strip().replace("-", "_")
@@ -61,7 +61,8 @@ def effect_name(text: str) -> str:
 
 
 def effect_names(text: str) -> tuple[str, ...]:
-    """The effects of `backlash,coulomb`, where joints are an option of their own. Raises SpecError with one line."""
+    """The effects of a list such as `backlash,coulomb`, for commands with an option of their own for joints. Raises
+    SpecError."""
     found = []
     for part in text.split(","):
         name, colon, joints = part.strip().partition(":")

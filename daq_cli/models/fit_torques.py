@@ -18,20 +18,26 @@ if TYPE_CHECKING:
     from model.machine_model.model import Model
 
 MOST_DRAWN = 6
-"""Traces in the report's pictures."""
+"""Most traces that the report shows as pictures."""
 
 
 def fit_recorded_torques(
-    begin: Model, traces: Sequence[Trace], held_out: Sequence[Trace], options: FitOptions, out: Path, *,
-    as_json: bool, report: Path | None,
-) -> None:  # fmt: skip
-    """Fit, save the model, and print what came of it. Raises SpecError and TraceError as the fit does."""
-    from daq_cli.models.model_progress import shown_progress
+    begin: Model,
+    traces: Sequence[Trace],
+    held_out: Sequence[Trace],
+    options: FitOptions,
+    out: Path,
+    *,
+    as_json: bool,
+    report: Path | None,
+) -> None:
+    """Fits, saves the model, and prints the result. Raises SpecError and TraceError as the fit does."""
+    from daq_cli.app.progress import shown_progress
     from model.inverse_dynamics.fit import fit_torques
     from model.machine_model.model_file import save_model
 
-    with shown_progress("fitting torques") as tell:
-        found = fit_torques(begin, traces, held_out, options, progress=tell)
+    with shown_progress("fitting torques") as progress:
+        found = fit_torques(begin, traces, held_out, options, progress=progress)
     with replacing(out) as part:
         save_model(found.model, part)
     if as_json:

@@ -1,4 +1,4 @@
-"""Models, machines and traces as the command line names them."""
+"""Reads the models, machines and traces that the command line names."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ import typer
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, load_machine, shipped_machines
 from daq_cli.app import completion
-from daq_cli.app.context import Invocation, console
+from daq_cli.app.context import console
 from daq_cli.app.output_file import check_folder
 
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
+    from daq_cli.robot.access import RobotAccess
     from model.machine_model.model import Model
 
 TracesArgument = Annotated[
@@ -28,7 +29,7 @@ TraceFolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (
 
 
 def _page(path: Path | None) -> Path | None:
-    """Refuses another kind of file, and one that cannot be made, before anything is computed."""
+    """Refuses a file of another kind, or one that cannot be written, before anything is computed."""
     if path is not None:
         if path.suffix != ".html":
             raise SpecError(f"report {path}: is written as .html")
@@ -37,12 +38,12 @@ def _page(path: Path | None) -> Path | None:
 
 
 ReportOption = Annotated[
-    Path | None, typer.Option("--report", callback=_page, help="Write a self-contained page, an .html file.")
+    Path | None, typer.Option("--report", callback=_page, help="Write a report as one self-contained .html file.")
 ]
 
 
 def _model_file(path: Path | None) -> Path | None:
-    """Refuses another kind of file, and one that cannot be made, before anything is computed."""
+    """Refuses a file of another kind, or one that cannot be written, before anything is computed."""
     if path is not None:
         if path.suffix != ".json":
             raise SpecError(f"--out {path}: a model is written as .json")
@@ -50,11 +51,13 @@ def _model_file(path: Path | None) -> Path | None:
     return path
 
 
-OutOption = typer.Option("--out", "-o", callback=_model_file, help="Where the model that is made goes, a .json file.")
+OutOption = typer.Option("--out", "-o", callback=_model_file, help="File for the resulting model (.json).")
 HoldoutOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--holdout", help="A trace to judge by, not fitted to. May be repeated.", autocompletion=completion.traces
+        "--holdout",
+        help="A held-out trace, used to judge and not to fit. May be repeated.",
+        autocompletion=completion.traces,
     ),
 ]
 
@@ -79,9 +82,17 @@ def read_model(name: str) -> Model:
     return base_model(load_machine(name))
 
 
-def load_effects(files: Sequence[Path] | None) -> None:
-    """Effects of the user's own, from files that the command line names. Raises SpecError with one line."""
+def load_effects(files: Sequence[Path] | None, robot: RobotAccess | None = None) -> None:
+    """Loads effects of the user's own, from files that the command line names. Raises SpecError with one line.
+
+    Args:
+        robot: where the effects are to be used, if that may be at a service, which runs no programs that it is sent.
+    """
     if files:
+        if robot is not None:
+            robot.require_local(
+                "--effect-file: a service runs no programs that it is sent; fetch the traces and compute here"
+            )
         from model.effects.effect_files import load_effect_file
 
         for file in files:
@@ -94,16 +105,17 @@ def model_label(name: str) -> str:
 
 
 def model_labels(names: Sequence[str]) -> list[str]:
-    """Labels that differ: whole names where file names are alike."""
+    """Distinct labels of models: their whole names where the file names are equal."""
     labels = [model_label(name) for name in names]
     return labels if len(set(labels)) == len(labels) else list(names)
 
 
-def read_traces(call: Invocation, folder: Path | None, names: Sequence[str]) -> list[Trace]:
+def read_traces(robot: RobotAccess, folder: Path | None, names: Sequence[str]) -> list[Trace]:
     """Traces by file, number, name or `last`; CSV files are read as they are. Raises TraceError, SpecError."""
     from daq.traces.csv_table import import_csv
     from daq.traces.reader import read_trace
 
+    call = robot.call
     place = folder or call.trace_folder
     if not names:
         raise SpecError("no traces named: at least one is needed")
@@ -112,13 +124,13 @@ def read_traces(call: Invocation, folder: Path | None, names: Sequence[str]) -> 
         if Path(name).suffix == ".csv" and Path(name).is_file():
             trace = import_csv(Path(name), call.trace_limits)
         else:
-            trace = read_trace(call.find_trace(place, name), call.trace_limits)
+            trace = read_trace(robot.find_trace(place, name), call.trace_limits)
         found.append(trace)
     return found
 
 
-def machine_of(traces: Sequence[Trace], call: Invocation, names: Sequence[str] = ()) -> Machine:
-    """The machine that the traces were made on; the configured one where they do not say, which is then said aloud.
+def machine_of(traces: Sequence[Trace], robot: RobotAccess, names: Sequence[str] = ()) -> Machine:
+    """The machine that recorded the traces; where they do not say, the configured one, which is then announced.
 
     Limits may differ: the last trace's are taken.
 
@@ -137,10 +149,9 @@ def machine_of(traces: Sequence[Trace], call: Invocation, names: Sequence[str] =
                 f"the traces were made on different machines that are both called {machine.name}: {place} differs; "
                 "one at a time, or name the machine or model to use"
             )
-    taken = machines[-1] if machines else call.machine
-    unnamed = [
-        (name, t) for name, t in zip(_names(traces, names), traces, strict=True) if t.record.machine is None
-    ]  # fmt: skip
+    taken = machines[-1] if machines else robot.machine
+    named = zip(_names(traces, names), traces, strict=True)
+    unnamed = [(name, trace) for name, trace in named if trace.record.machine is None]
     for name, trace in unnamed:
         if lacking := [joint for joint in taken.modelled_joints if joint not in trace.joints]:
             raise SpecError(
@@ -181,13 +192,13 @@ def _listed(joints: Sequence[int]) -> str:
 
 
 def _described(machine: Machine) -> dict[str, Any]:
-    """What a machine file says of the machine: not what people call it, nor where it may go."""
+    """The physical description of a machine, without its title, notes, limits and rest posture."""
     return machine.model_dump(exclude={"title", "notes", "limits", "rest_posture"})
 
 
 def _difference(one: Any, other: Any, place: str = "") -> str:
-    """Where two descriptions first differ, such as `joints.2.link.mass.value`; empty where they agree. The sources of
-    numbers are words, and may differ."""
+    """The place where two descriptions first differ, such as `joints.2.link.mass.value`; empty where they agree.
+    Sources of numbers are only words, and may differ."""
     if isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other):
         one, other = dict(enumerate(one, start=1)), dict(enumerate(other, start=1))
     if isinstance(one, dict) and isinstance(other, dict):

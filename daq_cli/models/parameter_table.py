@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 
 def print_parameters(parameters: Sequence[FittedParameter]) -> None:
-    """One line a parameter; no number where the data give none."""
+    """Prints one line for each parameter; without a number where the data do not determine one."""
     from rich.table import Table
 
     table = Table(box=None, header_style="bold")
-    for name, side in (("parameter", "left"), ("value", "right"), ("95 % interval", "right"), ("unit", "left"),
-                       ("before", "right"), ("", "left")):  # fmt: skip
-        table.add_column(name, justify="right" if side == "right" else "left", overflow="fold")
+    for name in ("parameter", "value", "95 % interval", "unit", "before", ""):
+        number = name in ("value", "95 % interval", "before")
+        table.add_column(name, justify="right" if number else "left", overflow="fold")
     for p in parameters:
         table.add_row(*_row(p))
     print_table(table, 140)
@@ -43,7 +43,7 @@ def _row(p: FittedParameter) -> tuple[str, ...]:
 
 
 def significant(value: float, deviation: float) -> int:
-    """Digits of a value so that its deviation shows with two; at most seven."""
+    """Number of digits of a value that shows its deviation with two digits, at most seven."""
     if value == 0 or deviation <= 0:
         return 3
     return max(2, min(7, 2 + math.floor(math.log10(abs(value))) - math.floor(math.log10(deviation))))

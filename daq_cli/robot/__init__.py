@@ -1,1 +1,1 @@
-"""A robot at this computer's port, or at a service."""
+"""The robot as every command reaches it (`RobotAccess`): at this computer's port, or through a service."""

@@ -1,21 +1,28 @@
-"""What the keys of `daq teach jog` mean, and the line that shows which joint they drive and how fast."""
+"""What teaching shares on both sides: its operations, the keys of `daq teach jog`, and what the terminal shows."""
 
 from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from daq.teaching.jog import JOG_SPEED, JogCommand, top_speed
+from daq_cli.app.context import console
 from daq_cli.app.keyboard import LEFT, RIGHT
+
+if TYPE_CHECKING:
+    from daq.teaching import RecordedPath
+    from daq.teaching.program import Program
 
 HELP = "1-6 joint   ← → drive while held   + - speed   o c gripper   p keep this posture   q end   Ctrl-C stop"
 FASTER, SLOWER = 1.25, 0.8
 
 
 def require_jog_speed(speed: float) -> float:
-    """`speed` (rad/s) when keys may begin with it. Raises SpecError, in degrees/s."""
+    """Checks the speed (rad/s) that jogging begins with. Raises SpecError, in degrees/s."""
     if not 0 < speed <= JOG_SPEED:
         raise SpecError(
             f"jog speed of {math.degrees(speed):.4g}°/s: allowed are above 0 and up to {math.degrees(JOG_SPEED):.0f}°/s"
@@ -24,7 +31,8 @@ def require_jog_speed(speed: float) -> float:
 
 
 class Pendant:
-    """Which joint, which way, how fast (rad/s). A joint is never driven faster than its own limit."""
+    """The joint, direction and speed (rad/s) that the keys have chosen. No joint is driven faster than its own
+    limit."""
 
     def __init__(self, machine: Machine, speed: float) -> None:
         self.joint = 1
@@ -37,7 +45,7 @@ class Pendant:
 
     @property
     def speed(self) -> float:
-        """Of the chosen joint, in rad/s."""
+        """Speed of the chosen joint in rad/s."""
         return min(self.wish, top_speed(self._machine.limits, self.joint))
 
     def command(self, typed: str, now: float) -> JogCommand | None:
@@ -67,7 +75,7 @@ class StatusLine:
         self._shown = ""
 
     def show(self, pendant: Pendant) -> None:
-        """The joint that the keys drive, and how fast."""
+        """Shows the joint that the keys drive, and its speed."""
         line = f"joint {pendant.joint}   {math.degrees(pendant.speed):.1f}°/s"
         if line != self._shown:
             sys.stderr.write(f"\r{line:<{len(self._shown)}}")
@@ -75,12 +83,30 @@ class StatusLine:
             self._shown = line
 
     def tell(self, line: str) -> None:
-        """A line of its own; the status comes again below it."""
+        """Prints a line of its own; the status follows below it."""
         self.close()
         print(line, file=sys.stderr)
 
     def close(self) -> None:
-        """Leaves the line."""
+        """Ends the line."""
         if self._shown:
             print(file=sys.stderr)
             self._shown = ""
+
+
+def announce_lead(seconds: float | None) -> None:
+    """Says that the arm may be led now, and until when."""
+    console().print("recording: lead the arm" + ("; Enter ends it" if seconds is None else f" for {seconds:g} s"))
+
+
+class Teaching(Protocol):
+    """An arm that a person teaches. Ctrl-C stops it. Angles are in rad."""
+
+    def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
+        """Drives joints with the keys; `keep` is given the set points of a posture to be kept."""
+
+    def perform(self, program: Program) -> str:
+        """Carries out a taught program, and returns one line on how it ended."""
+
+    def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
+        """Records a path while the arm is led by hand; `keep` is given the path of a stopped lead, too."""

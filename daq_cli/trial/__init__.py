@@ -1,1 +1,1 @@
-"""The blind trial of `daq blind`: each stage a process of its own, and what passes between them."""
+"""The blind trial of `daq blind`: its stages, each in a process of its own, and the data between them."""

@@ -1,4 +1,5 @@
-"""The trial, case by case: seen, recorded, diagnosed, sealed, revealed, scored. Each stage is done once and kept."""
+"""The trial, case by case: detectability, recording, diagnosis, scoring. Each stage is carried out once, and its
+result kept."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from typing import Any
 
 from daq.contracts.machine import Machine
 from daq.traces.reader import read_trace
-from daq_cli.models.diagnose_asking import as_run, next_to_run, time_left
+from daq_cli.models.stopping_rule import as_run, next_to_run, time_left
 from daq_cli.trial.experiments import machine_with_load, trial_experiment, write_set_points
 from daq_cli.trial.folder import STAGES, Stage, TrialFolder
 from daq_cli.trial.mock_side import TrialStageError, detect, reveal
@@ -26,13 +27,13 @@ from model.trial.table import TrialTable, trial_table
 from model.trial.truth import Detectability, parse_truth
 
 ROBOT_TIME = 60.0
-"""s that a trial with further experiments may spend on them."""
-Tell = Callable[[int, str], None]
+"""Robot time in s that a trial may spend on further experiments."""
+Progress = Callable[[int, str], None]
 
 
 @dataclass
 class Campaign:
-    """A trial of `seeds`. `machine` is the one whose model the diagnosis begins from, before loads are announced."""
+    """One trial. `machine` describes the arm from which every diagnosis begins, before a load is announced."""
 
     folder: TrialFolder
     machine: Machine
@@ -42,8 +43,8 @@ class Campaign:
     _counting: Lock = field(default_factory=Lock)
     _failed: int = 0
 
-    def run(self, seeds: Sequence[int], processes: int, tell: Tell) -> int:
-        """Does what is left to do of all cases, several at once; `tell` hears of every case that is done.
+    def run(self, seeds: Sequence[int], processes: int, progress: Progress) -> int:
+        """Carries out the stages that are left of all cases, several at once; `progress` is called after every case.
 
         Returns how many are not done, because a process of theirs failed; they are tried again next time.
         """
@@ -56,24 +57,24 @@ class Campaign:
                 for number, said in enumerate(
                     pool.map(lambda seed: self._case(seed, set_points), self.folder.in_order(seeds)), start=1
                 ):
-                    tell(number, said)
+                    progress(number, said)
             except BaseException:
                 pool.shutdown(cancel_futures=True)
                 raise
         return self._failed
 
     def scores(self) -> list[Score]:
-        """Of all cases in the folder that are scored, those of other shards too."""
+        """The scores of all cases in the folder, those of other shards included."""
         self.folder.reload()
         return [Score.model_validate(row) for row in self.folder.rows("score")]
 
     def table(self) -> TrialTable:
-        """The table over them."""
+        """The table of all scores."""
         scores = self.scores()
         return trial_table(scores, sum(row["outcome"] != "complete" for row in self.folder.rows("record")))
 
     def _case(self, seed: int, set_points: Path) -> str:
-        """One case through the stages that are left; what to tell about it."""
+        """Carries out the stages of one case that are left; returns one line about it."""
         try:
             for stage in STAGES[: STAGES.index(self.until) + 1]:
                 if self.folder.row(stage, seed) is None and not self._stage(stage, seed, set_points):
@@ -85,7 +86,7 @@ class Campaign:
         return f"{self.folder.name_of(seed)}: done"
 
     def _stage(self, stage: Stage, seed: int, set_points: Path) -> bool:
-        """Does one stage; False where the case ends there."""
+        """Carries out one stage; False where the case ends there."""
         if stage == "detect":
             # The first of a load works out its tangents, which takes a minute; the others read them.
             with self._tangents[seed % 10]:
@@ -130,8 +131,8 @@ class Campaign:
         return record(seed, name, trial_experiment(name), self._machine(seed), self.folder.path / "traces")
 
     def _diagnose(self, seed: int) -> dict[str, Any]:
-        """The sealed answer, the last one where more was asked for: its file and hash are written before anybody looks
-        at the truth."""
+        """The sealed answer, the last one where further experiments were run. Its file and hash are written before
+        the truth is revealed."""
         recorded, case = self._row("record", seed), self.folder.name_of(seed)
         traces = [self.folder.path / "traces" / recorded["trace"]]
         row: dict[str, Any] = {"seed": seed, "case": case}
@@ -148,7 +149,9 @@ class Campaign:
         file = self.folder.path / "answers" / f"{case}.json"
         file.write_bytes(answers[-1].text)
         return {
-            **row, "answer": file.name, "sha256": answers[-1].digest,
+            **row,
+            "answer": file.name,
+            "sha256": answers[-1].digest,
             "seconds": sum(given.seconds for given in answers),
             "robot_seconds": recorded["robot_seconds"] + budget - time_left(runs, budget),
             "traces": [trace.name for trace in traces],
@@ -156,7 +159,7 @@ class Campaign:
                 {"experiment": r.experiment, "trace": Path(r.file).name, "outcome": r.outcome, "duration": r.duration}
                 for r in runs
             ],
-        }  # fmt: skip
+        }
 
     def _answer(self, seed: int, traces: list[Path], held_out: str, runs: Sequence[Acquired]) -> SealedAnswer:
         left = time_left(runs, ROBOT_TIME) if self.folder.asked.acquire else None
@@ -164,7 +167,7 @@ class Campaign:
         return diagnose_sealed(traces, self.folder.path / "traces" / held_out, model, self.diagnoser, left)
 
     def _further(self, seed: int, asked: NextExperiment, number: int) -> Acquired:
-        """The experiment that an answer asks for, run on the same arm."""
+        """Runs the experiment that an answer asks for on the same arm."""
         made = record(seed, f"further {number}", asked.spec, self._machine(seed), self.folder.path / "traces")
         return as_run(asked, read_trace(made.file), made.file, made.outcome)
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def main() -> int:
-    """Writes the answer; the exit code."""
+    """Writes the answer, and returns the exit code."""
     from daq.traces.reader import read_trace
     from model.discrepancy.workflow import diagnose
     from model.machine_model.model_file import load_model
@@ -39,7 +39,7 @@ def main() -> int:
 
 
 def _asker(file: Path, machine: Machine) -> Asker | None:
-    """What may be asked for; None where nothing may be."""
+    """The experiments that may be asked for; None where none may."""
     from server.jobs.asking import asker
 
     return asker(machine, float(json.loads(file.read_text("utf-8"))["budget"])) if file.exists() else None

@@ -1,4 +1,4 @@
-"""What the arms of a trial are asked to do."""
+"""The experiments of a trial."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def write_set_points(spec: ExperimentSpec, machine: Machine, path: Path) -> Path
 
 
 def machine_with_load(machine: Machine, kilograms: float | None) -> Machine:
-    """The machine with the load that was announced; None: its own."""
+    """The machine with the announced load; with its own for None."""
     if kilograms is None or machine.load is None:
         return machine
     return carrying(machine, kilograms, "announced")

@@ -1,4 +1,4 @@
-"""A trial's folder: what it was asked, one JSON line a case and stage, traces and answers under random names."""
+"""The folder of a trial: its options, a JSON line for each case and stage, traces and answers under random names."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _CAMPAIGN = "trial.json"
 
 
 class Asked(BaseModel):
-    """What a folder's trial is; a resumed one must be the same. `key` makes the names of its cases."""
+    """The options of a trial, which must be the same when it is resumed. `key` makes the names of its cases."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -31,13 +31,13 @@ class Asked(BaseModel):
     experiment: Literal["diagnostic", "ramp"]
     acquire: bool
     registration: dict[str, str] | None
-    """Its file's name, SHA-256, the run, and the commit that the seeds are drawn from."""
+    """File name and SHA-256 of the registration, its run, and the commit that the seeds are drawn from."""
     key: str
 
 
 @dataclass
 class TrialFolder:
-    """The folder of one trial, perhaps shared by several shards, each of which writes lines of its own."""
+    """The folder of one trial. Several shards may share it; each writes files of lines of its own."""
 
     path: Path
     asked: Asked
@@ -47,9 +47,13 @@ class TrialFolder:
 
     @classmethod
     def open(
-        cls, path: Path, experiment: Literal["diagnostic", "ramp"], acquire: bool, registration: dict[str, str] | None,
+        cls,
+        path: Path,
+        experiment: Literal["diagnostic", "ramp"],
+        acquire: bool,
+        registration: dict[str, str] | None,
         shard: str,
-    ) -> TrialFolder:  # fmt: skip
+    ) -> TrialFolder:
         """The folder, made when it is new. Raises SpecError when it holds another trial."""
         try:
             for part in ("traces", "answers"):
@@ -76,7 +80,7 @@ class TrialFolder:
         return folder
 
     def _finish_lines(self) -> None:
-        """Ends lines of this shard that a crash cut short, so that the next is not added to them."""
+        """Ends lines of this shard that a crash cut short, so that the next line is not appended to them."""
         for stage in STAGES:
             file = self._file(stage)
             if file.exists() and not file.read_bytes().endswith(b"\n"):
@@ -101,11 +105,11 @@ class TrialFolder:
                     self._rows[stage][row["seed"]] = row
 
     def row(self, stage: Stage, seed: int) -> dict[str, Any] | None:
-        """What a stage has given for a case."""
+        """The result of a stage for a case."""
         return self._rows[stage].get(seed)
 
     def rows(self, stage: Stage) -> list[dict[str, Any]]:
-        """What a stage has given for all cases."""
+        """The results of a stage for all cases."""
         return list(self._rows[stage].values())
 
     def add(self, stage: Stage, row: dict[str, Any]) -> None:
@@ -118,7 +122,7 @@ class TrialFolder:
             self._rows[stage][row["seed"]] = row
 
     def name_of(self, seed: int) -> str:
-        """A case's name: twelve digits that tell nobody without the folder's key anything."""
+        """The name of a case: twelve digits, which reveal nothing without the folder's key."""
         return hmac.new(bytes.fromhex(self.asked.key), str(seed).encode(), "sha256").hexdigest()[:12]
 
     def in_order(self, seeds: Sequence[int]) -> list[int]:

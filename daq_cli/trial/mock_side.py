@@ -1,4 +1,4 @@
-"""The mock's side of a trial, each a process: how well an arm's effects can be seen, and what they were."""
+"""The mock's side of a trial, in processes of its own: how detectable an arm's effects are, and what they are."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from daq.contracts.errors import DaqError
 
 
 class TrialStageError(DaqError):
-    """A stage of a trial that did not do its work; one line."""
+    """A stage of a trial has failed; the text is one line."""
 
 
 def detect(seed: int, set_points: Path, cache: Path) -> dict[str, Any]:
-    """d′ of the arm's effects, one by one and together. Raises TrialStageError."""
+    """Detectability d′ of the arm's effects, one by one and together. Raises TrialStageError."""
     return _line("mock_controller.detectability", str(seed), "--experiment", str(set_points), "--cache", str(cache))
 
 
 def reveal(seed: int) -> dict[str, Any]:
-    """What the arm hid. Raises TrialStageError."""
+    """The effects that the arm hides. Raises TrialStageError."""
     return _line("mock_controller.reveal", str(seed))
 
 

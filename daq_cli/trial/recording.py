@@ -1,4 +1,4 @@
-"""An experiment on an arm that keeps a secret, recorded in lock-step as `daq run` records any."""
+"""Records an experiment on an arm with hidden effects in lock-step, as `daq run` does."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Recorded:
     outcome: str
     reason: str
     duration: float
-    """s of robot time."""
+    """Robot time in s."""
 
 
 def record(seed: int, run: str, spec: ExperimentSpec, machine: Machine, folder: Path) -> Recorded:

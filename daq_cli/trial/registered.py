@@ -1,4 +1,4 @@
-"""What a registration file is held against: the source tree as it is, and the commit that registered it."""
+"""Compares a registration file with the source tree as it is, and finds the commit that registered it."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from model.trial.registration import Registration, parse_registration
 REGISTERED = (
     "model/discrepancy/thresholds.py",
     "model/discrepancy",
+    "model/arrays.py",
+    "model/layout.py",
     "model/effects",
     "model/simulation",
     "model/fitting",
@@ -27,7 +29,6 @@ REGISTERED = (
     "model/design",
     "model/validation",
     "model/analysis",
-    "model/identifiability",
     "model/trial",
     "mock_controller",
     "firmware_protocol",
@@ -42,12 +43,13 @@ REGISTERED = (
     "daq/safety",
     "daq_cli/trial",
     "daq_cli/commands/blind.py",
-    "daq_cli/models/diagnose_asking.py",
+    "daq_cli/models/stopping_rule.py",
     "server/jobs/asking.py",
 )
-"""Parts of the source tree that decide the outcome. A test follows the imports of every stage and misses none."""
+"""Parts of the source tree that decide the outcome. A test follows the imports of every stage and finds them all
+here."""
 LIBRARIES = ("numpy", "scipy", "numba", "mujoco")
-"""Libraries whose numbers the outcome is made of."""
+"""Libraries whose numerical results decide the outcome."""
 _SUFFIXES = (".py", ".toml", ".json", ".csv")
 
 
@@ -68,7 +70,7 @@ def library_versions() -> dict[str, str]:
 
 
 def to_register() -> str:
-    """What a registration has to hold of the code at hand, as the last tables of its file."""
+    """The hashes and versions of the present code, as the last tables of a registration file."""
     hashes = [f'"{path}" = "{digest}"' for path, digest in tree_hashes().items()]
     versions = [f'{name} = "{found}"' for name, found in library_versions().items()]
     return "\n".join(["[hashes]", *hashes, "", "[versions]", *versions])

@@ -1,4 +1,4 @@
-"""Diagnosis as a process that is given trace files, a model, what it may ask for, and nothing else."""
+"""A diagnosis in a process that is given trace files, a model, the robot time it may ask for, and nothing else."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from model.machine_model.model_file import save_model
 
 MODEL, ANSWER, HELD_OUT = "model.json", "answer.json", "held-out.mcap"
 ASKING = "asking.json"
-"""There where more may be asked for: `budget`, the s of robot time that are left for it."""
+"""File that is there where experiments may be asked for: `budget` is the robot time in s that is left for them."""
 TIME_LIMIT = 1800.0
-"""s after which a diagnosis counts as failed: generous, for a machine that has much else to do."""
+"""Time limit of a diagnosis in s: generous, because the computer may be busy with others."""
 _KEPT_VARIABLES = ("PATH", "HOME", "LANG", "LC_ALL", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE", "VIRTUAL_ENV")
 _KEPT_BEGINNINGS = ("NUMBA_", "OMP_", "OPENBLAS_", "MKL_")
 DIAGNOSER = (sys.executable, "-m", "daq_cli.trial.diagnoser")
@@ -37,7 +37,7 @@ class DiagnosisFailedError(TrialStageError):
 
 @dataclass(frozen=True)
 class SealedAnswer:
-    """An answer as bytes, with their SHA-256, and the seconds that the process took."""
+    """An answer as bytes, with their SHA-256, and the time that the process took in s."""
 
     text: bytes
     seconds: float
@@ -48,7 +48,7 @@ class SealedAnswer:
         return sha256(self.text).hexdigest()
 
     def read(self) -> Diagnosis:
-        """The answer. Raises DiagnosisFailedError for what is none."""
+        """The answer, parsed. Raises DiagnosisFailedError when it is not valid."""
         try:
             return Diagnosis.model_validate_json(self.text)
         except ValidationError as error:
@@ -58,10 +58,13 @@ class SealedAnswer:
 
 
 def diagnose_sealed(
-    traces: Sequence[Path], holdout: Path | None, model: Model, diagnoser: Sequence[str] = DIAGNOSER,
+    traces: Sequence[Path],
+    holdout: Path | None,
+    model: Model,
+    diagnoser: Sequence[str] = DIAGNOSER,
     budget: float | None = None,
-) -> SealedAnswer:  # fmt: skip
-    """Starts `diagnoser` in a new folder with copies of the traces and the model; its answer.
+) -> SealedAnswer:
+    """Runs `diagnoser` in a new folder with copies of the traces and the model, and returns its answer.
 
     Arguments are those of `diagnoser` alone; the environment is what any program needs to run. `budget`: s of robot
     time for what it may ask for; None: it may not ask. Raises DiagnosisFailedError.
@@ -78,9 +81,16 @@ def diagnose_sealed(
         begun = time.monotonic()
         try:
             done = subprocess.run(
-                diagnoser, cwd=place, env=_environment(), stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                check=False, timeout=TIME_LIMIT, start_new_session=True,
-            )  # fmt: skip
+                diagnoser,
+                cwd=place,
+                env=_environment(),
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                check=False,
+                timeout=TIME_LIMIT,
+                start_new_session=True,
+            )
         except subprocess.TimeoutExpired:
             raise DiagnosisFailedError(f"no answer within {TIME_LIMIT:g} s") from None
         seconds = time.monotonic() - begun

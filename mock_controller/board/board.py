@@ -16,12 +16,13 @@ from functools import partial
 
 from firmware_protocol.memory_map import JOINTS, MemoryMap
 from firmware_protocol.units import DAC_MAX, GAIN_MAX, POSTURE_UNITS, counts_to_posture, posture_to_counts
+from mock_controller.board.extension_points import ChangesBoard, ChangesSetPoint
 from mock_controller.board.memory import SharedMemory
 from mock_controller.board.parameters import BoardParameters
 from mock_controller.board.pid import IntegerPid
 from mock_controller.board.sensor import PositionSensors
 from mock_controller.board.snapshot import PeriodSnapshot, SnapshotRing
-from mock_controller.modifications.interface import ChangesBoard, ChangesSetPoint, Modification, of_kind
+from mock_controller.modification import Modification, of_kind
 from mock_controller.plant import Plant
 
 
@@ -104,11 +105,11 @@ class Board:
 
     @property
     def next_snapshot_us(self) -> int:
-        """Before this time no further snapshot joins the ring."""
+        """Earliest time (µs) at which a further snapshot can join the ring."""
         return max(self._next_us, self._complete_us)
 
     def run_until(self, time_us: int) -> None:
-        """Lets time pass up to `time_us`, events at that very time included. A time already past changes nothing."""
+        """Lets time pass up to and including `time_us`. A time already past changes nothing."""
         while self._next_us <= time_us:
             self._time_us = self._next_us
             self._next_action()
@@ -154,13 +155,13 @@ class Board:
         return self._frozen
 
     def hold(self) -> None:
-        """From now on set points are kept out; a `freeze` with a posture is to follow."""
+        """Blocks new set points from now on; a `freeze` with a posture follows."""
         self._frozen, self._postureless = True, True
 
     def freeze(self, positions: Sequence[int] | None = None) -> tuple[int, ...]:
-        """Set points := measured posture, now, and no others until `release`; the six postures (posture units).
+        """Set points := measured posture at once, held until `release`; returns the six postures (posture units).
 
-        positions: what the host's side has read of the measured positions (ADC counts); None for the board's own
+        positions: measured positions (ADC counts) as the host's side has read them; None for the board's own
         A second freeze changes nothing. The latch outlives a brown-out.
         """
         if self._frozen and self._powered and not self._postureless:

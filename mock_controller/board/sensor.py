@@ -12,11 +12,12 @@ from random import Random
 
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.units import ADC_COUNTS, JointCalibration
+from mock_controller.board.extension_points import ChangesReading, ChangesSensor, KnowsBoard
 from mock_controller.board.parameters import BoardParameters
-from mock_controller.modifications.interface import ChangesReading, ChangesSensor, KnowsBoard, Modification, of_kind
+from mock_controller.modification import Modification, of_kind
 
 _CELLS = 256
-"""Cells of a linearity curve's table, interpolated linearly: good to a hundredth of a count."""
+"""Cells of a linearity curve's table; linear interpolation between them is exact to a hundredth of a count."""
 
 
 class LinearityCurve:
@@ -72,7 +73,7 @@ class PositionSensors:
 
     def read(self, angles: Sequence[float]) -> tuple[int, ...]:
         """ADC counts (0–4095) of six joint angles (rad)."""
-        # The noise is drawn whatever happens, so that a fault of one moment leaves later noise as it was.
+        # Noise is always drawn, so that a momentary fault does not change later noise.
         noise = [rms * source.gauss(0.0, 1.0) for rms, source in zip(self._noise, self._noise_source, strict=True)]
         counts = [min(max(math.floor(value + 0.5), 0), ADC_COUNTS - 1) for value in self.unrounded(angles, noise)]
         for index, stuck in self._stuck.items():

@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 
 RING_DEPTH = 64
-"""Snapshots kept: 1.28 s at the default period."""
+"""Number of snapshots kept: 1.28 s at the default period."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class SnapshotRing:
         """The oldest snapshot with a tick above `tick`, None when there is none yet."""
         if not self._snapshots or self._snapshots[-1].tick <= tick:
             return None
-        # Ticks in the ring are consecutive, so the place is known.
+        # Ticks in the ring are consecutive, so the index follows.
         place = max(tick + 1 - self._snapshots[0].tick, 0)
         return self._snapshots[place]
 

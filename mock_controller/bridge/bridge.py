@@ -59,7 +59,7 @@ from mock_controller.bridge.stop_record import StopRecord
 from mock_controller.timeline import Timeline
 
 WAIT_LIMIT_PERIODS = 25
-"""A sample that has waited for so many periods is refused: the controller does not run."""
+"""Periods after which a waiting `Sample` is refused, since the controller evidently does not run."""
 
 # Plain integers: combining the flags themselves costs more than all else about an answer.
 _FROZEN, _RESTARTED, _SET_POINT_MISSED = (
@@ -86,7 +86,7 @@ class _WaitingAdvance:
 class Bridge:
     """Answers requests. `sees_period` offers `Sample`; `lock_step` offers `Advance`.
 
-    `first_number` is where the numbers of sessions and stops begin, which are to be others at every start.
+    `first_number` is the first number of sessions and stops, which should differ at every start.
     """
 
     routines: type[MemoryRoutines] = MemoryRoutines

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 BITS_PER_BYTE = 10
-"""Start bit, eight data bits, stop bit."""
+"""Bits that a byte takes on the line: start bit, eight data bits, stop bit."""
 
 
 class Line:

@@ -43,7 +43,7 @@ class Responder(Protocol):
         ...
 
     def hang_up(self) -> None:
-        """The host is gone: forgets what waits."""
+        """Handles the end of the connection: forgets waiting requests."""
         ...
 
 
@@ -59,14 +59,14 @@ class WireChunk(Protocol):
 
 
 class Wire(Protocol):
-    """What may happen to a frame on its way."""
+    """The faults that act on a frame on its way."""
 
     def on_the_wire(self, data: bytes, direction: Literal["to_controller", "to_host"]) -> Iterable[WireChunk]: ...
 
 
 @dataclass
 class LinkCounts:
-    """What the bridge has seen and said, over all connections."""
+    """Counts of received and sent frames, over all connections."""
 
     frames_received: int = 0
     damaged: int = 0
@@ -74,7 +74,7 @@ class LinkCounts:
 
 
 _Due = tuple[int, int, bytes]
-"""When (board time, µs), in which order at the same time, and what."""
+"""Board time (µs), order among events at the same time, and the bytes."""
 
 
 class Link:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from firmware_protocol.framing import MAX_ENCODED
 
 LONGEST = MAX_ENCODED + 2
-"""Bytes of a frame with its delimiters. A longer piece is passed on in parts, so that nothing grows without bound."""
+"""Length (bytes) of the longest frame with delimiters. A longer piece is passed on in parts, to bound the memory."""
 
 
 class PieceSplitter:

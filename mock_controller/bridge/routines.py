@@ -32,7 +32,8 @@ from mock_controller.timeline import Timeline
 
 _GAINS = ("gain_p", "gain_i", "gain_d")
 SETTLING_US = 2_000
-"""Between two readings of positions before a freeze: longer than the controller takes to store a period's results."""
+"""Pause (µs) between two readings of positions before a freeze: longer than the controller takes to store its
+results."""
 
 
 class MemoryRoutines:

@@ -1,4 +1,4 @@
-"""When a stop came, was in the memory, and was used: the figures that stopping is judged by."""
+"""Moments of a stop: received, stored in the memory, used by the controller."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ class StopRecord:
 
     count: int = 0
     received_us: int | None = None
-    """The whole request had arrived."""
+    """When the whole request had arrived."""
     frozen_us: int | None = None
-    """The last byte of the frozen set points was in the memory."""
+    """When the last byte of the frozen set points was in the memory."""
     frozen_tick: int | None = None
-    """The last period that had begun then."""
+    """The last period that had begun by then."""
     first_used_us: int | None = None
-    """The first period began that took the frozen set points."""
+    """When the first period began that took the frozen set points."""
     first_used_tick: int | None = None
 
     @property
@@ -28,7 +28,7 @@ class StopRecord:
         return self.frozen_us is not None and self.first_used_us is None
 
     def note(self, received_us: int, frozen_us: int, tick: int) -> None:
-        """A stop was carried out."""
+        """Records a stop that was carried out."""
         self.count += 1
         self.received_us, self.frozen_us, self.frozen_tick = received_us, frozen_us, tick
         self.first_used_us = self.first_used_tick = None

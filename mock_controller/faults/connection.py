@@ -11,7 +11,7 @@ from mock_controller.faults.fault import Count, Fault, FaultyParts, PartFault, p
 
 @dataclass(frozen=True, kw_only=True)
 class Stall(Fault):
-    """The bridge is silent: what comes in, and what would go out, waits for the end of it."""
+    """The bridge is silent: input and output wait until the stall ends."""
 
     name: ClassVar[str] = "stall"
     duration: float = parameter("s of board time that it lasts", 0.2, 0.0, 1e6)

@@ -60,7 +60,7 @@ class WireFault(Fault):
     direction: str = choice("which frames", "both", ("both", "to_controller", "to_host"))
 
     def strike(self, data: bytes, dice: random.Random) -> list[Chunk]:
-        """What becomes of one encoded frame, delimiters included. Time does not concern it."""
+        """The chunks that one encoded frame, delimiters included, turns into; independent of time."""
         raise NotImplementedError
 
 
@@ -110,13 +110,13 @@ class PartFault(Fault):
     """A fault of board, arm or connection: begins, perhaps acts in every period, ends."""
 
     def begin(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:
-        """Sets in."""
+        """Begins the fault."""
 
     def each_period(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:
         """Called once before every control period while it lasts."""
 
     def end(self, parts: FaultyParts) -> None:
-        """Is over."""
+        """Ends the fault."""
 
 
 class Count(Protocol):

@@ -104,7 +104,7 @@ class FaultSet:
     # --- the line
 
     def on_the_wire(self, data: bytes, direction: Direction) -> list[Chunk]:
-        """What becomes of one encoded frame now: every fault of the line in the order they were switched on."""
+        """The chunks that one encoded frame turns into now: all faults of the line act in the order of switching on."""
         chunks = [Chunk(data)]
         if not self.active:
             return chunks

@@ -13,10 +13,21 @@ from mock_controller.faults.wire import Delay, Drop, Duplicate, Flip, Junk, Spli
 FAULTS: dict[str, type[Fault]] = {
     kind.name: kind
     for kind in (
-        Flip, Drop, Duplicate, Delay, Split, Junk, Stall, Disconnect, BusyMemory, StuckPotentiometer,
-        NoisyPotentiometer, StalledJoint, BrownOut,
+        Flip,
+        Drop,
+        Duplicate,
+        Delay,
+        Split,
+        Junk,
+        Stall,
+        Disconnect,
+        BusyMemory,
+        StuckPotentiometer,
+        NoisyPotentiometer,
+        StalledJoint,
+        BrownOut,
     )
-}  # fmt: skip
+}
 
 
 def parse_fault(text: str) -> Fault:

@@ -77,5 +77,5 @@ class Junk(WireFault):
 
     def strike(self, data: bytes, dice: random.Random) -> list[Chunk]:
         count = dice.randint(1, self.most)
-        # No zeros: a lone delimiter would be no junk, and a run of them would be the end of a lock-step turn.
+        # No zeros: a lone delimiter would not be junk, and a run of zeros would end a turn of lock-step.
         return [Chunk(b"".join(dice.randint(1, 255).to_bytes() for _ in range(count)) + data)]

@@ -1,8 +1,8 @@
 """An arm that a seed has drawn: its load, its deviations, its hidden effects.
 
-A seed is a whole number, 100·number + 10·kind + load: its last digit says which load the arm carries, which those who
-diagnose are told, the one before it from which kind of arms it is drawn, which they are not. Everything else follows
-from the whole number, so that arms of different kinds have nothing in common.
+A seed is a whole number, 100·number + 10·kind + load. Its last digit gives the load, which is announced to those who
+diagnose; the digit before it gives the kind of arm, which is not. Everything else is drawn from the whole number, so
+that arms of different kinds have nothing in common.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from mock_controller.plant import PlantParameters
 
 SEED_LIMIT = 2**63
 UNKNOWN = "unknown_effect"
-"""What an effect is to those who know only the shared list, if it is not on it."""
+"""Name of an effect that is not in the shared list."""
 _WRONG_PRIORS = 2
-"""Constants that lie outside what is stated, in arms of that kind."""
+"""Number of constants outside their stated tolerance, in arms of kind `WRONG_PRIORS`."""
 _OUTSIDE = (3.0, 5.0)
-"""How far outside, in drawn standard deviations."""
+"""Range of those deviations, in drawn standard deviations."""
 
 
 class SecretError(ValueError):
@@ -139,7 +139,7 @@ def compose_seed(number: int, kind: Kind, load: Load) -> int:
 
 
 def draw_arm(seed: int) -> HiddenArm:
-    """The arm that a seed hides. Raises SecretError for a seed that stands for none."""
+    """The arm that a seed hides. Raises SecretError for a seed without a meaning."""
     kind_digit, load_digit = seed // 10 % 10, seed % 10
     if not 0 <= seed < SEED_LIMIT or kind_digit > max(Kind) or load_digit > max(Load):
         raise SecretError(
@@ -157,7 +157,7 @@ def draw_arm(seed: int) -> HiddenArm:
 
 
 def _put_outside(random: Random, deviations: dict[str, float]) -> None:
-    """Makes some constants deviate more than anybody expects."""
+    """Moves some constants outside their stated tolerance."""
     candidates = [tolerance for tolerance in tolerances() if tolerance.name.startswith(("m2", "m3", "torque", "rotor"))]
     for tolerance in random.sample(candidates, _WRONG_PRIORS):
         deviations[tolerance.name] = random.choice((-1, 1)) * random.uniform(*_OUTSIDE) * tolerance.drawn

@@ -1,4 +1,4 @@
-"""The control loop without rounding: what the readings of an arm would be, but for what the converter cuts off.
+"""The control loop without rounding: an arm's readings as real numbers.
 
 Positions, errors and drive are real numbers here; in place of rounding, each reading carries noise of the same size
 (the converter's own and that of a rounding error, a quantity uniform over one count), drawn from a seed. Two arms run
@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.units import DAC_MAX, posture_to_counts
+from mock_controller.board.extension_points import ChangesBoard, ChangesSetPoint
 from mock_controller.board.parameters import BoardParameters
 from mock_controller.board.sensor import PositionSensors
 from mock_controller.hidden.experiment import Experiment
-from mock_controller.modifications.interface import ChangesBoard, ChangesSetPoint, Modification, of_kind
+from mock_controller.modification import Modification, of_kind
 from mock_controller.plant import STEP_US, Plant, PlantParameters
 
 ROUNDING_VARIANCE = 1.0 / 12.0

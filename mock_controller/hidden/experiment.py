@@ -1,4 +1,4 @@
-"""What an arm is asked to do: a set point for every joint in every period."""
+"""An experiment for a hidden arm: a set point for every joint in every period."""
 
 from __future__ import annotations
 

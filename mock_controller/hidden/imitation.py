@@ -1,12 +1,12 @@
-"""Deviations that imitate an effect exactly or nearly, where there are any: the refit looks there, too."""
+"""Deviations that imitate an effect exactly or nearly, where they exist; the refit also starts from them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from mock_controller.hidden.tolerances import tolerances
+from mock_controller.modification import Modification
 from mock_controller.modifications.friction import LoadDependentFriction, ViscousFriction
-from mock_controller.modifications.interface import Modification
 from mock_controller.modifications.load import LinkMass, Payload
 from mock_controller.modifications.motor import BackEmfError
 from mock_controller.modifications.sensor import PotentiometerGain

@@ -37,44 +37,45 @@ from mock_controller.hidden.tolerances import (
     harmonic_deviation,
     tolerances,
 )
+from mock_controller.modification import Modification, of_kind
 from mock_controller.modifications.controller import InputDelay
-from mock_controller.modifications.interface import ChangesTransmission, Modification, of_kind
 from mock_controller.plant import STEP_US, PlantParameters
+from mock_controller.plant.extension_points import ChangesTransmission
 
 Priors = Literal["stated", "drawn"]
 MODELLED = 3
-"""Joints 1 to 3 are looked at; the others are held."""
+"""Number of joints whose readings are compared; the others are held."""
 _COARSE_STEP_US = 2000
-"""Steps of the plant where four digits of a difference are enough: it takes half the time."""
+"""Step (µs) of the plant where four digits of a difference suffice; it halves the time."""
 _TANGENT_STEP_US = _COARSE_STEP_US
 _LARGEST_STEP = 0.1
-"""Fraction by which a constant is moved at most: wide priors are followed along the tangent."""
+"""Largest fraction by which a constant is changed for a finite difference; wide priors are extrapolated."""
 _DELAY_STEP_S = 2e-3
-"""Change of the computing delay: a step of the plant."""
+"""Change (s) of the computing delay for a finite difference: a step of the plant."""
 
 
 MOST_REFITS = 8
-"""Times that the refit looks where it has got to; each takes a run of the experiment."""
+"""Most simulations of a refit; each runs the experiment once."""
 _FIRST_DAMPING, _LESS_DAMPING, _MORE_DAMPING = 1000.0, 10.0, 4.0
-"""The refit's damping at first (in units of the priors' weight), and how it changes with success and failure."""
+"""Initial damping of the refit (in units of the priors' weight), and its factors after success and failure."""
 _NEAR_DAMPING = 1.0
-"""The refit's damping at first where it begins from a place that the tangents have led to."""
+"""Initial damping of a refit that starts from the tangents' solution."""
 _CLEAR = 15.0
-"""d′ far above what counts as detectable: its value then decides nothing. The tangents give it within a third or so."""
+"""d′ far above the threshold of detectability, where the tangents' estimate (exact to about a third) is enough."""
 _MOSTLY_EXPLAINED = 0.2
-"""Share of the difference: where no more is left, the tangents have explained so much that they need a look."""
+"""Share of the difference: where the tangents leave less than this, their solution is checked by a simulation."""
 _SMALL_MOVE = 0.5
-"""Standard deviations within which the tangents are trusted without looking."""
+"""Largest move (standard deviations) for which the tangents are trusted without a simulation."""
 _SETTLED = 0.95
-"""A refit that leaves more than this share of the cost is the last."""
+"""The refit stops after a step that leaves more than this share of the cost."""
 _AS_FORETOLD = 0.03
-"""A run that leaves what the tangents have foretold, d′ to this share, shows that they hold there: it is the last."""
+"""Relative deviation of d′ from the tangents' prediction below which they are confirmed and the refit stops."""
 _LEAST_FRACTION, _MOST_FRACTION = -0.9, 5.0
-"""Constants are moved by no more than these fractions of their values."""
+"""Bounds of a constant's change, as fractions of its value."""
 _WHOLE_S = 5e-5
-"""A computing delay this near to whole steps is moved by them, and the rest along its tangent."""
+"""Distance (s) from whole steps within which a computing delay is rounded; the remainder goes along its tangent."""
 _EARLIEST_S = 5e-3
-"""The computing delay is moved by no more than this: something is left of it."""
+"""Largest reduction (s) of the computing delay, so that it stays positive."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ class Tangents:
 
 
 def _reach(name: str) -> tuple[float, float]:
-    """How far a tolerance parameter may be moved: fractions, seconds or counts."""
+    """Bounds of a tolerance parameter's change: fractions, seconds or counts."""
     if name.startswith("linearity"):
         return -math.inf, math.inf
     return (-_EARLIEST_S, _EARLIEST_S) if name == "computing_delay" else (_LEAST_FRACTION, _MOST_FRACTION)
@@ -168,7 +169,7 @@ def separation(
 ) -> Separation:
     """d′ between `parts` and the same arm with the modifications `without` only (by default none).
 
-    `present`: what `seen` has given for these parts, where that is known.
+    `present`: what `modelled_readings` has given for these parts, where that is known.
 
     The refit goes along the tangents, then looks where that has led. Unless what is left is what the tangents have
     foretold, or d′ is clearly large, it goes on, up to `refits` times: a strong effect that tolerances can imitate is
@@ -176,11 +177,11 @@ def separation(
     """
     one = reading_deviation(parts.board)
     step_us = _step_length(parts)
-    present = seen(parts, experiment) if present is None else present
+    present = modelled_readings(parts, experiment) if present is None else present
     sound = replace(parts, modifications=without)
 
     def left_at(moved: NDArray[np.float64]) -> NDArray[np.float64]:
-        there, rest = _moved(sound, known, moved, step_us)
+        there, rest = _move_parameters(sound, known, moved, step_us)
         absent = readings(there, experiment, step_us=step_us)[:, :MODELLED]
         left: NDArray[np.float64] = ((present - absent) / one).ravel() - known.matrix @ rest
         return left
@@ -192,7 +193,7 @@ def separation(
         return found
     there = known.within_reach(np.array(list(found.moved.values())))
     left_there = left_at(there)
-    looked = _told(found.before_refit, left_there, there, known)
+    looked = _separation_of(found.before_refit, left_there, there, known)
     hidden = [effect for effect in parts.modifications if effect not in without]
     imitating = imitation(parts.plant, hidden)
     as_foretold = abs(looked.d_prime - found.d_prime) <= _AS_FORETOLD * found.d_prime
@@ -201,21 +202,21 @@ def separation(
         return min(looked, found, key=lambda each: each.d_prime)
     if imitating:
         start = known.within_reach(np.array([imitating.get(name, 0.0) for name in known.names]) / known.deviations)
-        refitted = _refitted(left_at(start), start, left_at, known, refits)
+        refitted = _refit(left_at(start), start, left_at, known, refits)
     elif looked.d_prime < found.before_refit:
-        refitted = _refitted(left_there, there, left_at, known, refits, _NEAR_DAMPING)
+        refitted = _refit(left_there, there, left_at, known, refits, _NEAR_DAMPING)
     else:
-        refitted = _refitted(apart, nowhere, left_at, known, refits)
+        refitted = _refit(apart, nowhere, left_at, known, refits)
     return replace(min(looked, refitted, key=lambda each: each.d_prime), before_refit=found.before_refit)
 
 
 def project(difference: NDArray[np.float64], known: Tangents) -> Separation:
     """d′ of a difference of readings (in their standard deviations, periods·3) after one refit along the tangents."""
     moved = _step(difference, np.zeros(len(known.names)), known.matrix)
-    return _told(float(np.linalg.norm(difference)), difference - known.matrix @ moved, moved, known)
+    return _separation_of(float(np.linalg.norm(difference)), difference - known.matrix @ moved, moved, known)
 
 
-def seen(parts: LoopParts, experiment: Experiment) -> NDArray[np.float64]:
+def modelled_readings(parts: LoopParts, experiment: Experiment) -> NDArray[np.float64]:
     """Readings (counts, (periods, MODELLED)) of the arm with all that it has."""
     return readings(parts, experiment, step_us=_step_length(parts))[:, :MODELLED]
 
@@ -226,7 +227,7 @@ def _step_length(parts: LoopParts) -> int:
     return STEP_US if fine else _COARSE_STEP_US
 
 
-def _refitted(
+def _refit(
     left: NDArray[np.float64],
     moved: NDArray[np.float64],
     left_at: Callable[[NDArray[np.float64]], NDArray[np.float64]],
@@ -234,7 +235,7 @@ def _refitted(
     refits: int,
     damping: float = _FIRST_DAMPING,
 ) -> Separation:
-    """Levenberg–Marquardt from `moved`, where `left` is what is left.
+    """Levenberg–Marquardt from `moved`, where `left` is the residual.
 
     The tangents are corrected by what each step has shown (Broyden's update).
     Heavily damped at first: it begins with the directions that explain most, and the others follow where those led.
@@ -254,24 +255,24 @@ def _refitted(
                 break
         else:
             damping *= _MORE_DAMPING
-    return _told(0.0, left, moved, known)
+    return _separation_of(0.0, left, moved, known)
 
 
 def _step(
     left: NDArray[np.float64], moved: NDArray[np.float64], matrix: NDArray[np.float64], damping: float = 0.0
 ) -> NDArray[np.float64]:
-    """By how much to move on from `moved` where `left` is what is left."""
+    """The step from `moved`, where `left` is the residual."""
     normal = matrix.T @ matrix + (1.0 + damping) * np.eye(matrix.shape[1])
     return np.asarray(np.linalg.solve(normal, matrix.T @ left - moved), dtype=np.float64)
 
 
-def _told(before: float, left: NDArray[np.float64], moved: NDArray[np.float64], known: Tangents) -> Separation:
+def _separation_of(before: float, left: NDArray[np.float64], moved: NDArray[np.float64], known: Tangents) -> Separation:
     squared = float(left @ left + moved @ moved)
     by_name = {name: float(value) for name, value in zip(known.names, moved, strict=True)}
     return Separation(float(np.sqrt(squared)), before, by_name)
 
 
-def _moved(
+def _move_parameters(
     parts: LoopParts, known: Tangents, moved: NDArray[np.float64], step_us: int
 ) -> tuple[LoopParts, NDArray[np.float64]]:
     """The arm with its tolerance parameters moved by so many of their standard deviations.

@@ -1,4 +1,4 @@
-"""How large a hidden effect may be: from what careful work just sees to what nobody overlooks.
+"""How large a hidden effect may be: from barely detectable to obvious.
 
 The ranges are for the arm of the data files at gains 2, 0, 0 and were chosen with `separation` on the 55 s reference
 set (docs/mock.md tells how); at their upper ends the loop is still stable. A size is drawn evenly on a logarithmic
@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from math import pi
 from random import Random
 
-from mock_controller.modifications.registry import fields_of, known_modifications
+from mock_controller.modifications.parameter import fields_of
+from mock_controller.modifications.registry import known_modifications
 
 Range = tuple[float, float]
 

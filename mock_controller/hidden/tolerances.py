@@ -25,9 +25,9 @@ _MASSES = ("m1", "m2", "m3", "m_load")
 _LENGTHS = ("r1", "a2", "a3")
 _JOINT_CONSTANTS = ("resistance", "torque_constant", "back_emf_constant", "rotor_inertia", "viscous_friction")
 _MOST = 2.0
-"""Deviations are drawn within this many standard deviations."""
+"""Truncation of drawn deviations, in standard deviations."""
 _STEP_S = 1e-3
-"""The board's computing delay is whole steps of the plant."""
+"""Resolution (s) of the board's computing delay: a whole number of the plant's steps."""
 HARMONICS = (1, 2, 3)
 
 

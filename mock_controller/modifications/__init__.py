@@ -1,9 +1,10 @@
 """Hidden physical effects: named modifications of the plant and the board, absent by default.
 
-`interface` says where one may act, `registry` knows them by name. A new effect is a file here, listed in `library`.
+`registry` knows them by name. A new effect is a class in a file here, named in the file's SHARED or OPEN_SET; it acts
+through the extension points of plant and board.
 """
 
-from mock_controller.modifications.interface import Modification
+from mock_controller.modification import Modification
 from mock_controller.modifications.registry import ModificationError, build_modifications, known_modifications
 
 __all__ = ["Modification", "ModificationError", "build_modifications", "known_modifications"]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from mock_controller.modifications.registry import joint_parameter, parameter
+from mock_controller.modifications.parameter import joint_parameter, parameter
 from mock_controller.plant.parameters import PlantParameters
 
 
@@ -21,7 +21,7 @@ class DeadZone:
     joint: int = joint_parameter()
     width: float = parameter(0.0, 20.0, unit="V", null=0.0)
 
-    def drive_voltage(self, volts: float, time_s: float) -> float:  # noqa: ARG002  (the place's signature)
+    def drive_voltage(self, volts: float, time_s: float) -> float:  # noqa: ARG002  (the protocol's signature)
         if volts > self.width:
             return volts - self.width
         if volts < -self.width:
@@ -40,10 +40,10 @@ class SupplyLimit:
     joint: int = joint_parameter()
     reduction: float = parameter(0.0, 35.0, unit="V", null=0.0)
 
-    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:  # noqa: ARG002  (the place's signature)
+    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:  # noqa: ARG002  (the protocol's signature)
         self._limit = max(parameters.amplifier.supply_limit - self.reduction, 0.0)
 
-    def drive_voltage(self, volts: float, time_s: float) -> float:  # noqa: ARG002  (the place's signature)
+    def drive_voltage(self, volts: float, time_s: float) -> float:  # noqa: ARG002  (the protocol's signature)
         return min(max(volts, -self._limit), self._limit)
 
 
@@ -58,7 +58,7 @@ class SlewRateLimit:
     joint: int = joint_parameter()
     time_per_volt: float = parameter(0.0, 0.1, unit="s/V", null=0.0)
 
-    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:  # noqa: ARG002  (the place's signature)
+    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:  # noqa: ARG002  (the protocol's signature)
         self._most = step_s / self.time_per_volt
         self.restart()
 
@@ -87,3 +87,7 @@ class DriveCoupling:
         coupled = list(volts)
         coupled[self.onto - 1] += self.share * volts[self.joint - 1]
         return coupled
+
+
+SHARED: tuple[type[Any], ...] = (DeadZone, SupplyLimit)
+OPEN_SET: tuple[type[Any], ...] = (SlewRateLimit, DriveCoupling)

@@ -14,7 +14,7 @@ class Bristle:
         self.restart()
 
     def restart(self) -> None:
-        """Straight again."""
+        """Resets the deflection."""
         self._deflection = 0.0
 
     def advance(self, rate: float) -> float:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, replace
 from random import Random
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from mock_controller.board.parameters import BoardParameters
-from mock_controller.modifications.registry import joint_parameter, parameter
+from mock_controller.modifications.parameter import joint_parameter, parameter
 from mock_controller.plant.parameters import PlantParameters
 
 
@@ -26,7 +26,7 @@ class InputDelay:
     joint: int = joint_parameter()
     delay: float = parameter(0.0, 0.2, unit="s", null=0.0)
 
-    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:  # noqa: ARG002  (the place's signature)
+    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:  # noqa: ARG002  (the protocol's signature)
         steps = self.delay / step_s
         self._whole = int(steps + 1e-9)
         self._part = max(steps - self._whole, 0.0)
@@ -81,8 +81,11 @@ class LostSetPoints:
         self._random = Random(f"lost set points {self.seed}")
         self._taken: int | None = None
 
-    def set_point(self, counts: int, tick: int) -> int:  # noqa: ARG002  (the place's signature)
+    def set_point(self, counts: int, tick: int) -> int:  # noqa: ARG002  (the protocol's signature)
         lost = self._random.random() < self.share
         if self._taken is None or not lost:
             self._taken = counts
         return self._taken
+
+
+SHARED: tuple[type[Any], ...] = (InputDelay, WrongGain, LostSetPoints)

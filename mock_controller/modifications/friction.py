@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import exp
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from mock_controller.modifications.bristle import Bristle
 from mock_controller.modifications.changes import change_joint
-from mock_controller.modifications.registry import joint_parameter, parameter
+from mock_controller.modifications.parameter import joint_parameter, parameter
 from mock_controller.plant.parameters import PlantParameters
 
 
@@ -74,7 +74,7 @@ class StribeckFriction:
     torque: float = parameter(0.0, 50.0, unit="N·m", null=0.0)
     speed: float = parameter(0.01, 2.0, default=0.1, unit="rad/s")
 
-    def friction_level(self, level: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+    def friction_level(self, level: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
         return level + self.torque * exp(-abs(rate) / self.speed)
 
 
@@ -102,7 +102,7 @@ class Stiction:
     def restart(self) -> None:
         self._force = 0.0
 
-    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
         bond = self.breakaway * exp(-((rate / self.speed) ** 2))
         moved = self._step_s * rate
         if bond <= 1e-9 * self.breakaway:
@@ -130,6 +130,16 @@ class DirectionDependentFriction:
     def restart(self) -> None:
         self._bristle.restart()
 
-    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
         bent = self._bristle.advance(rate)
         return -abs(self.torque) * bent if bent * self.torque > 0.0 else 0.0
+
+
+SHARED: tuple[type[Any], ...] = (
+    ViscousFriction,
+    CoulombFriction,
+    LoadDependentFriction,
+    StribeckFriction,
+    Stiction,
+    DirectionDependentFriction,
+)

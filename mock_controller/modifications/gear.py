@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import sin
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from mock_controller.modifications.registry import joint_parameter, parameter
+from mock_controller.modifications.parameter import joint_parameter, parameter
 from mock_controller.plant.transmission import Transmission
 
 
@@ -56,7 +56,7 @@ class TorqueRipple:
     periods: float = parameter(1.0, 400.0, default=12.0, unit="1/turn")
     phase: float = parameter(-6.3, 6.3, default=0.0, unit="rad")
 
-    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
         return self.amplitude * sin(self.periods * angle + self.phase)
 
 
@@ -72,7 +72,7 @@ class DetentCogging:
     amplitude: float = parameter(0.0, 50.0, unit="N·m", null=0.0)
     periods: float = parameter(1.0, 100.0, default=10.0, unit="1/turn")
 
-    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
         turn = self.periods * angle
         return self.amplitude / 1.6 * sum(sin(k * turn) / k**0.5 for k in (1, 2, 3, 4))
 
@@ -101,5 +101,9 @@ class GearLoss:
         self._through = torque
         return 0.0
 
-    def friction_level(self, level: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+    def friction_level(self, level: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
         return level + self.loss * abs(self._through)
+
+
+SHARED: tuple[type[Any], ...] = (TorqueRipple, GearLoss, Backlash, JointCompliance)
+OPEN_SET: tuple[type[Any], ...] = (DetentCogging,)

@@ -1,13 +1,13 @@
-"""Masses and springs that nobody told the model about."""
+"""Masses, springs and disturbances that are missing in the model."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import cos, sin
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from mock_controller.modifications.changes import change_body
-from mock_controller.modifications.registry import joint_parameter, parameter
+from mock_controller.modifications.parameter import joint_parameter, parameter
 from mock_controller.plant.parameters import PlantParameters
 
 
@@ -92,7 +92,7 @@ class SpringTorque:
     stiffness: float = parameter(0.0, 200.0, unit="N·m/rad", null=0.0)
     neutral: float = parameter(-6.3, 6.3, default=0.0, unit="rad")
 
-    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
         return -self.stiffness * (angle - self.neutral)
 
 
@@ -109,5 +109,8 @@ class PeriodicDisturbance:
     frequency: float = parameter(0.05, 20.0, default=2.0, unit="Hz")
     phase: float = parameter(-6.3, 6.3, default=0.0, unit="rad")
 
-    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
         return self.amplitude * sin(6.283185307179586 * self.frequency * time_s + self.phase)
+
+
+SHARED: tuple[type[Any], ...] = (Payload, LinkMass, CentreOfMass, BaseTilt, SpringTorque, PeriodicDisturbance)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import exp
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from mock_controller.modifications.changes import change_joint
-from mock_controller.modifications.registry import joint_parameter, parameter
+from mock_controller.modifications.parameter import joint_parameter, parameter
 from mock_controller.plant.parameters import PlantParameters
 
 _COPPER_PER_KELVIN = 0.0039
@@ -16,7 +16,8 @@ _COPPER_PER_KELVIN = 0.0039
 
 @dataclass
 class BackEmfError:
-    """The back-EMF constant of `joint`'s motor is `factor` times what it is taken for; the torque constant is not."""
+    """The back-EMF constant of `joint`'s motor is `factor` times its nominal value; the torque constant is
+    unchanged."""
 
     name: ClassVar[str] = "back_emf_error"
     shared: ClassVar[bool] = True
@@ -85,3 +86,6 @@ class ResistanceDrift:
         steady = self.thermal_resistance * resistance * current**2
         self._warmer = steady + (self._warmer - steady) * self._keep
         return -self._torque_per_ampere * cold_current * (1.0 - self._cold / resistance)
+
+
+SHARED: tuple[type[Any], ...] = (BackEmfError, ResistanceDrift, MotorInductance)

@@ -1,7 +1,7 @@
 """Modifications by name, with their parameters checked.
 
-A modification class is a dataclass; its fields are its parameters, made by `parameter` with unit and bounds. A class
-also tells its `name`, whether that name is `shared` with those who diagnose, one `line` of physics, and its `source`.
+A modification class is a dataclass; its fields are its parameters. It also states its `name`, whether that name is
+`shared` with those who diagnose, one `line` of physics, and its `source`.
 """
 
 from __future__ import annotations
@@ -12,39 +12,19 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
 
-from mock_controller.modifications.interface import Modification
+from mock_controller.modification import Modification
+from mock_controller.modifications.library import LIBRARY
+from mock_controller.modifications.parameter import fields_of
 
 
 class ModificationError(ValueError):
     """A modification that does not exist, or a parameter it cannot have."""
 
 
-def parameter(
-    low: float, high: float, default: float | int | None = None, unit: str = "1", null: float | None = None
-) -> Any:
-    """A dataclass field whose value (in `unit`) must lie in [low, high]; at `null` the effect is absent."""
-    metadata = {"low": low, "high": high, "unit": unit, "null": null}
-    if default is None:
-        return dataclasses.field(metadata=metadata)
-    return dataclasses.field(default=default, metadata=metadata)
-
-
-def joint_parameter(high: int = 6, low: int = 1) -> Any:
-    """The field for the joint (or the link of that number) on which an effect acts."""
-    return parameter(low, high)
-
-
 @cache
 def known_modifications() -> Mapping[str, type[Any]]:
     """Every modification class of the library by its name."""
-    from mock_controller.modifications.library import LIBRARY
-
     return {kind.name: kind for kind in LIBRARY}
-
-
-def fields_of(kind: type[Any]) -> dict[str, dataclasses.Field[Any]]:
-    """The parameters of a modification class, by name."""
-    return {field.name: field for field in dataclasses.fields(kind) if field.init}
 
 
 def build_modification(name: str, values: Mapping[str, object]) -> Modification:
@@ -66,7 +46,7 @@ def build_modification(name: str, values: Mapping[str, object]) -> Modification:
 
 
 def build_modifications(requests: Iterable[tuple[str, Mapping[str, object]]]) -> tuple[Modification, ...]:
-    """Several modifications, in the order given; those of no size are left out, and so cost nothing."""
+    """Several modifications, in the order given; those at their null value are left out, so that they cost nothing."""
     built = (build_modification(name, values) for name, values in requests)
     return tuple(modification for modification in built if not is_null(modification))
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import exp, floor
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from mock_controller.board.parameters import BoardParameters
-from mock_controller.modifications.registry import joint_parameter, parameter
+from mock_controller.modifications.parameter import joint_parameter, parameter
 
 
 @dataclass
@@ -129,3 +129,7 @@ class StuckConverterBit:
         mask = 1 << self.bit
         stuck = whole | mask if self.level else whole & ~mask
         return counts + (stuck - whole)
+
+
+SHARED: tuple[type[Any], ...] = (PotentiometerGain, PotentiometerOffset, PotentiometerNonlinearity)
+OPEN_SET: tuple[type[Any], ...] = (PotentiometerZeroDrift, ConverterBitWeight, StuckConverterBit)

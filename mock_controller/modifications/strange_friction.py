@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import exp, log1p
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from mock_controller.modifications.bristle import Bristle
-from mock_controller.modifications.registry import joint_parameter, parameter
+from mock_controller.modifications.parameter import joint_parameter, parameter
 from mock_controller.plant.parameters import PlantParameters
 
 
@@ -24,7 +24,7 @@ class TightSpot:
     centre: float = parameter(-6.3, 6.3, default=0.0, unit="rad")
     width: float = parameter(0.01, 2.0, default=0.1, unit="rad")
 
-    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
         away = (angle - self.centre) / self.width
         return -self.coefficient * rate * exp(-0.5 * away * away)
 
@@ -40,7 +40,7 @@ class QuadraticDrag:
     joint: int = joint_parameter()
     coefficient: float = parameter(0.0, 1000.0, unit="N·m·s²/rad²", null=0.0)
 
-    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
         return -self.coefficient * rate * abs(rate)
 
 
@@ -56,13 +56,13 @@ class CableHysteresis:
     torque: float = parameter(0.0, 50.0, unit="N·m", null=0.0)
     reach: float = parameter(0.01, 1.0, default=0.15, unit="rad")
 
-    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:  # noqa: ARG002  (the place's signature)
+    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:  # noqa: ARG002  (the protocol's signature)
         self._bristle = Bristle(self.reach, step_s)
 
     def restart(self) -> None:
         self._bristle.restart()
 
-    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
         return -self.torque * self._bristle.advance(rate)
 
 
@@ -83,14 +83,14 @@ class AgeingFriction:
     onset: float = parameter(0.001, 10.0, default=0.2, unit="s")
     memory: float = parameter(1e-4, 0.1, default=3e-3, unit="rad")
 
-    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:  # noqa: ARG002  (the place's signature)
+    def know_plant(self, parameters: PlantParameters, step_s: float) -> None:  # noqa: ARG002  (the protocol's signature)
         self._step_s = step_s
         self.restart()
 
     def restart(self) -> None:
         self._age = 0.0
 
-    def friction_level(self, level: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the place's signature)
+    def friction_level(self, level: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
         wear = abs(rate) / self.memory
         share = wear * self._step_s
         if share < 1e-9:
@@ -98,3 +98,6 @@ class AgeingFriction:
         else:
             self._age = 1.0 / wear + (self._age - 1.0 / wear) * exp(-share)
         return level + self.torque * log1p(self._age / self.onset)
+
+
+OPEN_SET: tuple[type[Any], ...] = (TightSpot, QuadraticDrag, CableHysteresis, AgeingFriction)

@@ -14,7 +14,9 @@ from collections.abc import Iterable, Sequence
 import mujoco
 import numpy as np
 
-from mock_controller.modifications.interface import (
+from mock_controller.modification import Modification, Restartable, of_kind
+from mock_controller.plant.drive_train import DriveTrain
+from mock_controller.plant.extension_points import (
     AddsJointTorque,
     AddsTorque,
     ChangesDriveVoltage,
@@ -25,11 +27,7 @@ from mock_controller.modifications.interface import (
     ChangesTransmission,
     CouplesDrives,
     KnowsPlant,
-    Modification,
-    Restartable,
-    of_kind,
 )
-from mock_controller.plant.drive_train import DriveTrain
 from mock_controller.plant.friction import CoulombLevel, deflect
 from mock_controller.plant.parameters import JOINTS, PlantParameters
 from mock_controller.plant.rigid_body import build_model
@@ -39,9 +37,9 @@ STEP_US = 1000
 """Integration step (µs); halving it changes the default ramp by less than a hundredth of an ADC count."""
 
 _PARTS_OF_A_STEP = 4
-"""Into how many parts a step is cut where a gear gives: the light waist of an upright arm swings against its teeth."""
+"""Substeps of a step where a gear is elastic or has play: the light waist of an upright arm oscillates in its teeth."""
 _STALL_INERTIA = 1e9
-"""Inertia (kg·m²) that holds a stalled joint still against anything the arm can do."""
+"""Inertia (kg·m²) of a stalled joint, large enough to hold it still against any torque of the arm."""
 
 
 class PlantError(ValueError):

@@ -13,7 +13,7 @@ import mujoco
 from mock_controller.plant.parameters import PlantParameters
 
 _NO_INERTIA = 1e-12
-"""Rotational inertia (kg·m²) given to a body where the source's is exactly zero: the engine needs a positive one."""
+"""Rotational inertia (kg·m²) of a body where the source's is exactly zero; the engine requires a positive value."""
 
 
 def build_model(parameters: PlantParameters, step_s: float, free_rotors: Collection[int] = ()) -> mujoco.MjModel:

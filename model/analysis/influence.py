@@ -21,12 +21,12 @@ class Influence(BaseModel):
 
     @property
     def published_too_many(self) -> tuple[str, ...]:
-        """Named by the source, without any effect."""
+        """Parameters that the source names although they have no effect."""
         return tuple(p for p in self.published if p not in self.acting)
 
     @property
     def published_too_few(self) -> tuple[str, ...]:
-        """With an effect, not named by the source."""
+        """Parameters that have an effect although the source does not name them."""
         return tuple(p for p in self.acting if p not in self.published)
 
 
@@ -38,9 +38,8 @@ def influences(
     Raises ChainError for a prismatic joint.
     """
     acting = acting_parameters(chain, _states(chain.joint_count, states, waist_still))
-    order = [
-        parameter_name(link, which) for link in range(1, chain.joint_count + 1) for which in range(len(PARAMETERS))
-    ]
+    links, kinds = range(1, chain.joint_count + 1), range(len(PARAMETERS))
+    order = [parameter_name(link, kind) for link in links for kind in kinds]
     return tuple(
         Influence(table=table, joint=j, acting=tuple(a), published=tuple(p for p in order if p in named))
         for j, (a, named) in enumerate(zip(acting, published, strict=True), start=1)
@@ -52,5 +51,8 @@ def _states(joints: int, count: int, waist_still: bool) -> list[State]:
     still = np.ones(joints)
     if waist_still:
         still[0] = 0.0
-    return [(rng.uniform(-3, 3, joints), still * rng.normal(size=joints), still * rng.normal(size=joints))
-            for _ in range(count)]  # fmt: skip
+
+    def state() -> State:
+        return rng.uniform(-3, 3, joints), still * rng.normal(size=joints), still * rng.normal(size=joints)
+
+    return [state() for _ in range(count)]

@@ -1,17 +1,20 @@
-"""How much each parameter moves the readings along a run: sensitivity curves."""
+"""Sensitivity curves: how much each parameter changes the readings along a run."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, sensitivities
-from model.validation.expected_deviation import Convention, expected_deviation
+from model.machine_model.parameter import Parameter
+from model.simulation.prepared import Options
+from model.simulation.simulate import sensitivities
+from model.validation.expected_deviation import expected_deviation
 
 
 class _Part(BaseModel):
@@ -53,28 +56,29 @@ class SensitivityCurves(_Part):
 
 
 def sensitivity_curves(
-    model: Model, trace: Trace, names: Sequence[str], convention: Convention = "source", options: Options | None = None
+    model: Model, trace: Trace, names: Sequence[str], options: Options | None = None
 ) -> SensitivityCurves:
     """Exact first-order effect of the named parameters on the readings of a run that repeats the trace.
 
-    The loop is closed unless `options` say otherwise: what the controller makes up for does not show.
+    The loop is closed unless `options` say otherwise: what the controller compensates does not show.
     Raises SpecError for no or an unknown parameter, or one without an expected deviation; TraceError as `simulate`.
     """
     if not names:
         raise SpecError("no parameters: name at least one")
-    found = sensitivities(model, trace, names, options)
-    curves = []
-    for name, derivative in zip(names, found.reading, strict=True):
-        parameter = model.parameter(name)
-        expected, _ = expected_deviation(parameter, convention)
-        moved = expected * derivative
-        curves.append(
-            SensitivityCurve(
-                name=name, unit=parameter.unit, expected=expected,
-                by_joint=tuple(tuple(map(float, column)) for column in moved.T), rms=float(np.sqrt((moved**2).mean())),
-            )
-        )  # fmt: skip
+    found = sensitivities(model, trace, [model.parameter(name) for name in names], options)
+    curves = [_curve(p, derivative) for p, derivative in zip(found.parameters, found.reading, strict=True)]
     return SensitivityCurves(
-        model=model.identity, trace=trace.record.trace_id, joints=found.simulation.joints,
-        time=tuple(map(float, found.simulation.time)), curves=tuple(sorted(curves, key=lambda c: -c.rms)),
-    )  # fmt: skip
+        model=model.identity,
+        trace=trace.record.trace_id,
+        joints=found.simulation.joints,
+        time=tuple(map(float, found.simulation.time)),
+        curves=tuple(sorted(curves, key=lambda c: -c.rms)),
+    )
+
+
+def _curve(parameter: Parameter, derivative: NDArray[np.float64]) -> SensitivityCurve:
+    expected, _ = expected_deviation(parameter, "source")
+    moved = expected * derivative
+    by_joint = tuple(tuple(map(float, column)) for column in moved.T)
+    rms = float(np.sqrt((moved**2).mean()))
+    return SensitivityCurve(name=parameter.name, unit=parameter.unit, expected=expected, by_joint=by_joint, rms=rms)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from itertools import combinations_with_replacement
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
-from model.analysis.bodies import chain_of
 from model.dynamics import recursive
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, simulate
+from model.simulation.chain_of_model import chain_of
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from model.validation import differentiation
 
 Floats = NDArray[np.float64]
@@ -81,7 +84,7 @@ class TorqueAnalysis(_Part):
 
 
 def torques_of_run(model: Model, trace: Trace) -> TorqueAnalysis:
-    """Torques along the model's own motion for the set points of a trace; accelerations from its exact motion."""
+    """Torques along the model's own motion for the set points of a trace, with accelerations of its exact speeds."""
     run = simulate(model, trace, Options(quantise=False))
     period = float(np.median(np.diff(run.time)))
     acceleration = np.gradient(run.velocity, period, axis=0)
@@ -109,42 +112,55 @@ def torques_of_trace(model: Model, trace: Trace, width: float = 2.0) -> TorqueAn
 def torques_along(
     model: Model, time: Floats, position: Floats, speed: Floats, acceleration: Floats, source: str
 ) -> TorqueAnalysis:
-    """Torques along a motion (k, n) in rad, rad/s and rad/s²; link 3 by (7.28) in a model that has it so."""
-    n = model.joint_count
+    """Torques along a motion (k, n) in rad, rad/s and rad/s²; link 3 by (7.28) if the model has it so."""
+    joints = range(model.joint_count)
     chain = _as_published(chain_of(model)) if model.published_inertia else chain_of(model)
-    points = _without_moments(chain)
     whole = np.array([recursive.mass_matrix(chain, q) for q in position])
-    translation = np.array([recursive.mass_matrix(points, q) for q in position])
-    rotors = np.asarray(chain.rotor_inertia)
     speed_torque = np.array([recursive.velocity_torques(chain, q, v) for q, v in zip(position, speed, strict=True)])
-    gravity = np.array([recursive.gravity_torques(chain, q) for q in position])
-    by_link = np.array([[recursive.gravity_torques(_only(chain, link), q) for q in position] for link in range(n)])
+    inertial = [
+        InertialTorque(at=i + 1, of=j + 1, values=_series(whole[:, i, j] * acceleration[:, j]))
+        for i in joints
+        for j in joints
+    ]
     return TorqueAnalysis(
-        model=model.identity, source=source, time=_series(time),
-        inertia=tuple(
-            _element(i, j, whole[:, i, j], translation[:, i, j], float(rotors[i]) if i == j else 0.0)
-            for i in range(n) for j in range(i, n)
-        ),
-        inertial=tuple(
-            InertialTorque(at=i + 1, of=j + 1, values=_series(whole[:, i, j] * acceleration[:, j]))
-            for i in range(n) for j in range(n)
-        ),
-        speed=tuple(SpeedTorque(joint=i + 1, values=_series(speed_torque[:, i])) for i in range(n)),
-        gravity=tuple(
-            GravityTorque(
-                joint=i + 1, whole=_series(gravity[:, i]), by_link=tuple(_series(link[:, i]) for link in by_link)
+        model=model.identity,
+        source=source,
+        time=_series(time),
+        inertia=_inertia_elements(chain, position, whole),
+        inertial=tuple(inertial),
+        speed=tuple(SpeedTorque(joint=i + 1, values=_series(speed_torque[:, i])) for i in joints),
+        gravity=_gravity_torques(chain, position),
+    )
+
+
+def _inertia_elements(chain: ChainArrays, position: Floats, whole: Floats) -> tuple[InertiaElement, ...]:
+    points = _without_moments(chain)
+    translation = np.array([recursive.mass_matrix(points, q) for q in position])
+    elements = []
+    for i, j in combinations_with_replacement(range(whole.shape[1]), 2):
+        rotor = float(chain.rotor_inertia[i]) if i == j else 0.0
+        elements.append(
+            InertiaElement(
+                row=i + 1,
+                column=j + 1,
+                whole=_series(whole[:, i, j]),
+                translation=_series(translation[:, i, j] - rotor),
+                rotation=_series(whole[:, i, j] - translation[:, i, j]),
+                rotor=rotor,
             )
-            for i in range(n)
-        ),
-    )  # fmt: skip
+        )
+    return tuple(elements)
 
 
-def _element(i: int, j: int, whole: Floats, translation: Floats, rotor: float) -> InertiaElement:
-    moved = translation - rotor
-    return InertiaElement(
-        row=i + 1, column=j + 1, whole=_series(whole), translation=_series(moved),
-        rotation=_series(whole - translation), rotor=rotor,
-    )  # fmt: skip
+def _gravity_torques(chain: ChainArrays, position: Floats) -> tuple[GravityTorque, ...]:
+    whole, *by_link = (
+        np.array([recursive.gravity_torques(part, q) for q in position])
+        for part in (chain, *(_only(chain, link) for link in range(position.shape[1])))
+    )
+    return tuple(
+        GravityTorque(joint=i + 1, whole=_series(whole[:, i]), by_link=tuple(_series(link[:, i]) for link in by_link))
+        for i in range(position.shape[1])
+    )
 
 
 def _without_moments(chain: ChainArrays) -> ChainArrays:

@@ -1,1 +1,1 @@
-"""Models beside what was measured: simulated traces, what is left of them, and how large that is."""
+"""Comparison of models with measurements: simulated traces, their residuals, and how large these are."""

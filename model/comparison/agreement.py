@@ -18,7 +18,7 @@ class JointAgreement(_Part):
 
     `rmse` and `largest` of measured − simulated, `floor` the noise and rounding of the measurement alone, `count` one
     count of the sensor (None where it has none), all in `unit`. `share` is the mean square of what is left over that of
-    the measured motion about its mean: 0 for a perfect model, 1 for one that says "it stays where it is on average".
+    the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
     """
 
     joint: int
@@ -71,7 +71,7 @@ class ModelAgreement(_Part):
 
 
 def pooled(traces: Sequence[TraceAgreement]) -> tuple[JointAgreement, ...] | None:
-    """Every sample of all traces alike; None for no traces."""
+    """Agreement over all samples of all traces, each counting the same; None for no traces."""
     if not traces:
         return None
     total = sum(t.samples for t in traces)

@@ -1,4 +1,4 @@
-"""Simulate traces with one or more models and say how much of the motion is left."""
+"""Simulation of traces with one or more models, and how much of the motion each leaves unexplained."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from daq.contracts.trace import Trace
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.fitting.records import Record, Signal, noise_floor, records_of, resolution
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 
 Floats = NDArray[np.float64]
 
@@ -45,11 +46,16 @@ class Comparison:
 
 
 def compare(
-    models: Sequence[tuple[str, Model]], traces: Sequence[Trace], held_out: Collection[str] | None = None, *,
-    signal: Signal = "position", options: Options | None = None, progress: Progress = silent,
+    models: Sequence[tuple[str, Model]],
+    traces: Sequence[Trace],
+    held_out: Collection[str] | None = None,
+    *,
+    signal: Signal = "position",
+    options: Options | None = None,
+    progress: Progress = silent,
     cancel: Cancel | None = None,
-) -> Comparison:  # fmt: skip
-    """Every trace simulated with every model, each as the controller (or the recorded drive) drove the arm.
+) -> Comparison:
+    """Simulate every trace with every model, driven by the controller or by the recorded drive.
 
     Args:
         models: labels and models, all of the same machine's joints. held_out: identities of traces not fitted to;

@@ -13,7 +13,7 @@ SAME = 1e-12
 
 
 class ParameterDifference(BaseModel):
-    """One parameter with its value in each model, None where a model has it not.
+    """One parameter with its value in each model, None where a model does not have it.
 
     `deviations` is the spread of the values in expected deviations; None where one lacks it or none is expected.
     """
@@ -27,7 +27,7 @@ class ParameterDifference(BaseModel):
 
 
 def differences(models: Sequence[Model]) -> tuple[ParameterDifference, ...]:
-    """Parameters that do not have the same value in all models, in the order of the first that has them."""
+    """Parameters whose values differ between models, in the order of the first model that has them."""
     names: dict[str, None] = {}
     for model in models:
         names |= dict.fromkeys(p.name for p in model.parameters)

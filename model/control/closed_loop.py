@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from model.arrays import Floats
 from model.control import arm as at
 from model.control.arm import DrivenArm, equation_of_motion
 from model.dynamics.compilation import compiled
 from model.dynamics.linear_solve import solve_3
-
-Floats = NDArray[np.float64]
 
 LONGEST_STEP = 2e-4
 """s; half of it changes no position of chapter 8's runs by more than 1e-5 rad (tests)."""
@@ -76,10 +74,16 @@ class ControlledMotion:
 
 
 def control(
-    plant: DrivenArm, law: Partitioned | ClassicalPid, wanted: Sinusoid, start: tuple[float, float, float],
-    duration: float, *, start_speed: tuple[float, float, float] = (0.0, 0.0, 0.0), every: int = 50,
+    plant: DrivenArm,
+    law: Partitioned | ClassicalPid,
+    wanted: Sinusoid,
+    start: tuple[float, float, float],
+    duration: float,
+    *,
+    start_speed: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    every: int = 50,
     step: float = LONGEST_STEP,
-) -> ControlledMotion:  # fmt: skip
+) -> ControlledMotion:
     """Motion of `plant` under `law`, from `start` (rad) with `start_speed` (rad/s), every `every` steps kept.
 
     The amplifier is linear and without limit, as in the source.
@@ -107,9 +111,16 @@ def control(
 
 @compiled
 def _run(
-    plant: Floats, estimate: Floats, gains: Floats, partitioned: bool, reference: Floats, state: Floats, step: float,
-    every: int, out: Floats,
-) -> None:  # fmt: skip
+    plant: Floats,
+    estimate: Floats,
+    gains: Floats,
+    partitioned: bool,
+    reference: Floats,
+    state: Floats,
+    step: float,
+    every: int,
+    out: Floats,
+) -> None:
     for k in range(out.shape[0]):
         for i in range(every):
             t = (k * every + i) * step
@@ -149,11 +160,16 @@ def _derivative(
             volts[j] /= estimate[at.VOLTS_TO_TORQUE + j]
     d, rest = equation_of_motion(q, v, plant)
     a1, a2, a3 = solve_3(
-        d[0], d[1], d[2], d[3], d[4], d[5],
+        d[0],
+        d[1],
+        d[2],
+        d[3],
+        d[4],
+        d[5],
         plant[at.VOLTS_TO_TORQUE] * volts[0] - rest[0],
         plant[at.VOLTS_TO_TORQUE + 1] * volts[1] - rest[1],
         plant[at.VOLTS_TO_TORQUE + 2] * volts[2] - rest[2],
-    )  # fmt: skip
+    )
     rates = np.empty((3, 3))
     rates[0], rates[1], rates[2] = v, np.array([a1, a2, a3]), error
     return rates, volts

@@ -1,4 +1,4 @@
-"""Experiments drawn at random within the limits: what a search for good ones chooses from."""
+"""Experiments drawn at random within the limits: the candidates of a search for good ones."""
 
 from __future__ import annotations
 
@@ -23,23 +23,31 @@ from daq.contracts.machine import BoardPid, Machine
 MARGIN = math.radians(5.0)
 """Distance that start postures keep from the limits of a joint."""
 AMPLITUDES = (math.radians(4.0), math.radians(25.0))
+"""Range of amplitudes, drawn evenly in their logarithm."""
 HIGHEST_FREQUENCIES = (0.5, 2.0)
-"""Hz; the slowest joint follows to about 0.8 Hz at full amplitude, small motion goes further."""
+"""Range of a multisine's highest frequency, Hz; the slowest joint follows up to about 0.8 Hz at full amplitude, and
+further in small motions."""
 SLOW_SPEEDS = (math.radians(2.0), math.radians(8.0))
+"""Range of the speeds of slow ramps, rad/s."""
 
 
 def drawn_experiment(machine: Machine, number: int, duration: float, seed: int) -> ExperimentSpec:
     """Candidate `number` of a seed: a multisine, slow ramps, or a sequence, at a posture and with gains of its own.
 
-    It may lie outside the limits; whoever plans it refuses it then.
+    It may lie outside the limits; planning it is then refused.
     """
     rng = np.random.default_rng([seed, number])
     kind = KINDS[number % len(KINDS)]
     joints = machine.modelled_joints
     spec = ExperimentSpec(
-        trajectory=kind(rng, joints, duration), joints=joints, start=_start(rng, machine), gains=_gains(rng, machine),
-        settle=0.5, hold=0.5, name=f"candidate-{seed}-{number}",
-    )  # fmt: skip
+        trajectory=kind(rng, joints, duration),
+        joints=joints,
+        start=_start(rng, machine),
+        gains=_gains(rng, machine),
+        settle=0.5,
+        hold=0.5,
+        name=f"candidate-{seed}-{number}",
+    )
     return ExperimentSpec.model_validate(spec.model_dump())
 
 
@@ -55,7 +63,7 @@ def _start(rng: np.random.Generator, machine: Machine) -> dict[int, float]:
 
 
 def _gains(rng: np.random.Generator, machine: Machine) -> dict[int, Gain]:
-    """The machine's own gains, or one step less or more of P on some joints: enough to tell gain from load."""
+    """The machine's own gains, with P one step lower or higher on some joints, so that gain can be told from load."""
     if not isinstance(machine.controller, BoardPid):
         return {}
     gains = {}
@@ -75,10 +83,9 @@ def _amplitudes(rng: np.random.Generator, joints: tuple[int, ...], share: float 
 
 
 def _multisine(rng: np.random.Generator, joints: tuple[int, ...], duration: float) -> Multisine:
-    return Multisine(
-        amplitude=_amplitudes(rng, joints), duration=duration, lowest=0.1,
-        highest=float(rng.uniform(*HIGHEST_FREQUENCIES)), tones=12, seed=int(rng.integers(1, 10_000)),
-    )  # fmt: skip
+    amplitude, highest = _amplitudes(rng, joints), float(rng.uniform(*HIGHEST_FREQUENCIES))
+    seed = int(rng.integers(1, 10_000))
+    return Multisine(amplitude=amplitude, duration=duration, lowest=0.1, highest=highest, tones=12, seed=seed)
 
 
 def _slow_ramps(rng: np.random.Generator, joints: tuple[int, ...], duration: float) -> Sequence:

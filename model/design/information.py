@@ -1,7 +1,7 @@
-"""What an experiment tells about a model's parameters, before it is made: Fisher information of simulated records.
+"""What an experiment will tell about a model's parameters: Fisher information of simulated records.
 
-Samples are weighed by the sensor's noise alone. The real residual is quieter than that at low frequencies (the loop
-suppresses it) and louder near the loop's bandwidth, so a width is predicted within a factor of two or so.
+Samples are weighted by the sensor's noise alone. The real residual is smaller than that at low frequencies, where the
+loop suppresses it, and larger near the loop's bandwidth, so widths are predicted within a factor of about two.
 """
 
 from __future__ import annotations
@@ -28,16 +28,18 @@ from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown, prior_precision, scales
 from model.fitting.whitening import white
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 
 Floats = NDArray[np.float64]
 
 Planner = Callable[[ExperimentSpec], Floats]
-"""Set points (k, joints of the machine) in rad, one row a control period, of an experiment. It raises a DaqError (one
-line) for an experiment that the limits of the machine do not allow. Given from above: planning belongs to `daq`."""
+"""A function that gives the set points (k, joints of the machine) of an experiment in rad, one row a control period. It
+raises a DaqError of one line for an experiment that the limits of the machine do not allow. The caller supplies it,
+since planning belongs to `daq`."""
 
 FOLLOWING_SHARE = 0.6
-"""Of the following error at which set points pause: the real arm may be slower than the model."""
+"""Largest following error of a design, as a share of that at which set points pause: a real arm may be slower."""
 
 
 class _Part(BaseModel):
@@ -54,25 +56,29 @@ class ParameterGain(_Part):
 
     @property
     def share(self) -> float:
-        """What is left of the width."""
+        """Share of the width that is left."""
         return self.after / self.before
 
 
 class InformationGain(_Part):
-    """What proposed experiments would add. `nats` is half the log of the ratio of the volumes of uncertainty."""
+    """What proposed experiments would add. `nats`: half the log of the ratio of the determinants of information."""
 
     parameters: tuple[ParameterGain, ...]
     nats: float
 
 
 def information_gain(
-    model: Model, specs: Sequence[ExperimentSpec], plan: Planner, *, options: FitOptions | None = None,
+    model: Model,
+    specs: Sequence[ExperimentSpec],
+    plan: Planner,
+    *,
+    options: FitOptions | None = None,
     fitted: FitResult | None = None,
-) -> InformationGain:  # fmt: skip
+) -> InformationGain:
     """How much narrower the intervals would be after the proposed experiments.
 
     Args:
-        model: the arm as it is believed to be; it takes the real one's place.
+        model: stands for the real arm.
         options: which parameters count (`FitOptions.parameters`). fitted: what is known already; None: the priors.
 
     Raises SpecError when the experiments are not possible, or the fit was of other parameters.
@@ -128,15 +134,20 @@ def imagined_trace(model: Model, spec: ExperimentSpec, plan: Planner) -> Trace:
     angles = np.asarray(plan(spec), dtype=np.float64)
     period = machine.controller.period.value
     record = TraceRecord(
-        trace_id=spec.name or spec.trajectory.kind, created=datetime(2000, 1, 1, tzinfo=UTC), software="imagined",
-        source="imported", robot=machine.name, spec=spec, gains=spec.gains or None, period=period,
-    )  # fmt: skip
+        trace_id=spec.name or spec.trajectory.kind,
+        created=datetime(2000, 1, 1, tzinfo=UTC),
+        software="imagined",
+        source="imported",
+        robot=machine.name,
+        spec=spec,
+        gains=spec.gains or None,
+        period=period,
+    )
     joints = machine.modelled_joints
     wanted = np.ascontiguousarray(angles[:, [j - 1 for j in joints]])
-    return Trace(
-        record, joints, np.asarray(period * np.arange(len(wanted)), dtype=np.float64), wanted, set_point=wanted,
-        drive=np.zeros_like(wanted), tick=np.arange(len(wanted)),
-    )  # fmt: skip
+    tick = np.arange(len(wanted))
+    time = np.asarray(period * tick, dtype=np.float64)
+    return Trace(record, joints, time, wanted, set_point=wanted, drive=np.zeros_like(wanted), tick=tick)
 
 
 def _check_followed(model: Model, trace: Trace) -> None:
@@ -185,7 +196,7 @@ def _falls_behind(error: Floats, change: Floats, smooth: float, most: float) -> 
 
 
 def _marginal(problem: SimulatedProblem, information: Floats) -> tuple[tuple[Unknown, ...], Floats]:
-    """Information about what is not a nuisance, nuisances known as far as their priors say."""
+    """Information about the unknowns that are no nuisances, which are known as far as their priors say."""
     nuisance = np.array([u.nuisance for u in problem.unknowns])
     own = tuple(u for u in problem.unknowns if not u.nuisance)
     if not nuisance.any():

@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 
 
 class DesignOptions(BaseModel):
-    """How to search. `experiments` of `duration` s each are chosen from `candidates` drawn with `seed`."""
+    """How to search: `experiments` of `duration` s each are chosen from `candidates` drawn with `seed`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -40,9 +40,10 @@ class DesignOptions(BaseModel):
 
 
 class DesignedExperiments(BaseModel):
-    """The experiments chosen, in the order in which they add most, and what they give together.
+    """The chosen experiments, the one that adds most first, and the information that they give together.
 
-    `gains[i]` is what the first i+1 experiments give. `refused` counts candidates outside the limits.
+    `nats[i]` is the information of the first i+1 experiments, beyond that of the priors. `refused` counts candidates
+    outside the limits.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -50,16 +51,19 @@ class DesignedExperiments(BaseModel):
     specs: tuple[ExperimentSpec, ...]
     gain: InformationGain
     nats: tuple[float, ...]
-    """Information after each, over the priors alone."""
     refused: int
     considered: int
     options: DesignOptions
 
 
 def design(
-    model: Model, plan: Planner, options: DesignOptions | None = None, fit_options: FitOptions | None = None,
-    progress: Progress = silent, cancel: Cancel | None = None,
-) -> DesignedExperiments:  # fmt: skip
+    model: Model,
+    plan: Planner,
+    options: DesignOptions | None = None,
+    fit_options: FitOptions | None = None,
+    progress: Progress = silent,
+    cancel: Cancel | None = None,
+) -> DesignedExperiments:
     """Experiments within the limits that make the parameters of `fit_options` best known together.
 
     Greedy choice of the candidate that adds most to log det of the information (priors included), then exchanges as
@@ -74,9 +78,8 @@ def design(
     last_refusal = ""
     for number in range(options.candidates):
         stop_if(cancel)
-        progress(
-            0.95 * number / options.candidates, f"candidate {number + 1} of {options.candidates}, {refused} refused"
-        )
+        count = options.candidates
+        progress(0.95 * number / count, f"candidate {number + 1} of {count}, {refused} refused")
         spec = drawn_experiment(model.machine, number, options.duration, options.seed)
         try:
             unknowns, information = experiment_information(model, spec, plan, fit_options)
@@ -98,9 +101,13 @@ def design(
     )
     progress(1.0, "done")
     return DesignedExperiments(
-        specs=tuple(specs[k] for k in chosen), gain=InformationGain(parameters=gains, nats=nats[-1]), nats=nats,
-        refused=refused, considered=options.candidates, options=options,
-    )  # fmt: skip
+        specs=tuple(specs[k] for k in chosen),
+        gain=InformationGain(parameters=gains, nats=nats[-1]),
+        nats=nats,
+        refused=refused,
+        considered=options.candidates,
+        options=options,
+    )
 
 
 def best_set(prior: Floats, informations: Sequence[Floats], count: int) -> list[int]:

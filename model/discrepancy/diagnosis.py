@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from daq.contracts.experiment import ExperimentSpec
+from model.discrepancy.grounds import ControllerProof, Method, Note, Reason, Refusal
 from model.machine_model.model import Model
 
 ANSWER_FORMAT = 1
@@ -15,6 +17,15 @@ ANSWER_FORMAT = 1
 Verdict = Literal["nothing-significant", "named", "ambiguous", "unknown-effect"]
 Phase = Literal["ramp_start", "steady_ramp", "reversal", "creep", "hold"]
 AgainstWhat = Literal["time", "position", "speed", "direction", "drive"]
+UNWRITTEN = ""
+"""A sentence that the renderer writes once the answer is complete."""
+
+CLEAR_SHAPE = 0.3
+"""Least share of the remaining torque's variance that a dependence must explain to count as a shape that a person could
+write an effect after."""
+FEWEST_BINS = 5
+"""Bins with a torque that such a shape needs: two or three values are no curve. Directions are never more than
+three."""
 
 
 class _Part(BaseModel):
@@ -33,10 +44,10 @@ class FoundValue(_Part):
 class Candidate(_Part):
     """An effect that was tried.
 
-    `evidence` is what it takes off −2 log posterior, its own parameters paid for (BIC; a tone's frequency by the number
-    of tones tried); above 0 it explains more than it costs. `misfit` is the weighted residual
-    that it leaves, per sample: near 1 for the right effect. `refitted` says whether all tolerance parameters were
-    fitted again with it, or it was only probed.
+    `evidence` is the fall of −2 log posterior less the cost of its own parameters (BIC; for a tone's frequency the
+    number of tones tried); above 0 it explains more than it costs. `misfit` is the mean square of the weighted residual
+    that it leaves: near 1 for the right effect. `refitted` says whether all tolerance parameters were fitted again with
+    it, or it was only probed.
     """
 
     effect: str
@@ -91,8 +102,24 @@ class MovingParameter(_Part):
     correlation: float
 
 
+class WorstPlace(_Part):
+    """The joint and phase of motion with the largest residual, `ratio` times its noise. `rms`, `floor`: of the residual
+    and of the noise, in `unit`, in that phase or over the `whole_record`."""
+
+    joint: int
+    phase: Phase
+    ratio: float
+    rms: float | None = None
+    floor: float | None = None
+    unit: str = ""
+    whole_record: bool = False
+
+
 class Where(_Part):
-    """Where simulation and measurement disagree, of a step before it: a one-line summary, and the numbers behind it."""
+    """Where simulation and measurement disagree, for a step before it: a one-line summary, and the numbers behind it.
+
+    `joint`, `phase`: where they disagree most; None where it is no more than noise, which `worst` then tells.
+    """
 
     joint: int | None
     phase: Phase | None
@@ -100,6 +127,7 @@ class Where(_Part):
     cells: tuple[PhaseCell, ...]
     dependences: tuple[Dependence, ...]
     moving: tuple[MovingParameter, ...] = ()
+    worst: WorstPlace | None = None
 
 
 class RemainingShape(_Part):
@@ -116,9 +144,15 @@ class RemainingShape(_Part):
     explained: float
     """Share of the remaining torque's variance that this dependence explains."""
 
+    @property
+    def filled_bins(self) -> int:
+        """Bins in which a torque is known."""
+        return sum(torque is not None for torque in self.torque)
+
 
 class Step(_Part):
-    """One turn of the workflow: what was found, what adding it did."""
+    """One step of the workflow: what was found, what adding it did. `reason` and `rejected_because` are written from
+    the data beside them."""
 
     effect: str | None
     joints: tuple[int, ...]
@@ -140,6 +174,20 @@ class Step(_Part):
     reason: str
     adopted: bool
     rejected_because: str | None = None
+    reason_data: Reason | None = None
+    proof: ControllerProof | None = None
+    """Where the controller's own recorded numbers prove the effect: nothing was fitted for it."""
+    refusal: Refusal | None = None
+
+
+class DifferencePlace(_Part):
+    """Where two candidates would differ most on an experiment: `share` of the difference's square is there.
+    `other_joint`: it is not the joint of the effect."""
+
+    joint: int
+    phase: Phase
+    share: float
+    other_joint: bool
 
 
 class NextExperiment(_Part):
@@ -154,6 +202,13 @@ class NextExperiment(_Part):
     """Standard deviations between the two candidates that are hardest to tell apart, tolerance parameters refitted; 0
     where there are no candidates to separate."""
     reason: str
+    description: str = ""
+    """What the experiment does."""
+    hardest: tuple[str, ...] = ()
+    """The two candidates that are hardest to tell apart."""
+    differs_at: DifferencePlace | None = None
+    information: float | None = None
+    """nats that it would add on the arm's parameters, where there are no candidates to separate."""
 
 
 class Acquired(_Part):
@@ -176,7 +231,7 @@ class Diagnosis(_Part):
     verdict: Verdict
     summary: str
     significant: float | None = None
-    """Evidence from which a first effect is named; None in answers from before it was told."""
+    """Evidence from which a first effect is named; None in older answers."""
     steps: tuple[Step, ...]
     rmse_fit: tuple[SignalError, ...] = ()
     """From the model as it was given to the model that comes out, on the traces it was fitted to."""
@@ -185,7 +240,7 @@ class Diagnosis(_Part):
     where: Where | None = None
     """What is left in the end: the map and dependences of the model that comes out; None in older answers."""
     candidates: tuple[Candidate, ...] = ()
-    """The ranking of the last turn, where nothing was added in it: what was tried against what is left."""
+    """The ranking of the last step, where nothing was added in it: what was tried against what is left."""
     remaining: tuple[RemainingShape, ...] = ()
     next_experiment: NextExperiment | None = None
     acquired: tuple[Acquired, ...] = ()
@@ -198,3 +253,27 @@ class Diagnosis(_Part):
     robot_seconds: float
     notes: tuple[str, ...] = ()
     """Assumptions and limits that a reader of this answer should know."""
+    notes_data: tuple[Note, ...] = ()
+    """The data of `notes`, in the same order; empty in older answers."""
+    method: Method = "output-error"
+    unexplained_joints: tuple[int, ...] = ()
+    """Joints on which more is left than noise, where the verdict is `unknown-effect`."""
+    worse_held_out: tuple[int, ...] = ()
+    """Joints whose held-out error grew although no effect was added: the tolerance parameters were fitted wrongly."""
+
+
+def in_order(candidates: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
+    """The fitted candidates and those that were only probed, each by evidence, the best first.
+
+    The two kinds are not comparable: a fit shows what a candidate takes off the residual, a probe extrapolates it.
+    """
+    best_first = sorted(candidates, key=lambda c: -c.evidence)
+    return [c for c in best_first if c.refitted], [c for c in best_first if not c.refitted]
+
+
+def clear_shape(found: Sequence[RemainingShape]) -> RemainingShape | None:
+    """The dependence that explains most, of those clear enough to be called a shape; None where there is none."""
+    clear = [
+        s for s in found if s.explained >= CLEAR_SHAPE and (s.against == "direction" or s.filled_bins >= FEWEST_BINS)
+    ]
+    return max(clear, key=lambda s: s.explained, default=None)

@@ -1,4 +1,4 @@
-"""How a diagnosis is to be done."""
+"""Options of a diagnosis."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 
 class DiagnosisOptions(BaseModel):
-    """How a diagnosis is to be done; the defaults suit traces of a machine with a known controller.
+    """Options of a diagnosis; the defaults suit traces of a machine with a known controller.
 
     effects: candidates by name; None for the whole library and loaded effects of the user's own.
     joints: on these joints only; None for all that the model moves.
-    most_steps: effects that may be added, one after the other.
-    fitted: candidates a step that are fitted after the probes.
-    polished: best of these whose fit is taken to its end.
+    most_steps: effects that may be added, one after another.
+    fitted: candidates per step that are fitted after the probes.
+    polished: how many of the best fits are taken to their ends.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -32,8 +32,8 @@ class DiagnosisOptions(BaseModel):
     polished: Annotated[int, Field(ge=1, le=100)] = 3
 
 
-class Searched(Protocol):
-    """What the options of any diagnosis say of where to look, and for what."""
+class SearchOptions(Protocol):
+    """Options of either method that limit the search to effects and joints."""
 
     @property
     def effects(self) -> tuple[str, ...] | None:
@@ -44,11 +44,11 @@ class Searched(Protocol):
         """Numbers from 1; None for all that the model moves."""
 
 
-def check_options(options: Searched, model: Model) -> None:
-    """That there is something to look for, where it is looked for.
+def check_options(options: SearchOptions, model: Model) -> None:
+    """Raises SpecError for options that leave nothing to look for.
 
-    Raises SpecError for a joint that the model does not move, an effect that is not in the library, and one of the
-    user's own that acts on other joints.
+    That is a joint that the model does not move, an effect that is not in the library, or a user's own effect that acts
+    on other joints.
     """
     moved = model.machine.modelled_joints
     for joint in options.joints or ():

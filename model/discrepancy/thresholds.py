@@ -1,8 +1,15 @@
-"""Where the lines are drawn. Every number was chosen on tuning arms, none of which is among those that report rates."""
+"""The lines that a diagnosis draws. All were chosen on tuning arms, none of which is among those that report rates."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+FEEDBACK_SHARE = 0.8
+"""Share of the way from the simulated to the recorded reading that the simulated controller is given, where models are
+fitted and compared (docs/decisions/0020). More finds less: the laws of an arm are never exactly a model's, and a torque
+that is a little wrong adds up. With less, what noise has moved looks like a torque."""
+FEEDBACK_SHARE_FOR_ERRORS = 0.5
+"""The same where errors are reported and judged, held-out ones above all: nearer to what the model alone would do."""
 
 
 @dataclass(frozen=True)
@@ -11,23 +18,24 @@ class Thresholds:
 
     Args:
         significant: evidence from which an effect counts as found.
-        echo: share of the evidence already collected that a further effect must bring besides: where the law of an
-            effect that has been added is not exactly the arm's, what is left of it is no effect of its own.
-            distant_echo: the same of what was collected on other joints.
-        kin: share of both that suffices for an effect that another joint has been found to have.
-        margin: evidence over the next answer from which one name is given, instead of a group.
-        unexplained: variance of a joint's error above its floor, in floors, above which something is missing that none
-            of the known effects is. unnamed: the same on the traces fitted to, while no effect has been added; then
-            also where the record is followed as in the fits. place: chance that one place of the map of a sound arm
-            tells the same then.
-        least_share: share of a joint's excess that effects must explain, or they only resemble what is missing.
-        worse: rise of the held-out sum of squares, in its own standard deviations, at which a step is rejected, unless
-            it is less than what is significant, or than the share `lost` of what as many samples have brought on the
-            fitted traces: the tolerance parameters, none of them known for sure, have moved too. It is also rejected
-            where a rise by more than its deviation takes the evidence below what is significant. grown: growth of what
-            is beyond the noise floor of the held-out traces, on the effect's own joints, at which it is rejected as
-            well; stuck joints let go by chance, so not at once.
-        close: evidence within which rivals are fitted to their ends before they are compared.
+        echo: share of the evidence collected so far that a further effect must bring in addition. Where the law of an
+            added effect is not exactly the arm's, its remainder looks like an effect of its own.
+            distant_echo: the same for evidence collected on other joints.
+        kin: factor on that sum for an effect that has been found on another joint already.
+        margin: lead in evidence from which one name is given, instead of a group.
+        unexplained: excess variance of a joint's error, relative to its noise floor, above which something outside the
+            library is missing. unnamed: the same on the fitted traces while no effect has been added; it then also
+            holds for the residual of the fits themselves. place: probability that some cell of a sound arm's map is
+            called significant then.
+        least_share: share of a joint's excess variance that effects must explain; with less they only resemble what is
+            missing.
+        worse: rise of the held-out sum of squares, in its standard deviations, at which a step is rejected. A rise is
+            tolerated while it is less than `significant`, or than the share `lost` of what as many samples brought on
+            the fitted traces: the tolerance parameters, none of them known for sure, have moved too. A step is also
+            rejected where a rise by more than one deviation takes the evidence below `significant`. grown: relative
+            growth of the held-out excess variance on the effect's own joints at which it is rejected as well; not 0,
+            because stuck joints break loose by chance.
+        close: lead in evidence below which rivals are fitted to their ends before they are compared.
         interesting: gain of a probe below which no candidate is worth a fit.
     """
 
@@ -47,10 +55,11 @@ class Thresholds:
     interesting: float = 12.0
 
     def needed(self, here: float = 0.0, elsewhere: float = 0.0, *, kin: bool = False) -> float:
-        """Evidence from which a further effect counts as found; so much was collected on its joints, and on others.
+        """Evidence from which a further effect counts as found.
 
         Args:
-            kin: whether the same effect has been found before.
+            here, elsewhere: evidence collected on its own joints and on others. kin: whether the same effect has been
+                found before.
         """
         line = self.significant + self.echo * here + self.distant_echo * elsewhere
         return line * self.kin if kin else line

@@ -6,10 +6,13 @@ import math
 from collections.abc import Sequence
 
 from model.discrepancy.diagnosis import SignalError, Step, Verdict
+from model.discrepancy.grounds import Refusal
 from model.discrepancy.thresholds import Thresholds
 
 LEAST_EXCESS = 0.25
 """Least relative excess variance for which a removed share is reported; a 17 s record resolves it to ±0.06."""
+GROWN = 1.1
+"""Ratio of a joint's mean square errors on held-out traces, above which a fit has made them worse beyond noise."""
 SCATTER = 4.0
 """Standard deviations of an estimated variance, within which it may exceed its floor by chance."""
 
@@ -42,6 +45,22 @@ def excess_removed(errors: Sequence[SignalError]) -> float | None:
     """
     shown = [(before, after) for before, after in map(excess_variance, errors) if before >= LEAST_EXCESS]
     return 1.0 - sum(after for _, after in shown) / sum(before for before, _ in shown) if shown else None
+
+
+def rises_too_much(rise: float, deviation: float, fall: float, evidence: float, thresholds: Thresholds) -> bool:
+    """Whether the held-out sum of squares rises by more than an effect may cost there.
+
+    Args:
+        rise, deviation: of that sum, and the standard deviation that noise gives it. fall: of the fitted sum, for as
+            many samples. evidence: of the effect.
+    """
+    by_chance = max(thresholds.worse * deviation, thresholds.lost * fall, thresholds.significant)
+    return rise > min(by_chance, max(deviation, evidence - thresholds.significant))
+
+
+def worse_held_out(held: Sequence[SignalError]) -> tuple[int, ...]:
+    """Joints whose error on held-out traces has grown beyond what noise may do."""
+    return tuple(e.joint for e in held if (e.after / e.floor) ** 2 > GROWN * (e.before / e.floor) ** 2 + LEAST_EXCESS)
 
 
 def unexplained(
@@ -79,6 +98,5 @@ def first_to_withdraw(steps: Sequence[Step], left: Sequence[int]) -> int | None:
 
 def withdrawn(step: Step, left: Sequence[int]) -> Step:
     """The step, not taken into the model after all."""
-    where = f"joint{'s' if len(left) > 1 else ''} {', '.join(map(str, left))}"
-    why = f"it only resembles what is missing: with all that was found, {where} still disagrees beyond noise"
-    return step.model_copy(update={"adopted": False, "rejected_because": why}) if step.adopted else step
+    why = Refusal(kind="only-resembles", joints=tuple(left))
+    return step.model_copy(update={"adopted": False, "refusal": why}) if step.adopted else step

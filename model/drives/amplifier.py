@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from model import layout as at
 from model.drives.piecewise import clamped, outside
 from model.dynamics.compilation import internal
-from model.machine_model import layout as at
 
 
 @internal
@@ -20,9 +20,8 @@ def motor_volts(command: complex, joint: NDArray[Any]) -> Any:
 
 @internal
 def warmed(
-    rise: complex, hot: complex, volts: complex, begun: complex, ended: complex, mean: complex, duration: complex,
-    joint: NDArray[Any],
-) -> Any:  # fmt: skip
+    rise: Any, hot: Any, volts: Any, begun: Any, ended: Any, mean: Any, duration: Any, joint: NDArray[Any]
+) -> Any:
     """Relative rise of the winding's resistance after `duration` s at constant volts: heated by i², cooled with a time
     constant.
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from model import layout as at
 from model.drives.piecewise import clamped, rounded_half_up
 from model.dynamics.compilation import compiled
-from model.machine_model import layout as at
 
 POWER_MAX = 127.0
 """Largest magnitude of the 8-bit DAC's signed input."""

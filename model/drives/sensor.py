@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from model import layout as at
 from model.drives.piecewise import rounded_half_up
 from model.dynamics.compilation import compiled
 from model.dynamics.dual import sin_cos
-from model.machine_model import layout as at
 
 
 @compiled

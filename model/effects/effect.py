@@ -59,7 +59,7 @@ class EffectParameter:
 
     Args:
         name: last part of the parameter's full name.
-        column: where it lies (`model.machine_model.layout`), a joint's column or, for the whole machine, a shared slot.
+        column: where it lies (`model.layout`), a joint's column or, for the whole machine, a shared slot.
         unit: in SI.
         null: value at which the effect is not there; None for a parameter that only shapes it.
         start: value when the effect is added without one: the null value, or a typical shape.

@@ -11,8 +11,8 @@ from typing import Any
 
 from daq.contracts.effects import effect_names
 from daq.contracts.errors import SpecError
+from model import layout as at
 from model.effects.effect import Effect, EffectFile, EffectParameter
-from model.machine_model import layout as at
 
 ARGUMENTS = ("position", "speed", "drive", "load", "time")
 """What the torque of an own effect may depend on beside its parameters."""
@@ -87,9 +87,16 @@ def as_library_effect(own: OwnEffect, file: EffectFile) -> Effect:
     if all(p.null is None for p in own.parameters):
         raise SpecError(f"{where}: no parameter has a null value; at least one must, at which the effect is not there")
     return Effect(
-        own.name, own.physics, own.source, tuple(_parameter(p, k) for k, p in enumerate(own.parameters)),
-        flag=at.HAS_USER_EFFECT, joints=own.joints, family=own.family, torque=own.torque, file=file,
-    )  # fmt: skip
+        own.name,
+        own.physics,
+        own.source,
+        tuple(_parameter(p, k) for k, p in enumerate(own.parameters)),
+        flag=at.HAS_USER_EFFECT,
+        joints=own.joints,
+        family=own.family,
+        torque=own.torque,
+        file=file,
+    )
 
 
 def _check_arguments(own: OwnEffect, where: str) -> None:
@@ -123,6 +130,13 @@ def _check_parameter(p: OwnParameter, where: str) -> None:
 
 def _parameter(p: OwnParameter, place: int) -> EffectParameter:
     return EffectParameter(
-        p.name, at.USER + place, p.unit, null=p.null, start=p.start, low=p.low, high=p.high, deviation=p.deviation,
+        p.name,
+        at.USER + place,
+        p.unit,
+        null=p.null,
+        start=p.start,
+        low=p.low,
+        high=p.high,
+        deviation=p.deviation,
         source=p.source,
-    )  # fmt: skip
+    )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from model import layout as at
 from model.effects.effect import Effect, EffectParameter, JointScale
-from model.machine_model import layout as at
 
 
 def _bend(scale: JointScale) -> float:

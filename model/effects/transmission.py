@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from model import layout as at
 from model.effects.effect import Effect, EffectParameter, JointScale
-from model.machine_model import layout as at
 
 CONTACT_RATE = 1500.0
 """rad/s at which parts in contact swing against each other at most: what steps of 1 ms carry (RK4 to 2785)."""

@@ -1,4 +1,4 @@
-"""Which numbers of a model a fit changes, with bounds and priors, and the nuisances that go with them."""
+"""Which parameters of a model a fit changes, with bounds and priors, and the nuisance parameters beside them."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
+from model import layout as at
 from model.fitting.options import FitOptions, Prior
 from model.fitting.records import Record, Signal, resolution, sensor_deviation
 from model.fitting.unknowns import Unknown
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter, initial_position, presliding, presliding_shape
 
@@ -22,13 +22,19 @@ BEND_SHARE = 0.5
 """Standard deviation of a bend's first term as a share of the stated linearity; later terms fall as one over their
 number, which makes the whole curve stay within the linearity in about nine of ten cases."""
 SLIDING_FRICTION = (
-    "coulomb_friction", "load_dependent_friction", "stribeck_friction", "direction_dependent_friction", "gear_loss",
+    "coulomb_friction",
+    "load_dependent_friction",
+    "stribeck_friction",
+    "direction_dependent_friction",
+    "gear_loss",
     "stiction",
-)  # fmt: skip
+)
+"""Effects whose torque builds up over the presliding distance."""
 PRESLIDING_SHARE = 0.5
 """Standard deviation of the presliding distance as a share of what the model assumes: an assumption."""
 SHAPE, SHAPE_DEVIATION = 0.5, 0.5
-"""Of the rise of friction where motion turns: 0 is Prandtl's law, 1 is Dahl's; which it is, is not known."""
+"""Expected shape of the rise of friction where motion turns, and its standard deviation: 0 is Prandtl's law and 1 is
+Dahl's, and nothing tells which of them holds."""
 
 
 def chosen_unknowns(model: Model, options: FitOptions) -> tuple[Unknown, ...]:
@@ -48,7 +54,7 @@ def chosen_unknowns(model: Model, options: FitOptions) -> tuple[Unknown, ...]:
 
 
 def with_bends(model: Model, options: FitOptions, signal: Signal) -> tuple[Model, tuple[Unknown, ...]]:
-    """The model with potentiometers that may bend, and the bends as nuisances; both unchanged where not wanted."""
+    """The model with bent potentiometers, and the bends as nuisance parameters; the model alone where not wanted."""
     if options.sensor_bend is False or signal != "position":
         return model, ()
     taken = {j for use in model.effects if use.name == BEND for j in use.joints}
@@ -75,7 +81,7 @@ def with_bends(model: Model, options: FitOptions, signal: Signal) -> tuple[Model
 
 
 def start_postures(machine: Machine, records: Sequence[Record], bends: bool) -> tuple[Unknown, ...]:
-    """One unknown a record and joint: how far the arm starts off the posture it was read at."""
+    """One unknown for each record and joint: how far the arm starts off the posture that was read."""
     found = []
     for t in range(len(records)):
         for joint in machine.modelled_joints:

@@ -12,9 +12,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from model.arrays import Floats
 
 BANDWIDTH = 50
 """Samples over which scores are taken to be correlated: one second at 50 Hz, longer than a reversal, shorter

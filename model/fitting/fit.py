@@ -7,14 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import NoController
 from daq.contracts.progress import Cancel, CancelledError, Never, Progress, silent
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.fitting.choice import chosen_unknowns, friction_forms, start_postures, with_bends
 from model.fitting.covariance import sandwich
+from model.fitting.identifiability import IdentifiabilityReport, ParameterVerdict, judged
 from model.fitting.least_squares import Search, Solution, solve
 from model.fitting.nelder_mead import climb
 from model.fitting.noise import expected_residual
@@ -26,33 +27,33 @@ from model.fitting.robust import influence
 from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown, prior_precision, scales
 from model.fitting.whitening import Whitener, fitted_whitener, white
-from model.identifiability.report import IdentifiabilityReport, ParameterVerdict, judged
 from model.machine_model.model import Lineage, Model
-
-Floats = NDArray[np.float64]
 
 INTERVAL = 1.959964
 """Standard deviations on either side that hold 95 % of a Gaussian."""
 SETTLED = 0.33
-"""Deviations by which a round may still move the values."""
+"""Largest move of the values in a round, in their deviations, with which the rounds end."""
 LEAST_SQUARES_EVALUATIONS = 60
 ROUND_EVALUATIONS = 2
-"""In a round that is not the last: the next one changes the weights anyway."""
+"""Most evaluations in a round that is not the last: the next round changes the weights anyway."""
 FIRST_TOLERANCE = 100.0
-"""Times the tolerance of the rounds: the first search only has to come near."""
+"""Tolerance of the first search, as a multiple of that of the rounds: it only has to come near."""
 SIMPLEX_EVALUATIONS = 400
-"""A parameter."""
+"""Most evaluations of Nelder and Mead's search for each parameter."""
 
 
 def fit(
-    model: Model, traces: Sequence[Trace], options: FitOptions | None = None, progress: Progress = silent,
+    model: Model,
+    traces: Sequence[Trace],
+    options: FitOptions | None = None,
+    progress: Progress = silent,
     cancel: Cancel | None = None,
-) -> FitResult:  # fmt: skip
+) -> FitResult:
     """The parameters with which the model best repeats the traces, and how far each can be trusted.
 
-    Output error: the model's own loop follows the recorded set points, and its readings are compared with the recorded
-    ones. A first search weighs every sample by the sensor's noise. Then, in rounds, what the noise does on average is
-    taken off, residual and Jacobian are whitened, and the search goes on from where it was.
+    This is an output-error fit: the model's own loop follows the recorded set points, and its readings are compared
+    with the recorded ones. A first search weighs every sample by the sensor's noise. Then, in rounds, the mean effect
+    of the noise is subtracted, residual and Jacobian are whitened, and the search goes on from where it was.
 
     Raises:
         TraceError, SpecError: for traces or options that cannot give a result; one line says why.
@@ -102,10 +103,9 @@ def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> S
         postures = start_postures(model.machine, records, bool(bends))
     forms = friction_forms(wider) if options.friction_form and not simple else ()
     loop = options.loop or ("open" if isinstance(model.machine.controller, NoController) else "closed")
-    return SimulatedProblem(
-        wider, records, (*unknowns, *bends, *forms, *postures), noise_floor(records, model.machine, signal), signal,
-        loop, options.step,
-    )  # fmt: skip
+    every = (*unknowns, *bends, *forms, *postures)
+    floor = noise_floor(records, model.machine, signal)
+    return SimulatedProblem(wider, records, every, floor, signal, loop, options.step)
 
 
 def _signal(model: Model, options: FitOptions) -> Signal:
@@ -163,7 +163,7 @@ def _beginnings(problem: SimulatedProblem, options: FitOptions) -> list[Floats]:
 def _with_noise(
     problem: SimulatedProblem, values: Floats, options: FitOptions
 ) -> tuple[SimulatedProblem, list[Whitener]]:
-    """The problem less what the noise does on average, and the whitening that its residual then asks for."""
+    """The problem with the mean effect of the noise subtracted, and whiteners fitted to its residual."""
     if options.replicas and problem.loop == "closed" and problem.signal == "position":
         problem = problem.with_offset(expected_residual(problem, values, options.replicas, options.seed))
     evaluations = problem.evaluate(values, derivatives=False)
@@ -179,8 +179,8 @@ def _with_noise(
 
 @dataclass(frozen=True)
 class _Estimate:
-    """At the solution; `after` is without what the noise does on average: simulated − measured as anybody
-    would see it."""
+    """What is estimated at the solution. `after` is simulated − measured as it stands, with what the noise does on
+    average left in."""
 
     covariance: Floats
     report: IdentifiabilityReport
@@ -207,8 +207,8 @@ def _estimate(
 
 
 def _settled(last: Floats, solution: Solution) -> bool:
-    """Whether the last round moved less than it matters, in the mean over all directions. Replicas differ from round to
-    round like other draws of the noise, which alone moves every direction by a third of its deviation."""
+    """Whether the last round moved the values by less than matters, in the mean over all directions. The replicas of
+    each round are new draws of the noise, which alone move every direction by a third of its deviation."""
     if solution.information is None:
         return True
     moved = solution.values - last
@@ -216,17 +216,25 @@ def _settled(last: Floats, solution: Solution) -> bool:
 
 
 def _result(
-    model: Model, problem: SimulatedProblem, solution: Solution, estimate: _Estimate, before: Sequence[Evaluation],
-    options: FitOptions, seconds: float,
-) -> FitResult:  # fmt: skip
+    model: Model,
+    problem: SimulatedProblem,
+    solution: Solution,
+    estimate: _Estimate,
+    before: Sequence[Evaluation],
+    options: FitOptions,
+    seconds: float,
+) -> FitResult:
     names = tuple(u.name for u in problem.unknowns)
     own = {u.name: float(v) for u, v in zip(problem.unknowns, solution.values, strict=True) if not u.nuisance}
     identities = tuple(record.name for record in problem.records)
     errors = _errors(model, problem, before, estimate.after)
     summary = {
-        "rmse": [e.after for e in errors], "whitened_mean_square": estimate.mean_square,
-        "converged": solution.converged, "fitted": list(own), "known": list(estimate.report.known),
-    }  # fmt: skip
+        "rmse": [e.after for e in errors],
+        "whitened_mean_square": estimate.mean_square,
+        "converged": solution.converged,
+        "fitted": list(own),
+        "known": list(estimate.report.known),
+    }
     fitted = model.with_values(own).with_lineage(Lineage(parent=model.identity, traces=identities, fit=summary))
     deviations = np.sqrt(np.diag(estimate.covariance))
     parameters = tuple(
@@ -235,25 +243,44 @@ def _result(
         if not u.nuisance
     )
     return FitResult(
-        model=fitted, parameters=parameters, identifiability=estimate.report, errors=errors,
-        whitened_mean_square=estimate.mean_square, names=names, values=tuple(map(float, solution.values)),
-        covariance=tuple(tuple(map(float, row)) for row in estimate.covariance), traces=identities,
-        samples=sum(r.samples for r in problem.records), options=options, evaluations=solution.evaluations,
-        seconds=seconds, converged=solution.converged, message=solution.message,
-    )  # fmt: skip
+        model=fitted,
+        parameters=parameters,
+        identifiability=estimate.report,
+        errors=errors,
+        whitened_mean_square=estimate.mean_square,
+        names=names,
+        values=tuple(map(float, solution.values)),
+        covariance=tuple(tuple(map(float, row)) for row in estimate.covariance),
+        traces=identities,
+        samples=sum(r.samples for r in problem.records),
+        options=options,
+        evaluations=solution.evaluations,
+        seconds=seconds,
+        converged=solution.converged,
+        message=solution.message,
+    )
 
 
 def fitted_parameter(u: Unknown, value: float, deviation: float, verdict: ParameterVerdict) -> FittedParameter:
-    """What is said of a parameter: no number and no interval where the data do not determine it."""
+    """The result for one parameter, without a number and an interval where the data do not determine it."""
     near = 1e-6 * u.scale
     at_bound = "low" if value - u.low < near else "high" if u.high - value < near else None
     known = verdict.verdict == "known"
     return FittedParameter(
-        name=u.name, unit=u.unit, verdict=verdict.verdict, reason=verdict.reason, value=value if known else None,
-        deviation=deviation if known else None, low=max(u.low, value - INTERVAL * deviation) if known else None,
-        high=min(u.high, value + INTERVAL * deviation) if known else None, model_value=value, before=u.start,
-        expected=None if u.deviation is None else u.expected, expected_deviation=u.deviation, at_bound=at_bound,
-    )  # fmt: skip
+        name=u.name,
+        unit=u.unit,
+        verdict=verdict.verdict,
+        reason=verdict.reason,
+        value=value if known else None,
+        deviation=deviation if known else None,
+        low=max(u.low, value - INTERVAL * deviation) if known else None,
+        high=min(u.high, value + INTERVAL * deviation) if known else None,
+        model_value=value,
+        before=u.start,
+        expected=None if u.deviation is None else u.expected,
+        expected_deviation=u.deviation,
+        at_bound=at_bound,
+    )
 
 
 def _errors(

@@ -6,26 +6,25 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, stop_if
+from model.arrays import Floats
+from model.fitting.bounded_step import bounded_step
 from model.fitting.problem import Problem, whitened
 from model.fitting.robust import huber
 from model.fitting.unknowns import prior_precision, scales
 from model.fitting.whitening import Whitener
 
-Floats = NDArray[np.float64]
-
 DIVERGED = 1e3
-"""Whitened residual of every sample where the model has no finite answer: a wall that the search turns away from."""
-
-
-FIRST_DAMPING, LEAST_DAMPING, TINY = 1e-3, 1e-9, 1e-12
-"""Shares of the information's diagonal, and what keeps it positive where nothing is known at all."""
+"""Whitened residual given to every sample where the model has no finite answer, so that the search turns back."""
+FIRST_DAMPING, LEAST_DAMPING = 1e-3, 1e-9
+"""Damping of the first step and the least damping, as shares of the information's diagonal (Marquardt 1963)."""
+TINY = 1e-12
+"""Added to the diagonal of the damped information, which keeps it positive where nothing is known at all."""
 LEAST_GAIN, FAIR_GAIN, GOOD_GAIN = 1e-3, 0.25, 0.6
-"""Of what a step promised: below the first it is not taken, below the second the next is shorter, above the third the
-Jacobian is good for another."""
+"""Shares of the promised fall in cost: below the first a step is not taken, below the second the next step is damped
+more, above the third the Jacobian serves for another step."""
 
 
 @dataclass(frozen=True)
@@ -106,10 +105,9 @@ def solve(
 ) -> Solution:
     """The values that minimise Σ ρ(whitened residual²) + Σ ((value − expected)/deviation)², within the bounds.
 
-    Levenberg and Marquardt's damping with Huber's weights; values that a step would take over a bound are held there
-    and the others solved for again. A Jacobian costs some thirty simulations and a step one, so a Jacobian serves as
-    long as its steps gain what they promise; the search ends by a new one only. A step on which the simulation diverges
-    is turned away.
+    The search is Levenberg and Marquardt's with Huber's weights and bounded steps (`bounded_step`). A Jacobian costs
+    some thirty simulations and a step one, so a Jacobian serves as long as its steps gain what they promise; only a new
+    Jacobian can end the search. A step on which the simulation diverges is not taken.
 
     Args:
         begin: (p,) values to begin from, moved inside the bounds where they lie on one.
@@ -131,7 +129,8 @@ def solve(
             jacobian, fresh = objective.jacobian(x), True
             information = (jacobian * weights[:, None]).T @ jacobian
         gradient = jacobian.T @ (weights * residual)
-        step = _step(information, gradient, damping, low - x, high - x)
+        damped = information + damping * np.diag(np.diag(information)) + TINY * np.eye(len(gradient))
+        step = bounded_step(damped, -gradient, low - x, high - x)
         promised = -float(gradient @ step + 0.5 * step @ information @ step)
         if promised <= search.tolerance * cost:
             if fresh:
@@ -150,10 +149,9 @@ def solve(
     if jacobian.size == 0:
         jacobian = objective.jacobian(x)
         information = (jacobian * weights[:, None]).T @ jacobian
-    return Solution(
-        objective.values(x), cost, objective.evaluations, bool(message), message or "as many evaluations as allowed",
-        information / np.outer(objective.scale, objective.scale),
-    )  # fmt: skip
+    information = information / np.outer(objective.scale, objective.scale)
+    converged, reason = bool(message), message or "as many evaluations as allowed"
+    return Solution(objective.values(x), cost, objective.evaluations, converged, reason, information)
 
 
 def _cost_and_weights(residual: Floats, samples: int, robust: bool) -> tuple[float, Floats]:
@@ -162,23 +160,6 @@ def _cost_and_weights(residual: Floats, samples: int, robust: bool) -> tuple[flo
         return 0.5 * float(residual @ residual), np.ones_like(residual)
     loss = huber(residual**2, samples)
     return 0.5 * float(loss[0].sum()), loss[1]
-
-
-def _step(information: Floats, gradient: Floats, damping: float, low: Floats, high: Floats) -> Floats:
-    """The damped step within what is left to the bounds (low ≤ 0 ≤ high)."""
-    step = np.zeros_like(gradient)
-    held = np.zeros(len(gradient), dtype=bool)
-    damped = information + damping * np.diag(np.diag(information)) + TINY * np.eye(len(gradient))
-    while not held.all():
-        free = ~held
-        pull = gradient[free] + damped[np.ix_(free, held)] @ step[held]
-        step[free] = -np.linalg.solve(damped[np.ix_(free, free)], pull)
-        outside = free & ((step < low) | (step > high))
-        if not outside.any():
-            break
-        step[outside] = np.clip(step, low, high)[outside]
-        held |= outside
-    return step
 
 
 def _inside(x: Floats, low: Floats, high: Floats) -> Floats:

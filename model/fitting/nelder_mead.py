@@ -5,21 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, stop_if
+from model.arrays import Floats
 from model.fitting.least_squares import Solution
 from model.fitting.problem import Problem
 from model.fitting.unknowns import scales
 
-Floats = NDArray[np.float64]
-
 
 def climb(
-    problem: Problem, begin: Floats, cancel: Cancel, most_evaluations: int, tolerance: float = 1e-6,
-    tell: Callable[[int, float], None] | None = None, goal: float | None = None,
-) -> Solution:  # fmt: skip
+    problem: Problem,
+    begin: Floats,
+    cancel: Cancel,
+    most_evaluations: int,
+    tolerance: float = 1e-6,
+    tell: Callable[[int, float], None] | None = None,
+    goal: float | None = None,
+) -> Solution:
     """Values that minimise the mean squared error summed over the joints, without priors, weights or derivatives.
 
     `goal`: end as soon as that mean squared error is reached. A simulation that diverges counts as infinitely bad.
@@ -53,8 +56,9 @@ def climb(
         return mean
 
     simplex = _first_simplex(np.array([b[0] for b in bounds]), np.array([b[1] for b in bounds]))
-    options = {"maxfev": most_evaluations, "fatol": tolerance * problem.floor.max() ** 2, "xatol": tolerance,
-               "initial_simplex": simplex, "adaptive": True}  # fmt: skip
+    least = tolerance * problem.floor.max() ** 2
+    ends = {"maxfev": most_evaluations, "fatol": least, "xatol": tolerance}
+    options = {**ends, "initial_simplex": simplex, "adaptive": True}
     try:
         start = np.zeros(len(begin))
         # The stubs know no tuple of floats as bounds.

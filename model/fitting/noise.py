@@ -11,11 +11,9 @@ the derivatives correlate with the residual, and inertia and delay come out wron
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.fitting.simulated import SimulatedProblem
-
-Floats = NDArray[np.float64]
 
 
 def expected_residual(problem: SimulatedProblem, values: Floats, replicas: int, seed: int) -> list[Floats]:

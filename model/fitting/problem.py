@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.fitting.unknowns import Unknown
 from model.fitting.whitening import Whitener
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

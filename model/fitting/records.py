@@ -8,14 +8,13 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import TraceError
 from daq.contracts.machine import Machine, NoController, Sensor
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.simulation.inputs import RunInputs, inputs_of
 
-Floats = NDArray[np.float64]
 Signal = Literal["position", "velocity"]
 
 LEAST_SAMPLES = 10

@@ -11,8 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from daq.contracts.documents import parse_json, read_text
 from daq.contracts.errors import SpecError
+from model.fitting.identifiability import IdentifiabilityReport, Verdict
 from model.fitting.options import FitOptions
-from model.identifiability.report import IdentifiabilityReport, Verdict
 from model.machine_model.model import Model
 
 RESULT_FORMAT = 1

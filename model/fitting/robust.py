@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from model.arrays import Floats
 
 THRESHOLD = 4.0
 """Standard deviations beyond which a residual counts as an outlier; Gaussian noise reaches it once in 16 000

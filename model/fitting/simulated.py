@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from model.arrays import Floats
 from model.dynamics.dual import DUAL_STEP
 from model.fitting.problem import Evaluation
 from model.fitting.records import Record, Signal
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
-from model.simulation.engines import engine_for
-from model.simulation.period import OUT_READING, OUT_SPEED, OUTPUTS
-from model.simulation.simulate import LONGEST_STEP, Options, Prepared, at_rows, prepare
-
-Floats = NDArray[np.float64]
+from model.simulation.batch import BatchRun, seed
+from model.simulation.period import OUT_READING, OUT_SPEED
+from model.simulation.prepared import LONGEST_STEP, Options, Prepared, prepare
+from model.simulation.simulate import at_rows
 
 
 @dataclass(frozen=True)
@@ -76,16 +76,8 @@ class SimulatedProblem:
         ]
         vector, initials = self._state(values)
         count = len(prepared)
-        out = np.zeros((count, OUTPUTS, max(len(r.inputs) for r in self.records), self.model.joint_count))
-        engine_for(self.model).run(
-            prepared,
-            np.arange(count),
-            np.tile(vector, (count, 1)),
-            np.array(initials),
-            self.model.flags,
-            self.step,
-            out,
-        )
+        vectors = np.tile(vector, (count, 1))
+        out = BatchRun(self.model, prepared, np.arange(count), vectors, np.array(initials), self.step).run()
         if not np.isfinite(out).all():
             raise SpecError("a simulation with noise does not stay finite: the loop is unstable")
         return [at_rows(out[t, OUT_READING, : len(r.inputs)], r.inputs.rows) for t, r in enumerate(self.records)]
@@ -122,14 +114,8 @@ class SimulatedProblem:
         starts = np.array([initials[t] for t in which], dtype=dtype)
         for row, unknown in enumerate(seeds):
             if unknown >= 0:
-                parameter = self.unknowns[unknown].parameter
-                vectors[row, list(parameter.slots)] += 1j * DUAL_STEP
-                if parameter.initial is not None:
-                    starts[row][parameter.initial] += 1j * DUAL_STEP
-        longest = max(len(r.inputs) for r in self.records)
-        out: NDArray[Any] = np.zeros((len(which), OUTPUTS, longest, self.model.joint_count), dtype=dtype)
-        engine = engine_for(self.model)
-        engine.run(self._prepared, np.array(which, dtype=np.int64), vectors, starts, self.model.flags, self.step, out)
+                seed(self.unknowns[unknown].parameter, vectors[row], starts[row])
+        out = BatchRun(self.model, self._prepared, np.array(which, dtype=np.int64), vectors, starts, self.step).run()
         column = OUT_SPEED if self.signal == "velocity" else OUT_READING
         return self._at_samples(out[:, column], which, seeds, derivatives)
 

@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from model.arrays import Floats
 from model.machine_model.parameter import Kind, Parameter
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

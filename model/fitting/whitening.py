@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
-Floats = NDArray[np.float64]
+from model.arrays import Floats
 
 
 @dataclass(frozen=True)

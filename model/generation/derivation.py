@@ -66,13 +66,11 @@ def in_effective_parameters(full: Dynamics) -> Dynamics:
         ValueError: if the lumping is wrong.
     """
     p = {symbol.name.upper(): symbol for symbol in EFFECTIVE}
-    kept = {
-        "s1x": "S1_X", "s1z": "S1_Z", "i1yy": "WAIST",
-        "s2x": "S2_X", "s2y": "S2_Y", "i2xy": "I2_XY", "i2xz": "I2_XZ",
-        "i2yy": "I2_YY_XX", "i2yz": "I2_YZ", "i2zz": "I2_ZZ",
-        "s3x": "S3_X", "s3y": "S3_Y", "i3xy": "I3_XY", "i3xz": "I3_XZ",
-        "i3yy": "I3_YY_XX", "i3yz": "I3_YZ", "i3zz": "I3_ZZ",
-    }  # fmt: skip
+    kept = {"s1x": "S1_X", "s1z": "S1_Z", "i1yy": "WAIST"}
+    for link in (2, 3):
+        kept |= {f"s{link}{axis}": f"S{link}_{axis.upper()}" for axis in ("x", "y")}
+        kept |= {f"i{link}{axes}": f"I{link}_{axes.upper()}" for axes in ("xy", "xz", "yz", "zz")}
+        kept[f"i{link}yy"] = f"I{link}_YY_XX"
     own = {s: p[kept[s.name]] if s.name in kept else sp.Integer(0) for link in LINKS for s in link}
     own |= {ROTORS[0]: sp.Integer(0), ROTORS[1]: sp.Integer(0), ROTORS[2]: p["ROTOR_3"]}
     own |= {OFFSET_2: sp.Integer(0), LENGTH_2: p["LENGTH_2"]}

@@ -15,6 +15,7 @@ from daq.contracts.trace import Trace
 from model.fitting.choice import chosen_unknowns
 from model.fitting.covariance import sandwich
 from model.fitting.fit import fitted_parameter
+from model.fitting.identifiability import IdentifiabilityReport, judged
 from model.fitting.least_squares import Search, solve
 from model.fitting.options import FitOptions
 from model.fitting.problem import whitened
@@ -23,7 +24,6 @@ from model.fitting.result import FittedParameter
 from model.fitting.robust import influence
 from model.fitting.unknowns import prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
-from model.identifiability.report import IdentifiabilityReport, judged
 from model.inverse_dynamics.problem import TorqueProblem
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance

@@ -14,9 +14,9 @@ from scipy.signal import welch
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
-from model.analysis.bodies import chain_of
 from model.dynamics.recursive import mass_matrix
 from model.machine_model.model import Model
+from model.simulation.chain_of_model import chain_of
 
 Floats = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from model import layout as at
 from model.drives.amplifier import motor_volts, warmed
 from model.dynamics import recursive
 from model.dynamics.compilation import compiled, internal
 from model.kinematics.chain import ChainArrays
-from model.machine_model import layout as at
 from model.simulation.dynamics_of_run import chain_levels
 from model.simulation.joint_torques import CURRENT, RISE, STATE, extra_torque, steady_current, winding_functions
 from model.simulation.own_torque import own_torque

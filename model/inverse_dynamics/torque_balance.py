@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from model import layout as at
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
 from model.kinematics.chain import ChainArrays
-from model.machine_model import layout as at
 from model.machine_model.model import Model
+from model.machine_model.nominal import is_rod_arm
 from model.simulation.bodies import chain_body
-from model.simulation.engines import is_rod_arm
 from model.simulation.own_table import own_table
 
 Floats = NDArray[np.float64]

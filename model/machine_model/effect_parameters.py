@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from daq.contracts.machine import Friction, Machine
 from daq.contracts.quantity import Quantity
+from model import layout as at
 from model.effects.effect import Effect, EffectParameter, JointScale, sized
 from model.effects.library import effect
-from model.machine_model import layout as at
 from model.machine_model.nominal import joint_scale
 from model.machine_model.parameter import Kind, Parameter
 

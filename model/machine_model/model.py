@@ -23,9 +23,9 @@ from pydantic import (
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
+from model import layout as at
 from model.effects.effect import EffectFile
 from model.effects.library import effect, effect_from
-from model.machine_model import layout as at
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.nominal import base_parameters, joint_scale, nominal_vector
 from model.machine_model.parameter import Parameter

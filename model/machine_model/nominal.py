@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import BoardPid, Body, Cylinder, DcMotor, Joint, Machine, NoController, PlainGain, Rod
 from daq.contracts.quantity import Quantity
+from model import layout as at
 from model.effects.effect import JointScale
 from model.effects.transmission import contact_compliance
-from model.machine_model import layout as at
 from model.machine_model.parameter import Kind, Parameter
 
 NO_LIMIT = 1e9
@@ -163,13 +163,31 @@ def joint_scale(machine: Machine, number: int) -> JointScale:
     friction = joint.friction.viscous_motor_side or joint.friction.viscous
     controller = machine.controller
     return JointScale(
-        torque=torque, volts=volts, strongest=torque if bounded else math.inf, highest=volts if bounded else math.inf,
-        speed=speed or 1.0, resolution=range_ / counts, range=range_,
+        torque=torque,
+        volts=volts,
+        strongest=torque if bounded else math.inf,
+        highest=volts if bounded else math.inf,
+        speed=speed or 1.0,
+        resolution=range_ / counts,
+        range=range_,
         viscous=0.0 if friction is None else friction.value,
         inertia=_transmission_inertia(machine, number),
         period=0.02 if isinstance(controller, NoController) else controller.period.value,
-        length=abs(joint.geometry.a.value) or _radius(joint), mass=joint.link.mass.value, supply=supply, gear=gear,
-    )  # fmt: skip
+        length=abs(joint.geometry.a.value) or _radius(joint),
+        mass=joint.link.mass.value,
+        supply=supply,
+        gear=gear,
+    )
+
+
+def is_rod_arm(machine: Machine) -> bool:
+    """Whether the closed form and (7.32) to (7.34) describe this machine: waist, shoulder and elbow of rods."""
+    joints = [machine.joint(j) for j in machine.modelled_joints]
+    if len(joints) != 3 or any(j.kind != "revolute" for j in joints):
+        return False
+    right_angle = math.isclose(joints[0].geometry.alpha.value, math.pi / 2, abs_tol=1e-12)
+    shapes = isinstance(joints[0].link, Cylinder) and all(isinstance(j.link, Rod) for j in joints[1:])
+    return right_angle and joints[1].geometry.alpha.value == 0.0 and joints[0].geometry.a.value == 0.0 and shapes
 
 
 def _radius(joint: Joint) -> float:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from model.machine_model import layout as at
+from model import layout as at
 
 
 class Kind(StrEnum):

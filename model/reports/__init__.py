@@ -1,1 +1,1 @@
-"""Typed results as HTML pages: each a list of sections, rendered into one file that needs nothing else."""
+"""Typed results as HTML pages: each is a list of sections, rendered into one self-contained file."""

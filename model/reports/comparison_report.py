@@ -8,7 +8,7 @@ from model.comparison.agreement import ModelAgreement
 from model.comparison.compare import Comparison
 from model.comparison.difference import ParameterDifference
 from model.reports.motion import ROLES, agreement_table, motion_section
-from model.reports.page import Cell, Report, Section, Table, cells, listed, spoken
+from model.reports.page import Cell, Report, Section, Table, cells, listed, numbers, spoken
 from model.reports.units import squared
 
 
@@ -45,7 +45,7 @@ def _answer(models: Sequence[ModelAgreement]) -> str:
 
 
 def total_error(model: ModelAgreement) -> float:
-    """Held-out traces count alone where there are any; the square of the joints' unit."""
+    """Error summed over the joints, in the square of their unit; of held-out traces if there are any."""
     held = model.mean_squared_error("held_out")
     return held if held is not None else model.mean_squared_error("in_sample") or 0.0
 
@@ -58,23 +58,15 @@ def _squared_errors(models: Sequence[ModelAgreement]) -> Table:
     rows = []
     for number, trace in enumerate(models[0].traces):
         errors = [m.traces[number].mean_squared_error for m in models]
-        rows.append((
-            Cell(trace.trace), Cell(ROLES[trace.held_out]),
-            *(Cell(f"{e:.4g}", number=True) for e in errors),
-        ))  # fmt: skip
-    return Table(
-        ("trace", "", *(m.label for m in models)), tuple(rows),
-        f"Mean squared error summed over the joints, {_unit(models[0])} (equation 4.70 of the source).",
-    )  # fmt: skip
+        rows.append((Cell(trace.trace), Cell(ROLES[trace.held_out]), *numbers(*(f"{e:.4g}" for e in errors))))
+    caption = f"Mean squared error summed over the joints, {_unit(models[0])} (equation 4.70 of the source)."
+    return Table(("trace", "", *(m.label for m in models)), tuple(rows), caption)
 
 
 def _differences(differences: Sequence[ParameterDifference], labels: Sequence[str]) -> Table:
-    rows = tuple(
-        cells(d.name, *("–" if v is None else f"{v:.6g}" for v in d.values), d.unit,
-              "–" if d.deviations is None else f"{d.deviations:.2f}")
-        for d in differences
-    )  # fmt: skip
-    return Table(
-        ("parameter", *labels, "unit", "in expected deviations"), rows,
-        "Parameters whose values differ; a dash where a model has no such parameter.",
-    )  # fmt: skip
+    rows = []
+    for d in differences:
+        values = ("–" if v is None else f"{v:.6g}" for v in d.values)
+        rows.append(cells(d.name, *values, d.unit, "–" if d.deviations is None else f"{d.deviations:.2f}"))
+    head = ("parameter", *labels, "unit", "in expected deviations")
+    return Table(head, tuple(rows), "Parameters whose values differ; a dash where a model has no such parameter.")

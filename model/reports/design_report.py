@@ -1,4 +1,4 @@
-"""The report of designed or judged experiments: how the arm would move, and what would become known."""
+"""The report of designed or judged experiments: the planned motions, and how much narrower intervals become."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 LITTLE = 0.9
-"""A width of which this share or more is left has not become narrower to speak of."""
+"""Share of a width from which an interval counts as not having become narrower."""
 
 
 @dataclass(frozen=True)
 class PlannedExperiment:
     """An experiment with its set points (k, joints of the machine), rad or m, one row a control period.
 
-    nats: what it and those before it tell together; None where nobody chose an order.
+    nats: information of this experiment and those before it; None where they have no order.
     """
 
     spec: ExperimentSpec
@@ -39,7 +39,7 @@ class PlannedExperiment:
 
 
 def design_report(model: Model, planned: Sequence[PlannedExperiment], gain: InformationGain, how: str) -> Report:
-    """The page. `how` says in a sentence how the experiments came about."""
+    """The page. `how` is a sentence on how the experiments were chosen."""
     machine = model.machine
     sections = (
         Section("What becomes known", (_gain_table(gain), *_gain_picture(gain), *_left_open(gain))),
@@ -71,15 +71,13 @@ def _answer(planned: Sequence[PlannedExperiment], gain: InformationGain) -> str:
 
 
 def _gain_table(gain: InformationGain) -> Table:
-    rows = tuple(
-        (*cells(p.name, f"{p.before:.3g}", f"{p.after:.3g}"), Cell(p.unit),
-         Cell(f"{100 * p.share:.2g} %", "good" if p.share <= 0.5 else "plain", number=True))
-        for p in gain.parameters
-    )  # fmt: skip
-    return Table(
-        ("parameter", "95 % width before", "after", "unit", "left"), rows,
-        "Width of the 95 % interval, from its lower to its upper end, without and with these experiments.",
-    )  # fmt: skip
+    rows = []
+    for p in gain.parameters:
+        left = Cell(f"{100 * p.share:.2g} %", "good" if p.share <= 0.5 else "plain", number=True)
+        rows.append((*cells(p.name, f"{p.before:.3g}", f"{p.after:.3g}"), Cell(p.unit), left))
+    head = ("parameter", "95 % width before", "after", "unit", "left")
+    caption = "Width of the 95 % interval, from its lower to its upper end, without and with these experiments."
+    return Table(head, tuple(rows), caption)
 
 
 def _gain_picture(gain: InformationGain) -> tuple[Picture, ...]:

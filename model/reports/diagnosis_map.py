@@ -18,19 +18,28 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PHASE_NAMES: dict[Phase, str] = {
-    "ramp_start": "start", "steady_ramp": "steady", "reversal": "reversal", "creep": "creep", "hold": "hold",
-}  # fmt: skip
+    "ramp_start": "start",
+    "steady_ramp": "steady",
+    "reversal": "reversal",
+    "creep": "creep",
+    "hold": "hold",
+}
 SHADES = (
-    (QUIET, 0.13), (COLOURS[1], 0.2), (COLOURS[1], 0.42), (COLOURS[1], 0.7), (COLOURS[1], 1.0), (COLOURS[5], 0.62),
+    (QUIET, 0.13),
+    (COLOURS[1], 0.2),
+    (COLOURS[1], 0.42),
+    (COLOURS[1], 0.7),
+    (COLOURS[1], 1.0),
+    (COLOURS[5], 0.62),
     (COLOURS[5], 1.0),
-)  # fmt: skip
+)
 """Colour and strength of a cell of the map, from noise to the strongest."""
 NOISE = 1.25
-"""Times its noise up to which a cell is drawn as noise."""
+"""Ratio of a cell to its noise, up to which it is drawn as noise."""
 
 
 def map_picture(where: Where, residual: str, trace: int = 0, *, small: bool = False) -> Picture:
-    """Joint by phase against time: how many times its noise the residual (as it is called) is."""
+    """The ratio of the residual to its noise, by joint and phase, against time. residual: its name."""
     cells = [c for c in where.cells if c.trace == trace]
     joints = sorted({c.joint for c in cells})
     limits = shade_limits(cells)
@@ -42,15 +51,21 @@ def map_picture(where: Where, residual: str, trace: int = 0, *, small: bool = Fa
             _map(place, [c for c in cells if c.joint == joint], joint, limits)
             place.set_xlim(*ends)
         axes[-1].set_xlabel("time / s")
-        figure.legend(handles=_shade_legend(limits), loc="outside upper right", ncols=len(SHADES), fontsize=6.5,
-                      handlelength=1.2, columnspacing=1.1)  # fmt: skip
+        figure.legend(
+            handles=_shade_legend(limits),
+            loc="outside upper right",
+            ncols=len(SHADES),
+            fontsize=6.5,
+            handlelength=1.2,
+            columnspacing=1.1,
+        )
 
     limit = chance_significance(len(cells))
     beyond = sum(c.significance > limit for c in cells)
     window = float(np.median([c.end - c.start for c in cells]))
     caption = (
-        f"Root mean square of {residual} in windows of {window:.2g} s, in times of what noise alone would leave, by "
-        f"phase of motion. {beyond} of {len(cells)} windows are beyond {limit:.1f} standard deviations; noise alone "
+        f"Root mean square of {residual} in windows of {window:.2g} s, as a multiple of what noise alone would leave, "
+        f"by phase of motion. {beyond} of {len(cells)} windows are beyond {limit:.1f} standard deviations; noise alone "
         "takes one of them past that in one record of a hundred."
     )
     return Picture(drawn(draw, 0.55 + (0.8 if small else 0.95) * len(joints)), caption)
@@ -74,7 +89,7 @@ def _map(axes: Axes, cells: Sequence[PhaseCell], joint: int, limits: Sequence[fl
 
 
 def shade_limits(cells: Sequence[PhaseCell]) -> tuple[float, ...]:
-    """Times the noise up to which each shade goes: noise, then doublings up to 64, or up to more where a cell is
+    """Upper limits of the shades, in terms of the noise: noise, then doublings up to 64, or up to more where a cell is
     further off, so that a strong map keeps its structure."""
     most = max((float(np.sqrt(c.mean_square)) for c in cells), default=1.0)
     top = max(64.0, 2.0 ** np.ceil(np.log2(most)))
@@ -82,7 +97,7 @@ def shade_limits(cells: Sequence[PhaseCell]) -> tuple[float, ...]:
 
 
 def by_shade(cells: Sequence[PhaseCell], limits: Sequence[float]) -> list[list[PhaseCell]]:
-    """Cells of the map, those of every shade."""
+    """Cells of the map, grouped by shade."""
     groups: list[list[PhaseCell]] = [[] for _ in limits]
     for cell in cells:
         groups[int(np.searchsorted(limits, np.sqrt(cell.mean_square)))].append(cell)
@@ -100,7 +115,7 @@ def _shade_legend(limits: Sequence[float]) -> list[object]:
 
 
 def dependence_picture(where: Where, joint: int, residual: str, unit: str) -> Picture | None:
-    """Mean residual (as it is called, of that unit) of a joint against each quantity."""
+    """The mean residual of a joint against each quantity. residual, unit: its name and unit."""
     own = [d for d in where.dependences if d.joint == joint]
     if not own:
         return None

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from model.discrepancy.candidates.candidate_order import in_order
-from model.discrepancy.diagnosis import Candidate, RemainingShape, SignalError
-from model.reports.effect_names import placed
+from model.discrepancy.diagnosis import Candidate, RemainingShape, SignalError, in_order
+from model.effects.names import placed
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels
 from model.reports.numbers import whole
 from model.reports.page import Picture
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHOWN, PROBED_SHOWN, PROBED_ALONE = 10, 4, 8
-"""Fitted candidates, the best ones; probed ones beside them, and where none was fitted."""
+"""Most candidates in a picture: fitted ones; probed ones beside them; probed ones where none was fitted."""
 MOST_TICKS = 5
 Key = tuple[str, tuple[int, ...]]
 
@@ -55,8 +54,15 @@ def evidence_picture(
         for place, c in zip(places, [*fitted, *probed], strict=True):
             _bar(axes, place, c, scale, named=(c.effect, c.joints) in named)
         if fitted and probed:
-            axes.text(0.0, places[len(fitted)] + 0.72, "promised by probes alone, not fitted", va="center",
-                      fontsize=6.8, style="italic", color=QUIET)  # fmt: skip
+            axes.text(
+                0.0,
+                places[len(fitted)] + 0.72,
+                "promised by probes alone, not fitted",
+                va="center",
+                fontsize=6.8,
+                style="italic",
+                color=QUIET,
+            )
         axes.set_yticks(places, [placed(c.effect, c.joints) for c in (*fitted, *probed)])
         axes.set_ylim((places[-1] if places else 0) - 0.6, 0.6)
         if needed is not None:
@@ -73,16 +79,16 @@ def evidence_picture(
 
 
 def _bar(axes: Axes, place: float, c: Candidate, scale: float, *, named: bool) -> None:
-    """A candidate; what a probe promises beyond the scale of the fits is cut off, and its number stands beside it."""
+    """The bar of a candidate. A probe beyond the scale of the fits is cut off; its number stands beside the bar."""
     colour = COLOURS[(c.joints[0] - 1) % len(COLOURS)] if c.joints else COLOURS[5]
     length = min(max(c.evidence, 0.0), scale)
     if c.refitted:
         axes.barh(place, length, 0.66, color=colour, alpha=1.0 if named else 0.35, lw=0)
     else:
         axes.barh(place, length, 0.5, facecolor="none", edgecolor=colour, ls=(0, (2, 1.5)), lw=0.8)
-    told = whole(c.evidence) + ("" if c.misfit is None else f", misfit {_misfit(c.misfit)}")
+    label = whole(c.evidence) + ("" if c.misfit is None else f", misfit {_misfit(c.misfit)}")
     beyond = ", beyond the scale" if c.evidence > scale else ""
-    axes.text(length + 0.008 * scale, place, told + beyond, va="center", fontsize=6.8, color=INK)
+    axes.text(length + 0.008 * scale, place, label + beyond, va="center", fontsize=6.8, color=INK)
 
 
 def _misfit(value: float) -> str:
@@ -90,20 +96,25 @@ def _misfit(value: float) -> str:
 
 
 def _evidence_caption(more: int, *, has_fits: bool, has_chosen: bool) -> str:
-    told = (
-        "Evidence: what each candidate takes off −2 log posterior, its own parameters and the places it was looked for "
-        "paid for; below 0 a candidate costs more than it explains. "
+    evidence = (
+        "Evidence: the fall of −2 log posterior, less the cost of the candidate's parameters and of the places tried; "
+        "below 0 a candidate costs more than it explains."
     )
-    told += "In full colour what this step names; colours are those of the joints. " if has_chosen else ""
-    told += "Misfit is the weighted residual that a fit leaves, 1 for noise alone. " if has_fits else ""
-    told += "What a probe promises is not what a fit shows: it may be far too much. "
-    return told + (f"{more} more lie lower." if more > 0 else "")
+    sentences = [evidence]
+    if has_chosen:
+        sentences.append("In full colour what this step names; colours are those of the joints.")
+    if has_fits:
+        sentences.append("Misfit is the weighted residual that a fit leaves, 1 for noise alone.")
+    sentences.append("A probe is only an estimate, which may be far too high.")
+    if more > 0:
+        sentences.append(f"{more} more lie lower.")
+    return " ".join(sentences)
 
 
 def error_picture(
     fit: Sequence[SignalError], held: Sequence[SignalError], residual: str = "measured − simulated"
 ) -> Picture:
-    """Errors before and after beside the noise floor, in sample and held out. residual: how it is called."""
+    """Errors before and after beside the noise floor, in sample and held out. residual: its name."""
     from matplotlib.lines import Line2D
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
@@ -147,7 +158,7 @@ def _error(axes: Axes, row: int, e: SignalError) -> None:
 
 
 def log_ticks(low: float, high: float, most: int = MOST_TICKS) -> list[float]:
-    """Round numbers in a range of positive sizes, at most so many: of each decade where it is wide, else evenly."""
+    """At most so many round numbers in a range of positive sizes: per decade where it is wide, else evenly spaced."""
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     if high / low >= 5.0:
         for steps, every in (((1, 2, 5), 1), ((1, 3), 1), ((1,), 1), ((1,), 2), ((1,), 3)):
@@ -156,19 +167,21 @@ def log_ticks(low: float, high: float, most: int = MOST_TICKS) -> list[float]:
             if len(inside) <= most:
                 return inside
     step = next(
-        float(f"{s}e{d}") for d in range(decades[0] - 3, decades[-1] + 1) for s in (1, 2, 5)
+        float(f"{s}e{d}")
+        for d in range(decades[0] - 3, decades[-1] + 1)
+        for s in (1, 2, 5)
         if (high - low) / float(f"{s}e{d}") < most
-    )  # fmt: skip
+    )
     return [round(step * k, 12) for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
 
 
 def _row_name(e: SignalError, units: Collection[str]) -> str:
-    """A joint, with its unit where the axis is of several."""
+    """The name of a row: a joint, with its unit where the axis has several units."""
     return f"joint {e.joint}" if len(units) == 1 else f"joint {e.joint} / {shown_unit(e.unit)[1]}"
 
 
 def remaining_picture(shapes: Sequence[RemainingShape]) -> Picture:
-    """Torque that would explain what is left, against what it goes with most."""
+    """The torque that would explain what is left, against the quantity that it depends on most."""
     shown = shapes[:4]
 
     def draw(figure: Figure) -> None:
@@ -190,7 +203,7 @@ def remaining_picture(shapes: Sequence[RemainingShape]) -> Picture:
                 place.set_ylabel(f"{'force' if one.torque_unit == 'N' else 'torque'} / {one.torque_unit}")
 
     caption = (
-        "The torque at a joint that would leave what is left, in bins of what it goes with, with one standard "
-        "deviation; in the titles the share of its variance that this explains."
+        "The torque at a joint that would cause what is left, in bins of the quantity that it goes with, with one "
+        "standard deviation; in the titles the share of its variance that this explains."
     )
     return Picture(drawn(draw, 2.0), caption)

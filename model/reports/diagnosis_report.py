@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from model.comparison.compare import Comparison
-from model.discrepancy.candidates.candidate_order import in_order
-from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment, RemainingShape, Step
-from model.discrepancy.localisation.clear_shape import FEWEST_BINS, clear_shape, filled_bins
+from model.discrepancy.diagnosis import (
+    Acquired,
+    Diagnosis,
+    NextExperiment,
+    RemainingShape,
+    Step,
+    clear_shape,
+)
+from model.discrepancy.explanation.renderer import best_tried, sentence, what_is_left
 from model.reports.diagnosis_map import map_picture
 from model.reports.diagnosis_pictures import evidence_picture, remaining_picture
 from model.reports.diagnosis_steps import error_blocks, step_sections, where_blocks
 from model.reports.diagnosis_words import Compared, compared, headline
-from model.reports.effect_names import capitalised, effect_name, placed
 from model.reports.motion import motion_section
-from model.reports.numbers import whole
 from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, html, listed, spoken
 
 VERDICTS = {
@@ -24,7 +28,7 @@ VERDICTS = {
     "unknown-effect": "an effect that is not among the known ones",
 }
 LABELS = ("before", "after")
-"""Of the models that a comparison for this report is made with."""
+"""Labels of the models in the comparison that this report shows."""
 
 
 def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> Report:
@@ -50,8 +54,7 @@ def diagnosis_report(found: Diagnosis, comparison: Comparison | None = None) -> 
     sections.append(_next(found.next_experiment, found.verdict))
     if found.notes:
         sections.append(Section("What to know about this answer", (Points(found.notes),)))
-    answer = f"{capitalised(found.summary).rstrip('.')}."
-    return Report(headline(found), answer, _facts(found), tuple(sections), f"Error and residual: {of.residual}.")
+    return Report(headline(found), found.summary, _facts(found), tuple(sections), f"Error and residual: {of.residual}.")
 
 
 def _facts(found: Diagnosis) -> tuple[tuple[str, str], ...]:
@@ -73,37 +76,21 @@ def diagnosis_page(found: Diagnosis, comparison: Comparison | None = None) -> st
 
 
 def _nothing_added(found: Diagnosis, of: Compared) -> list[Section]:
-    """What proves an answer in which no effect was added: the map, what was tried, and errors beside the noise."""
+    """The ground of an answer in which no effect was added: the map, what was tried, and errors beside the noise."""
     sections = []
     if not found.steps:
         if found.where is not None:
             sections.append(Section("Where they disagree", where_blocks(found.where, found.rmse_fit, of)))
         if found.candidates:
-            sections.append(Section("What was tried", _tried(found)))
+            picture = evidence_picture(found.candidates, needed=found.significant)
+            needed = found.significant
+            words = () if needed is None else (Text(best_tried(found.candidates, needed)),)
+            sections.append(Section("What was tried", (*words, picture)))
     errors = error_blocks(found.rmse_fit, found.rmse_holdout, of, "as given", "fitted")
     if errors:
         text = "No effect was added. Before is the model as it was given; after, its tolerance parameters are fitted."
         sections.append(Section("Errors beside the noise", (Text(text), *errors)))
     return sections
-
-
-def _tried(found: Diagnosis) -> tuple[Block, ...]:
-    """The candidates, none of which was added, beside what one needs."""
-    fitted, probed = in_order(found.candidates)
-    needed, count = found.significant, len(found.candidates)
-    best = (fitted or probed)[0]
-    name, evidence = placed(best.effect, best.joints), whole(best.evidence)
-    if fitted:
-        told = f"The best of {count} candidates, {name}, has an evidence of {evidence}"
-    else:
-        told = f"None of {count} candidates promised enough to be fitted. The best, {name}, promises {evidence}"
-    if needed is None:
-        told += "."
-    elif fitted and best.evidence >= needed:
-        told += f". It is above the {needed:g} from which an effect is named, but takes off no more than noise."
-    else:
-        told += f"; an effect is named from {needed:g}."
-    return Text(told), evidence_picture(found.candidates, needed=needed)
 
 
 def _overlays(comparison: Comparison, steps: Sequence[Step]) -> Section:
@@ -116,7 +103,7 @@ def _overlays(comparison: Comparison, steps: Sequence[Step]) -> Section:
     )
     text += (
         "The simulations here are of the closed loop alone: they are given the set points and the start, and nothing "
-        "else of the record. So their errors are other ones than those of the tables."
+        "else of the record. So their errors differ from those of the tables."
     )
     return Section("Measured, before and after", (Text(text), *motion.blocks))
 
@@ -124,8 +111,8 @@ def _overlays(comparison: Comparison, steps: Sequence[Step]) -> Section:
 def _remaining(found: Diagnosis, of: Compared) -> Section:
     blocks: list[Block] = []
     if found.where is not None and any(s.adopted for s in found.steps):
-        told = f"With what was added: {found.where.summary}."
-        blocks.append(Text(told, "good" if found.where.joint is None else "plain"))
+        blocks.append(Text("With what was added:", "quiet"))
+        blocks.append(Text(found.where.summary, "good" if found.where.joint is None else "plain"))
         traces = sorted({c.trace for c in found.where.cells})
         blocks += [map_picture(found.where, of.residual, trace, small=True) for trace in traces]
     if found.remaining:
@@ -139,32 +126,23 @@ def _remaining(found: Diagnosis, of: Compared) -> Section:
 
 
 def _shape_in_words(shapes: Sequence[RemainingShape]) -> Text:
-    clear = clear_shape(shapes)
-    if clear is None:
-        best = shapes[0]
-        told = (
-            f"No clear shape: the best, a torque at joint {best.joint} that goes with {best.against}, explains "
-            f"{100 * best.explained:.0f} % of what is left there"
-        )
-        few = f", and is known at {filled_bins(best)} values only" if filled_bins(best) < FEWEST_BINS else ""
-        return Text(f"{told}{few}.", "warning")
-    return Text(
-        f"A torque at joint {clear.joint} that goes with {clear.against} would explain "
-        f"{100 * clear.explained:.0f} % of what is left there. None of the candidates explains it. An effect "
-        "of your own with this shape can be tried with --effect-file.",
-        "warning",
-    )
+    words = sentence(what_is_left(shapes))
+    if clear_shape(shapes) is not None:
+        words += " None of the candidates explains it."
+        words += " An effect of your own with this shape can be tried with --effect-file."
+    return Text(words, "warning")
 
 
 def _shapes(shapes: Sequence[RemainingShape]) -> Table:
     rows = tuple(
         (
-            Cell(f"joint {s.joint}"), Cell(s.against),
+            Cell(f"joint {s.joint}"),
+            Cell(s.against),
             Cell(_span([t for t in s.torque if t is not None], s.torque_unit), number=True),
             Cell(f"{100 * s.explained:.0f} %", number=True),
         )
         for s in shapes
-    )  # fmt: skip
+    )
     return Table(("joint", "goes with", "torque", "explains"), rows)
 
 
@@ -175,11 +153,14 @@ def _span(torques: Sequence[float], unit: str) -> str:
 def _acquired(runs: Sequence[Acquired]) -> Section:
     rows = tuple(
         (
-            Cell(r.experiment), Cell(f"{r.duration:.1f} s", number=True),
-            Cell(r.outcome, "plain" if r.outcome == "complete" else "warning"), Cell(r.trace), Cell(r.reason),
+            Cell(r.experiment),
+            Cell(f"{r.duration:.1f} s", number=True),
+            Cell(r.outcome, "plain" if r.outcome == "complete" else "warning"),
+            Cell(r.trace),
+            Cell(r.reason),
         )
         for r in runs
-    )  # fmt: skip
+    )
     caption = (
         "In the order in which they were asked for. Only complete runs are used, and are among what was fitted to."
     )
@@ -193,9 +174,9 @@ def _next(experiment: NextExperiment | None, verdict: str) -> Section:
         return Section(title, (Text(text, "quiet"),))
     rows = [("on the arm", f"{experiment.duration:.1f} s")]
     if experiment.separates:
-        apart = [effect_name(name) for name in experiment.separates]
+        apart = experiment.separates
         separation = f"{experiment.predicted_separation:.1f} standard deviations, tolerances fitted again"
         rows.append(("would tell apart", " and ".join(apart) if len(apart) <= 2 else listed(apart)))
         rows.append(("predicted separation", separation))
     table = Table(("experiment", experiment.name), tuple((Cell(a), Cell(b)) for a, b in rows))
-    return Section(title, (Text(f"{capitalised(experiment.reason).rstrip('.')}."), table))
+    return Section(title, (Text(experiment.reason), table))

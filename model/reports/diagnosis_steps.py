@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from model.discrepancy.diagnosis import Candidate, Dependence, FoundValue, SignalError, Step, Where
+from model.effects.names import capitalised, placed
 from model.reports.diagnosis_map import dependence_picture, map_picture
 from model.reports.diagnosis_pictures import error_picture, evidence_picture
-from model.reports.diagnosis_words import Compared, distortion, gap, gone, proved
-from model.reports.effect_names import capitalised, placed
+from model.reports.diagnosis_words import Compared, distortion, gap, gone
 from model.reports.numbers import column, estimate
 from model.reports.page import Block, Cell, Section, Table, Text, cells
 from model.reports.units import shown_unit, with_unit
 
 WITHOUT_AND_WITH = "without the effect", "with it"
-"""Errors of a step; the tolerance parameters are fitted both times."""
+"""Names of a step's two errors; the tolerance parameters are fitted for both."""
 
 
 def step_sections(number: int, steps: Sequence[Step], of: Compared) -> list[Section]:
-    """What a step, counted from 1, says. Where nothing was added by the step before it, its map is the same."""
+    """Sections of a step, counted from 1. Where the step before added nothing, the map is not shown again."""
     step, before = steps[number - 1], steps[: number - 1]
     turn = f"Step {number}: " if len(steps) > 1 else ""
     if before and before[-1].where == step.where:
@@ -36,7 +36,7 @@ def step_sections(number: int, steps: Sequence[Step], of: Compared) -> list[Sect
 
 def where_blocks(where: Where, errors: Sequence[SignalError], of: Compared) -> tuple[Block, ...]:
     """The place in words, the map of every trace, what the residual goes with, and what would have to move."""
-    blocks: list[Block] = [Text(f"{capitalised(where.summary)}.", "plain" if where.joint is None else "warning")]
+    blocks: list[Block] = [Text(where.summary, "plain" if where.joint is None else "warning")]
     if where.cells:
         blocks.append(Text(of.errors, "quiet"))
         blocks += [map_picture(where, of.residual, trace) for trace in sorted({c.trace for c in where.cells})]
@@ -57,40 +57,42 @@ def _moving(where: Where) -> Table:
     ranges = [f"{v} %" for v in column([100 * m.relative_range for m in where.moving], digits=2)]
     rows = tuple(
         (
-            Cell(m.parameter), Cell(told, number=True),
+            Cell(m.parameter),
+            Cell(shown, number=True),
             Cell("–" if m.moves_with is None else f"{m.moves_with} ({m.correlation:+.2f})"),
         )
-        for m, told in zip(where.moving, ranges, strict=True)
-    )  # fmt: skip
+        for m, shown in zip(where.moving, ranges, strict=True)
+    )
     return Table(
-        ("parameter", "would have to range over", "and moves with"), rows,
+        ("parameter", "would have to range over", "and moves with"),
+        rows,
         "The distortion method in time: which parameter alone, moving with time, would explain most, and what it would "
         "move with (correlation; a dash: with nothing). A parameter that moves with something stands for a term that "
         "the model lacks.",
-    )  # fmt: skip
+    )
 
 
 def _what(step: Step, before: Sequence[Step]) -> tuple[Block, ...]:
-    blocks: list[Block] = [Text(f"{capitalised(step.reason).rstrip('.')}.")]
+    blocks: list[Block] = [Text(step.reason)]
     chosen = list(step.group)
     if step.effect is not None:
         chosen.append(Candidate(effect=step.effect, joints=step.joints, evidence=step.evidence))
     refused = {(s.effect, s.joints) for s in before if not s.adopted}  # fitted and refused, so no promise any more
     candidates = [c for c in step.candidates if c.refitted or (c.effect, c.joints) not in refused]
-    if candidates and not proved(step):
+    if candidates and step.proof is None:
         blocks.append(evidence_picture(candidates, chosen))
     if step.group:
-        told = "; ".join(placed(c.effect, c.joints) for c in step.group)
-        blocks.append(Text(f"These traces cannot tell apart: {told}.", "warning"))
+        names = "; ".join(placed(c.effect, c.joints) for c in step.group)
+        blocks.append(Text(f"These traces cannot tell apart: {names}.", "warning"))
     return tuple(blocks)
 
 
 def _shown(step: Step, of: Compared) -> tuple[Block, ...]:
     blocks: list[Block] = [Text(gap(step), "good")]
     if step.parameters:
-        caption = "As the record has it." if proved(step) else "As the last fit has them."
+        caption = "As the record has it." if step.proof is not None else "As the last fit has them."
         blocks.append(_parameters(step.parameters, caption))
-    if proved(step):
+    if step.proof is not None:
         return tuple(blocks)
     blocks += error_blocks(step.rmse_fit, step.rmse_holdout, of, *WITHOUT_AND_WITH)
     if step.sum_lambda2_before is not None and step.sum_lambda2_after is not None:
@@ -110,20 +112,20 @@ def _parameters(parameters: dict[str, FoundValue], caption: str) -> Table:
     rows = []
     for name, v in parameters.items():
         value, interval = estimate(v.value, v.low, v.high)
-        told = "not bounded by these traces" if interval is None else interval
-        rows.append((Cell(name), Cell(value, number=True), Cell(told, number=True), Cell(v.unit)))
+        shown = "not bounded by these traces" if interval is None else interval
+        rows.append((Cell(name), Cell(value, number=True), Cell(shown, number=True), Cell(v.unit)))
     return Table(("parameter", "value", "95 % interval", "unit"), tuple(rows), caption)
 
 
 def error_blocks(
     fit: Sequence[SignalError], held: Sequence[SignalError], of: Compared, before: str, after: str
 ) -> tuple[Block, ...]:
-    """Picture and table of errors before and after; what these two are, in words."""
+    """Picture and table of errors. before, after: names of the two states that are compared."""
     if not fit and not held:
         return ()
-    told = [("fitted to", e) for e in fit] + [("held out", e) for e in held]
-    sizes = _sizes([e for _, e in told])
-    rows = tuple((Cell(kind), *cells(str(e.joint), *own, gone(e))) for (kind, e), own in zip(told, sizes, strict=True))
+    kinds = [("fitted to", e) for e in fit] + [("held out", e) for e in held]
+    sizes = _sizes([e for _, e in kinds])
+    rows = tuple((Cell(kind), *cells(str(e.joint), *own, gone(e))) for (kind, e), own in zip(kinds, sizes, strict=True))
     caption = (
         f"Root mean square of {of.residual}, {before} and {after}. "
         f"{of.errors} Gone: share of the variance beyond noise that was taken off; a dash where there was hardly any. "

@@ -1,25 +1,24 @@
-"""What the page of a diagnosis says in words: its headline, and what its numbers are of."""
+"""Words of a diagnosis's page: its headline, and what its numbers are of."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from daq.contracts.machine import NoController
 from model.discrepancy.diagnosis import Diagnosis, FoundValue, SignalError, Step
-from model.discrepancy.explanation.table import telling
-from model.reports.effect_names import capitalised, placed
+from model.discrepancy.explanation.effect_words import words_of
+from model.effects.names import capitalised, placed
 from model.reports.numbers import estimate
 from model.reports.units import shown_unit, with_unit
 
 NOTABLE = 1.5
-"""Times the noise from which an error is large enough to ask for the share that is gone."""
+"""Ratio of an error to its noise, from which the share that is gone means something."""
 NO_LAW = "none of the known effects explains what is left"
 
 
 @dataclass(frozen=True)
 class Compared:
-    """What a diagnosis compared. residual: what is left, in words. errors: what errors and map are of. overlays: why
-    there are none; empty where there are some."""
+    """What a diagnosis compared. residual: its name. errors: what errors and map are of. overlays: why there are none;
+    empty where there are some."""
 
     residual: str
     errors: str
@@ -31,31 +30,37 @@ POSITIONS = Compared(
     "The simulation follows half of the record: its controller is given the mean of the simulated and the recorded "
     "reading. These are not the errors of the closed loop alone.",
 )
-TORQUES = Compared(
-    "torque that the model needs − torque that was applied",
-    "Both torques are taken along the recorded motion, and nothing is simulated.",
-    "There is no overlay: without a controller, or without set points, no motion is simulated. The map and the errors "
-    "are of torques along the recorded motion.",
-)
-FORCES = Compared(*(text.replace("torque", "force") for text in (TORQUES.residual, TORQUES.errors, TORQUES.overlays)))
+
+
+def _balanced(torque: str) -> Compared:
+    return Compared(
+        f"{torque} that the model needs − {torque} that was applied",
+        f"Both {torque}s are taken along the recorded motion, and nothing is simulated.",
+        "There is no overlay: without a controller, or without set points, no motion is simulated. The map and the "
+        f"errors are of {torque}s along the recorded motion.",
+    )
+
+
+TORQUES, FORCES = _balanced("torque"), _balanced("force")
 
 
 def compared(found: Diagnosis) -> Compared:
-    """Torques (forces, where all joints slide) without a controller or set points, else positions (speeds)."""
-    units = {e.unit for e in (*found.rmse_fit, *(e for step in found.steps for e in step.rmse_fit))}
-    if not units & {"N·m", "N"} and not isinstance(found.model_before.machine.controller, NoController):
+    """Positions (speeds) where the loop was simulated, else torques, or forces where all joints slide."""
+    if found.method == "output-error":
         return POSITIONS
-    return FORCES if units == {"N"} else TORQUES
+    machine = found.model_before.machine
+    slides = all(machine.joint(j).kind == "prismatic" for j in machine.modelled_joints)
+    return FORCES if slides else TORQUES
 
 
 def headline(found: Diagnosis) -> str:
-    """What was found, where, and its size; or that nothing was, or nothing known."""
+    """The effects found, with joints and sizes; or that none was found, or none that is known."""
     if found.verdict == "nothing-significant":
         return "Nothing that the held-out traces confirm" if found.steps else "Nothing significant"
-    told = [_finding(s) for s in found.steps if s.adopted]
+    findings = [_finding(s) for s in found.steps if s.adopted]
     if found.verdict == "unknown-effect":
-        told.append(NO_LAW)
-    return capitalised("; ".join(told)) or "Several effects that cannot be told apart"
+        findings.append(NO_LAW)
+    return capitalised("; ".join(findings)) or "Several effects that cannot be told apart"
 
 
 def _finding(step: Step) -> str:
@@ -63,7 +68,7 @@ def _finding(step: Step) -> str:
         return "one of: " + " or ".join(placed(c.effect, c.joints) for c in step.group)
     if step.effect is None:
         return "an effect without a name"
-    size = telling(step.effect).size
+    size = words_of(step.effect).size
     values = [v for name, v in step.parameters.items() if size is not None and name.rsplit(".", 1)[-1] == size]
     return ", ".join([placed(step.effect, step.joints), *(_size(v) for v in values)])
 
@@ -72,23 +77,18 @@ def _size(v: FoundValue) -> str:
     factor, unit = shown_unit("" if v.unit == "1" else v.unit)
     low, high = (None if bound is None else factor * bound for bound in (v.low, v.high))
     value, interval = estimate(factor * v.value, low, high, digits=1)
-    told = with_unit(value, unit) if unit else value
-    return told if interval is None else f"{told} ({interval})"
-
-
-def proved(step: Step) -> bool:
-    """Whether the controller's own numbers prove a step: then nothing was fitted for it, and it has no errors."""
-    return step.adopted and not any(e.before or e.after for e in step.rmse_fit)
+    shown = with_unit(value, unit) if unit else value
+    return shown if interval is None else f"{shown} ({interval})"
 
 
 def gap(step: Step) -> str:
-    """What a step that was taken does on traces it was not fitted to."""
-    if proved(step):
+    """What an adopted step does on traces that it was not fitted to."""
+    if step.proof is not None:
         return "Taken into the model: the recorded numbers of the controller prove it, and nothing was fitted for it."
     if step.excess_removed_holdout is None:
         return "Taken into the model. No trace was held out to judge it by."
-    told = _percent(step.excess_removed_holdout, 1) or "all"
-    return f"Taken into the model: on traces it was not fitted to, {told} of the variance beyond noise is gone."
+    share = _percent(step.excess_removed_holdout, 1) or "all"
+    return f"Taken into the model: on traces it was not fitted to, {share} of the variance beyond noise is gone."
 
 
 def gone(e: SignalError) -> str:
@@ -100,7 +100,7 @@ def gone(e: SignalError) -> str:
 
 
 def _percent(share: float, places: int) -> str | None:
-    """A share in percent; None for all of it. What is not all is never rounded up to it."""
+    """A share in percent; None for all of it. A share below all is never rounded up to 100 %."""
     if share >= 1.0:
         return None
     return f"{min(100 * share, 100 - 10**-places):.{places}f} %".replace("-", "−")
@@ -108,13 +108,14 @@ def _percent(share: float, places: int) -> str | None:
 
 def distortion(before: float, after: float) -> str:
     """Σλ² of the distortion method before and after a step that was taken, and what it means."""
-    told = f"Σλ² of the distortion method goes from {before:.3g} to {after:.3g}. "
+    change = f"Σλ² of the distortion method goes from {before:.3g} to {after:.3g}. "
     if before >= 1.0:
         more = "It grows because less is left to explain. " if after > before else ""
         return (
-            f"{told}{more}Above 1 already before: judged by the size of the error alone, deviations of the parameters "
-            "as large as expected would explain it. What speaks for the effect is the pattern, which they cannot make."
+            f"{change}{more}Above 1 already before: judged by the size of the error alone, deviations of the "
+            "parameters as large as expected would explain it. What speaks for the effect is its pattern, which they "
+            "cannot produce."
         )
     if after >= 1.0:
-        return told + "At 1 or more, deviations of the parameters as large as expected explain all that is left."
-    return told + "Below 1 the expected deviations of the parameters do not explain all that is left."
+        return change + "At 1 or more, deviations of the parameters as large as expected explain all that is left."
+    return change + "Below 1 the expected deviations of the parameters do not explain all that is left."

@@ -1,10 +1,11 @@
-"""Figures for print and screen: one style, colours for the colour-blind too, light or dark as the page is."""
+"""Figures for print and screen: one style, colours that the colour-blind can tell apart, light or dark as the page."""
 
 from __future__ import annotations
 
 import io
 import re
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,34 +22,26 @@ INK = "#222222"
 QUIET = "#8a8a8a"
 GRID = "#e4e4e4"
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#a07800", "#4b4b9b")
-"""Okabe and Ito's, the yellow darkened to show on paper; the same a joint as in the plots of traces."""
+"""Colours of the joints, as in the plots of traces: those of Okabe and Ito, the yellow darkened to show on paper."""
 
 MODEL_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
-"""One a model where several are drawn together."""
+"""Colours of models that are drawn together."""
 
 WIDTH = 7.2
-"""Inches: a page's text."""
+"""Width of a page's text, inches."""
 
 _THEMED = {INK: "ink", QUIET: "quiet", GRID: "grid"} | {c: f"colour-{k + 1}" for k, c in enumerate(COLOURS)}
 
-_STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans", "font.size": 8.0, "text.color": INK, "axes.spines.top": False,
-    "axes.spines.right": False, "axes.edgecolor": QUIET, "axes.labelcolor": INK, "axes.linewidth": 0.7,
-    "axes.grid": True, "axes.axisbelow": True, "grid.color": GRID, "grid.linewidth": 0.6, "xtick.color": INK,
-    "ytick.color": INK, "xtick.major.width": 0.7, "ytick.major.width": 0.7, "xtick.major.size": 2.5,
-    "ytick.major.size": 2.5, "lines.linewidth": 1.2, "lines.solid_joinstyle": "round", "legend.frameon": False,
-    "legend.fontsize": 7.5, "axes.titlesize": 8.5, "axes.titleweight": "bold", "axes.titlelocation": "left",
-    "figure.facecolor": "none", "axes.facecolor": "none", "savefig.facecolor": "none", "svg.hashsalt": "ma2000-daq",
-    "path.simplify_threshold": 0.4,
-}  # fmt: skip
+_STYLE = Path(__file__).parent / "templates" / "page.mplstyle"
+_INKS: dict[Any, Any] = dict.fromkeys(("text.color", "axes.labelcolor", "xtick.color", "ytick.color"), INK)
+_INKS |= {"axes.edgecolor": QUIET, "grid.color": GRID}
 
 
 def drawn(draw: Callable[[Figure], None], height: float, width: float = WIDTH) -> str:
     """SVG of what `draw` puts on a figure of that size (inches). Its colours are variables of the page's style."""
-    import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    with mpl.rc_context(_STYLE):
+    with _style():
         figure = Figure(figsize=(width, height), layout="constrained")
         draw(figure)
         stream = io.StringIO()
@@ -64,24 +57,29 @@ def drawn(draw: Callable[[Figure], None], height: float, width: float = WIDTH) -
 
 def saved(draw: Callable[[Figure], None], height: float, path: Path, kind: str, width: float = WIDTH) -> None:
     """The same as a file of that kind (png, svg, pdf), on white. Raises OSError."""
-    import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    with mpl.rc_context(_STYLE):
+    with _style():
         figure = Figure(figsize=(width, height), layout="constrained")
         draw(figure)
         dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
         figure.savefig(path, format=kind, dpi=200, facecolor="white", metadata=dates.get(kind))
 
 
+def _style() -> AbstractContextManager[None]:
+    import matplotlib as mpl
+
+    return mpl.rc_context({**mpl.rc_params_from_file(_STYLE, use_default_template=False), **_INKS})
+
+
 def thinned(time: Floats, *signals: Floats, most: int = 1500) -> tuple[Floats, ...]:
-    """At most about `most` samples of each, evenly picked: more than a printed page resolves."""
+    """About `most` samples of each at most, evenly picked: a printed page resolves no more."""
     stride = max(1, -(-len(time) // most))
     return (time[::stride], *(s[::stride] for s in signals))
 
 
 def band(axes: Axes, time: Floats, signal: Floats, colour: str, most: int = 300) -> None:
-    """A signal as a line; of many samples the mean of each of `most` stretches, and a shade from least to largest."""
+    """Draw a signal as a line; if it is long, as the mean of `most` stretches with a band from least to largest."""
     if len(time) <= 2 * most or not np.isfinite(signal).all():
         axes.plot(time, signal, color=colour, lw=0.8)
         return
@@ -99,5 +97,5 @@ def panels(figure: Figure, rows: int, columns: int, **options: Any) -> Any:
 
 
 def baseline(axes: Axes) -> None:
-    """The line of zero."""
+    """Draw the line of zero."""
     axes.axhline(0.0, color=QUIET, lw=0.7, zorder=1)

@@ -1,4 +1,4 @@
-"""The report of a fit: what was found, how well it is known, what the data cannot tell, and what is left."""
+"""The report of a fit: the parameters and how well they are known, what the data cannot tell, and the residual."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sections about motion: simulated beside measured, what is left of it, and tables of how large that is."""
+"""Sections about motion: simulated beside measured motion, the residual, and tables of its size."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from model.reports.figures import (
     drawn,
     panels,
     thinned,
-)  # fmt: skip
+)
 from model.reports.motion_closer import closer_picture
 from model.reports.page import Cell, Picture, Section, Table, cells
 from model.reports.units import shown_unit, with_unit
@@ -28,17 +28,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ABREAST = 3
-"""Joints beside each other."""
+"""Number of joints side by side."""
 USUAL = 2.5
-"""Times the residual that 99.5 % of the samples stay below, to which its picture reaches at most."""
+"""Largest reach of a picture of a residual, over its 99.5th percentile; no outlier may hide the rest."""
 ROLES = {True: "held out", False: "fitted to", None: "all"}
-"""What a trace was to a model."""
+"""Roles of a trace: whether it was held out from the fit of a model."""
 
 
 def motion_section(
     signals: Sequence[TraceSignals], labels: Sequence[str], most: int = 8, *, closer: bool = False
 ) -> Section:
-    """A figure a trace: position above, residual below, a column a joint; of many traces the first ones.
+    """A section with one figure for each of the first traces: position above, residual below, a column a joint.
 
     Args:
         closer: also the stretch in which the first model is furthest off.
@@ -85,8 +85,8 @@ def _picture(one: TraceSignals, labels: Sequence[str]) -> Picture:
 
 
 def _reach(one: TraceSignals) -> tuple[float, float]:
-    """How far the picture of a residual reaches, and its largest size: the first is less where a moment, like a start
-    posture that is off, would leave nothing to be seen of the rest."""
+    """The reach of a residual's picture, and the residual's largest size. The reach is smaller where a short peak, such
+    as that of a wrong start posture, would hide the rest."""
     sizes = [np.abs(one.measured - s) for s in one.simulated]
     widest = max(float(s.max()) for s in sizes)
     usual = max(float(np.quantile(s, 0.995, axis=0).max()) for s in sizes)
@@ -110,8 +110,8 @@ def _joint(
     for place, (label, simulated) in enumerate(zip(labels, one.simulated, strict=True)):
         shade = colour if len(labels) == 1 else MODEL_COLOURS[place % len(MODEL_COLOURS)]
         time, own = thinned(one.time, simulated[:, column] * factor)
-        above.plot(time, own, color=shade, lw=1.4, ls="-" if len(labels) == 1 else ("-", "--", "-.", ":")[place % 4],
-                   label=label)  # fmt: skip
+        style = "-" if len(labels) == 1 else ("-", "--", "-.", ":")[place % 4]
+        above.plot(time, own, color=shade, lw=1.4, ls=style, label=label)
         band(below, one.time, (one.measured - simulated)[:, column] * factor, shade)
     time, measured = thinned(one.time, one.measured[:, column] * factor)
     above.plot(time, measured, color=INK, lw=0.6, label="measured")  # thin and on top: neither hides the other
@@ -139,15 +139,14 @@ def agreement_table(models: Sequence[ModelAgreement]) -> Table:
 
 def _row(label: str, kind: str, one: JointAgreement) -> tuple[Cell, ...]:
     factor, unit = shown_unit(one.unit)
-    return (
-        Cell(label), Cell(kind), *cells(str(one.joint), f"{one.rmse * factor:.4g} {unit}", counted(one.counts),
-        f"{one.largest * factor:.4g} {unit}", f"{one.floor * factor:.3g} {unit}", counted(one.floor_counts),
-        "–" if one.share is None else f"{100 * one.share:.2g} %"),
-    )  # fmt: skip
+    error = (f"{one.rmse * factor:.4g} {unit}", counted(one.counts), f"{one.largest * factor:.4g} {unit}")
+    floor = (f"{one.floor * factor:.3g} {unit}", counted(one.floor_counts))
+    share = "–" if one.share is None else f"{100 * one.share:.2g} %"
+    return (Cell(label), Cell(kind), *cells(str(one.joint), *error, *floor, share))
 
 
 def in_sample(model: ModelAgreement) -> str:
-    """What the traces that are not held out were to a model."""
+    """The role of the traces that are not held out from a model."""
     return ROLES[next((t.held_out for t in model.traces if not t.held_out), None)]
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 STRETCH = 4.0
-"""s that are shown."""
+"""Length of the stretch that is shown, s."""
 
 
 def stretch_of_most(residual: Floats, period: float) -> tuple[slice, int]:
@@ -32,7 +32,7 @@ def stretch_of_most(residual: Floats, period: float) -> tuple[slice, int]:
 
 
 def closer_picture(one: TraceSignals, labels: Sequence[str]) -> Picture | None:
-    """Position and residual of one joint there; None where the first simulation does not stay finite."""
+    """Position and residual of one joint in that stretch; None where the first simulation does not stay finite."""
     left = one.measured - one.simulated[0]
     if len(one.time) < 2 or not np.isfinite(left).all():
         return None
@@ -43,8 +43,9 @@ def closer_picture(one: TraceSignals, labels: Sequence[str]) -> Picture | None:
     def draw(figure: Figure) -> None:
         above, below = panels(figure, 1, 2, sharex=True)[0]
         if one.set_point is not None:
-            above.plot(time, one.set_point[window, column] * factor, color=QUIET, lw=0.9, ls=(0, (4, 2)),
-                       drawstyle="steps-post", label="set point")  # fmt: skip
+            wanted = one.set_point[window, column] * factor
+            dashed = {"color": QUIET, "lw": 0.9, "ls": (0, (4, 2)), "drawstyle": "steps-post"}
+            above.plot(time, wanted, label="set point", **dashed)
         baseline(below)
         for place, (label, simulated) in enumerate(zip(labels, one.simulated, strict=True)):
             colour = MODEL_COLOURS[place % len(MODEL_COLOURS)]

@@ -1,4 +1,4 @@
-"""Numbers as a column or an interval shows them: with the same decimals throughout."""
+"""Numbers as text, with the same decimals throughout a column or an interval."""
 
 from __future__ import annotations
 

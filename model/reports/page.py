@@ -1,4 +1,4 @@
-"""A report as data, and its one HTML file: no script, nothing loaded from elsewhere, light or dark, and printed."""
+"""A report as data, and its HTML file: without scripts or outside resources, for light or dark screens and print."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from daq.contracts.errors import SpecError
-from model.reports.effect_names import effect_name
+from model.effects.names import effect_name
 
 Tone = Literal["plain", "good", "warning", "quiet"]
 
@@ -32,7 +32,7 @@ class Points:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of a table; numbers are set to the right."""
+    """A cell of a table; numbers are aligned to the right."""
 
     text: str
     tone: Tone = "plain"
@@ -63,7 +63,7 @@ Block = Text | Points | Table | Picture
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what stands below it."""
+    """A heading and its blocks."""
 
     title: str
     blocks: tuple[Block, ...]
@@ -76,8 +76,10 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """A page: what it is of, the answer in one or two sentences, facts in two columns, and sections; at its foot, what
-    its errors are."""
+    """A page: title, the answer in one or two sentences, facts in two columns, and sections.
+
+    errors: the definition of error and residual at the foot of the page.
+    """
 
     title: str
     answer: str
@@ -88,7 +90,12 @@ class Report:
 
 def cells(*texts: str, tone: Tone = "plain") -> tuple[Cell, ...]:
     """A row: its name, then numbers."""
-    return (Cell(texts[0], tone), *(Cell(t, tone, number=True) for t in texts[1:]))
+    return (Cell(texts[0], tone), *numbers(*texts[1:], tone=tone))
+
+
+def numbers(*texts: str, tone: Tone = "plain") -> tuple[Cell, ...]:
+    """Cells that hold numbers."""
+    return tuple(Cell(t, tone, number=True) for t in texts)
 
 
 def html(report: Report) -> str:
@@ -96,9 +103,12 @@ def html(report: Report) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("model.reports"), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
+        loader=PackageLoader("model.reports"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     return environment.get_template("report.html.j2").render(report=report)
 
 
@@ -114,7 +124,7 @@ def write_report(report: Report, path: Path) -> Path:
 
 
 def listed(names: Sequence[str], most: int = 6) -> str:
-    """Names in a sentence; what is more than `most` is counted."""
+    """Names in a sentence; those beyond `most` are only counted."""
     shown = ", ".join(names[:most])
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
 

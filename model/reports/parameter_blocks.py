@@ -1,12 +1,12 @@
-"""What a report of a fit says of its parameters: a table, a picture of the intervals, and what is not known."""
+"""The parameters in a report of a fit: a table, a picture of the intervals, and what the data leave open."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from model.fitting.identifiability import IdentifiabilityReport
 from model.fitting.result import FittedParameter
-from model.identifiability.report import IdentifiabilityReport
 from model.reports.figures import COLOURS, QUIET, drawn, panels
 from model.reports.page import Cell, Picture, Points, Table, Text, Tone, cells
 
@@ -21,7 +21,7 @@ def parameter_table(parameters: Sequence[FittedParameter]) -> Table:
     return Table(
         ("parameter", "value", "95 % interval", "unit", "before", "expected", "verdict"),
         tuple(_parameter_row(p) for p in parameters),
-        "A parameter that the traces do not determine gets no number; the model goes on with what was expected of it. "
+        "A parameter that the traces do not determine gets no number; the model keeps its expected value. "
         "Intervals take the correlation of the residual into account.",
     )
 
@@ -62,7 +62,7 @@ def interval_picture(parameters: Sequence[FittedParameter]) -> tuple[Picture, ..
         axes.grid(visible=False, axis="y")
 
     caption = (
-        "Values with 95 % intervals, relative to what was expected before (band: one expected deviation). "
+        "Values with 95 % intervals, relative to the expected values (band: one expected deviation). "
         "Colours are those of the joints."
     )
     return (Picture(drawn(draw, 0.6 + 0.19 * len(shown)), caption),)
@@ -75,13 +75,13 @@ def _joint(name: str) -> int:
 
 
 def undetermined_blocks(report: IdentifiabilityReport) -> tuple[Text | Points, ...]:
-    """Combinations that the data leave open, and why parameters are not known."""
+    """Combinations that the data leave open, and the reasons why parameters are not known."""
     weak = [p for p in report.parameters if p.verdict != "known"]
     if not weak and not report.undetermined:
-        return (Text("Every parameter is determined by the traces alone, without the help of what was expected."),)
+        return (Text("Every parameter is determined by the traces alone, without the help of the priors."),)
     blocks: list[Text | Points] = []
     if report.undetermined:
-        blocks.append(Text("These changes leave the records as they are, within the noise:"))
+        blocks.append(Text("These changes do not change the records beyond the noise:"))
         blocks.append(Points(tuple(c.text for c in report.undetermined)))
     if weak:
         blocks.append(Text("By parameter:"))

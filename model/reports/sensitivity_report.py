@@ -1,4 +1,4 @@
-"""Sensitivity curves as a page and as a picture: what each parameter's expected deviation does to each joint, when."""
+"""Sensitivity curves as a page and as a picture: how the expected deviation of each parameter changes each reading."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from model.analysis.sensitivity import SensitivityCurve, SensitivityCurves
 from model.reports.figures import COLOURS, baseline, drawn, panels, saved, thinned
-from model.reports.page import Cell, Picture, Report, Section, Table, cells
+from model.reports.page import Cell, Picture, Report, Section, Table, cells, numbers
 from model.reports.units import joint_unit, shown_unit, with_unit
 
 if TYPE_CHECKING:
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from daq.contracts.machine import Machine
 
 SHOWN = len(COLOURS)
-"""Curves of a joint that are drawn: those that move it most."""
+"""Number of curves that are drawn for a joint: those of the parameters that move it most."""
 PANEL_HEIGHT = 1.9
-"""Inches."""
+"""Height of a panel, inches."""
 
 
 def sensitivity_report(label: str, found: SensitivityCurves, machine: Machine) -> Report:
@@ -37,11 +37,9 @@ def sensitivity_report(label: str, found: SensitivityCurves, machine: Machine) -
         f"each joint the {SHOWN} parameters that move it most."
     )
     picture = Picture(drawn(lambda figure: _draw(figure, found, machine), PANEL_HEIGHT * len(found.joints)), caption)
-    return Report(
-        f"Sensitivity of {label}", answer, facts,
-        (Section("How much, and when", (_table(found, machine),)), Section("Curves", (picture,))),
-        "Changes are exact to first order; each parameter changes alone.",
-    )  # fmt: skip
+    sections = (Section("How much, and when", (_table(found, machine),)), Section("Curves", (picture,)))
+    errors = "Changes are exact to first order; each parameter changes alone."
+    return Report(f"Sensitivity of {label}", answer, facts, sections, errors)
 
 
 def largest_change(found: SensitivityCurves, curve: SensitivityCurve, k: int, machine: Machine) -> str:
@@ -57,15 +55,13 @@ def save_curves(found: SensitivityCurves, machine: Machine, path: Path, kind: st
 
 
 def _table(found: SensitivityCurves, machine: Machine) -> Table:
-    rows = tuple(
-        (
-            *cells(curve.name, f"{curve.expected:.3g}"), Cell(curve.unit),
-            *(Cell(largest_change(found, curve, k, machine), number=True) for k in range(len(found.joints))),
-        )
-        for curve in found.curves
-    )  # fmt: skip
+    rows = []
+    for curve in found.curves:
+        changes = (largest_change(found, curve, k, machine) for k in range(len(found.joints)))
+        rows.append((*cells(curve.name, f"{curve.expected:.3g}"), Cell(curve.unit), *numbers(*changes)))
     head = ("parameter", "changes by", "unit", *(f"joint {joint}" for joint in found.joints))
-    return Table(head, rows, "Largest change of each joint's reading along the trace; the strongest parameter first.")
+    caption = "Largest change of each joint's reading along the trace; the strongest parameter first."
+    return Table(head, tuple(rows), caption)
 
 
 def _draw(figure: Figure, found: SensitivityCurves, machine: Machine) -> None:

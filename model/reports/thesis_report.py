@@ -1,4 +1,4 @@
-"""The report of the source reproduced: ours beside the published, table by table and figure by figure."""
+"""The report of the reproduced source: our results beside the published ones, by table and figure."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ METHODS = {"nelder_mead": "Nelder and Mead, as in the source", "least_squares": 
 
 
 def thesis_report(found: Reproduction) -> Report:
-    """The page that one reads beside the thesis."""
+    """The page of the reproduction, to be read beside the thesis."""
     borne_out = len(found.checks) - len(found.failed)
     sections = [
         Section("What the source says, and whether it comes out", (_checks(found),)),
@@ -47,30 +47,22 @@ def thesis_report(found: Reproduction) -> Report:
 
 
 def _checks(found: Reproduction) -> Table:
-    rows = tuple(
-        (
-            Cell(c.name), Cell("yes" if c.holds else "no", "good" if c.holds else "warning"), Cell(c.ours),
-            Cell(c.published, "quiet"),
-        )
-        for c in found.checks
-    )  # fmt: skip
+    verdicts = {True: Cell("yes", "good"), False: Cell("no", "warning")}
+    rows = tuple((Cell(c.name), verdicts[c.holds], Cell(c.ours), Cell(c.published, "quiet")) for c in found.checks)
     return Table(("statement", "holds", "ours", "published"), rows)
 
 
 def _sums(found: Reproduction) -> Table:
     source = [f for f in found.fidelity if f.convention == "source"]
     three = {f.name: f for f in found.fidelity if f.convention == "three_sigma"}
-    rows = tuple(
-        cells(
-            f"{f.name} (tables {f.table}, {f.deviation_table})", f"{f.published:.4f}", f"{f.ours:.4f}",
-            f"{100 * f.relative_difference:+.1f} %", f"{three[f.name].ours:.4f}",
-        )
-        for f in source
-    )  # fmt: skip
-    return Table(
-        ("model", "published", "τ′ = â/(3√2)", "difference", "τ′ = â/3"), rows,
-        "The sum that the printed values and standard deviations give, in both readings of the expected deviation.",
-    )  # fmt: skip
+    rows = []
+    for f in source:
+        ours, other = (f"{one.ours:.4f}" for one in (f, three[f.name]))
+        sums = (f"{f.published:.4f}", ours, f"{100 * f.relative_difference:+.1f} %", other)
+        rows.append(cells(f"{f.name} (tables {f.table}, {f.deviation_table})", *sums))
+    head = ("model", "published", "τ′ = â/(3√2)", "difference", "τ′ = â/3")
+    caption = "The sum from the printed values and standard deviations, with both readings of the expected deviation."
+    return Table(head, tuple(rows), caption)
 
 
 def _ladder(ladder: Ladder) -> Section:
@@ -88,11 +80,9 @@ def _ladder(ladder: Ladder) -> Section:
     unoptimised = (
         f"Before any fit the error is {ladder.unoptimised_error:.4g} rad², 2.1428e-3 in the source (table 7.2)."
     )
-    return Section(
-        f"The four models, fitted by {METHODS[ladder.method]}",
-        (Text(unoptimised), Table(head, tuple(rows), "Tables 7.3 to 7.10, ours beside the published."),
-         _ladder_picture(ladder)),
-    )  # fmt: skip
+    table = Table(head, tuple(rows), "Tables 7.3 to 7.10, ours beside the published.")
+    blocks = (Text(unoptimised), table, _ladder_picture(ladder))
+    return Section(f"The four models, fitted by {METHODS[ladder.method]}", blocks)
 
 
 def _pairs(name: str, pairs: list[tuple[float, float] | None]) -> tuple[Cell, ...]:
@@ -178,11 +168,9 @@ def _influence(found: Reproduction) -> Table:
     rows = []
     for entry in found.influence:
         where = f"link {entry.joint}" if entry.table == "5.3" else f"joint {entry.joint}"
-        rows.append((
-            Cell(f"{entry.table}, {where}"), Cell(", ".join(entry.acting)),
-            Cell(", ".join(entry.published_too_many) or "–", "warning" if entry.published_too_many else "plain"),
-            Cell(", ".join(entry.published_too_few) or "–", "warning" if entry.published_too_few else "plain"),
-        ))  # fmt: skip
+        differing = (entry.published_too_many, entry.published_too_few)
+        differences = (Cell(", ".join(p) or "–", "warning" if p else "plain") for p in differing)
+        rows.append((Cell(f"{entry.table}, {where}"), Cell(", ".join(entry.acting)), *differences))
     return Table(("table", "acting", "named by the source, without effect", "missing in the source"), tuple(rows))
 
 

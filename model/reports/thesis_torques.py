@@ -72,8 +72,8 @@ def _inertial(found: TorqueAnalysis, time: np.ndarray) -> Picture:
         for own, joint in zip(axes, joints, strict=True):
             for torque in found.inertial:
                 if torque.at == joint:
-                    own.plot(time, torque.values, color=COLOURS[(torque.of - 1) % len(COLOURS)],
-                             label=f"acceleration of joint {torque.of}", lw=1.2)  # fmt: skip
+                    colour = COLOURS[(torque.of - 1) % len(COLOURS)]
+                    own.plot(time, torque.values, color=colour, label=f"acceleration of joint {torque.of}", lw=1.2)
             baseline(own)
             own.set_title(f"joint {joint}")
             own.set_xlabel("time / s")

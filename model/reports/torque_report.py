@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def torque_report(found: TorqueFit, curves: Sequence[TorqueCurves]) -> Report:
-    """The page; `curves` are of the fitted model, on the traces that are to be drawn."""
+    """The page; `curves` are those of the fitted model on the traces to draw."""
     machine = found.model.machine
     sections = (
         Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.parameters))),
@@ -53,7 +53,7 @@ def _error_table(found: TorqueFit) -> Table:
     return Table(
         ("trace", "", "joint", "rms left", "rms of the torque"),
         tuple(rows),
-        "In N·m (N on a prismatic joint): torque that the motion needs by the model less torque of the recorded drive.",
+        "In N·m (N on a prismatic joint): torque that the model needs for the motion − torque of the recorded drive.",
     )
 
 

@@ -1,4 +1,4 @@
-"""Units as people read them: degrees and millimetres, squares, and what belongs to the kind of a joint."""
+"""Units for readers: degrees and millimetres, squares of units, and the unit of each kind of joint."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _SHOWN = {"rad": (_DEGREES, "°"), "m": (1e3, "mm"), "rad/s": (_DEGREES, "°/s")
 
 
 def shown_unit(unit: str) -> tuple[float, str]:
-    """Factor and name of the unit in which people read: degrees, millimetres."""
+    """Factor and name of the unit to show: degrees for radians, millimetres for metres."""
     return _SHOWN.get(unit, (1.0, unit))
 
 
@@ -29,5 +29,5 @@ def joint_unit(machine: Machine, joint: int) -> str:
 
 
 def squared(units: Iterable[str]) -> str:
-    """Unit of a sum of squares over joints of these units; rad² + m² tells that it is a sum of unlike things."""
+    """Unit of a sum of squares over joints of these units; rad² + m² shows that unlike quantities are summed."""
     return " + ".join(f"({unit})²" if "/" in unit else f"{unit}²" for unit in dict.fromkeys(units))

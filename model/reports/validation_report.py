@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels, thinned
-from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, Tone, cells, listed
+from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, Tone, cells, listed, numbers
 from model.reports.units import joint_unit, squared
 from model.validation.criterion import Curve, Fidelity
 from model.validation.variation import TimeDomain, Variation
@@ -21,19 +21,22 @@ if TYPE_CHECKING:
 
 CURVES_ABREAST = 4
 VARIATIONS_SHOWN = 8
-"""In time, those that explain most of what is left."""
+"""Number of variations with time that are drawn: those that explain most of what is left."""
 
 
 def validation_report(
     label: str, found: tuple[Fidelity, Fidelity], in_time: Sequence[TimeDomain], machine: Machine
 ) -> Report:
-    """The page of a validation; `found` in the source's convention of τ′ and in that of three standard deviations.
+    """The page of a validation; `found` is in the source's convention of τ′ and in that of three standard deviations.
 
-    machine: of the model; it tells the units of its joints.
+    machine: the model's machine, from which the units of its joints are taken.
     """
     source, three = found
     sections = [
-        Section("What would have to move", (_distortion_table(source, three), _contribution_picture(source, three))),
+        Section(
+            "How far parameters would have to vary",
+            (_distortion_table(source, three), _contribution_picture(source, three)),
+        ),
         *([Section("How the error grows", (_curves(source),))] if source.curves else []),
         *(_in_time(one, machine) for one in in_time),
     ]
@@ -72,17 +75,15 @@ def _distortion_table(source: Fidelity, three: Fidelity) -> Table:
         down = "–" if one.change_down is None else f"−{one.change_down:.3g}"
         up = "–" if one.change_up is None else f"+{one.change_up:.3g}"
         needed = "very large" if one.required is None else f"{one.required:.3g}"
-        rows.append((
-            *cells(one.name, f"{one.value:.5g}"), Cell(one.unit),
-            Cell(f"{down} / {up}", number=True), Cell(needed, number=True), Cell(f"{one.expected:.3g}", number=True),
-            Cell(f"{one.contribution:.4f}", number=True), Cell(f"{other.contribution:.4f}", number=True),
-        ))  # fmt: skip
-    return Table(
-        ("parameter", "value", "unit", "doubles the error", "σ needed", "τ′ expected", "λ²", "λ² with â/3"),
-        tuple(rows),
+        shares = (f"{c:.4f}" for c in (one.contribution, other.contribution))
+        found = numbers(f"{down} / {up}", needed, f"{one.expected:.3g}", *shares)
+        rows.append((*cells(one.name, f"{one.value:.5g}"), Cell(one.unit), *found))
+    caption = (
         "The change of one parameter alone that doubles the mean squared error gives σ, the standard deviation it "
-        "would need to explain the residual (4.63); λ² = τ′²/σ² (4.92) compares it with the expected one.",
-    )  # fmt: skip
+        "would need to explain the residual (4.63); λ² = τ′²/σ² (4.92) compares it with the expected one."
+    )
+    head = ("parameter", "value", "unit", "doubles the error", "σ needed", "τ′ expected", "λ²", "λ² with â/3")
+    return Table(head, tuple(rows), caption)
 
 
 def _contribution_picture(source: Fidelity, three: Fidelity) -> Picture:
@@ -152,7 +153,7 @@ def _in_time(one: TimeDomain, machine: Machine) -> Section:
     shown = sorted(one.parameters, key=lambda v: -v.alone_varying)[:VARIATIONS_SHOWN]
     blocks: list[Text | Table | Picture | Points] = [
         Text(
-            "All parameters move together, as little as explains the measured accelerations. A variation beyond its "
+            "All parameters vary together, as little as explains the measured accelerations. A variation beyond its "
             "noise says which term is wrong, when, and what it goes with."
         ),
         _variation_table(one),
@@ -169,12 +170,9 @@ def _variation_table(one: TimeDomain) -> Table:
     for v in one.parameters:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in v.against if c.significant][:2]
         tone: Tone = "plain" if v.within_expectation else "warning"
-        rows.append((
-            Cell(v.name), Cell(f"{v.deviation:.3g}", tone, number=True), Cell(f"{v.expected:.3g}", number=True),
-            Cell(v.unit), Cell(f"{100 * v.significant:.0f} %", number=True),
-            Cell(f"{100 * v.alone_constant:.0f} %", number=True), Cell(f"{100 * v.alone_varying:.0f} %", number=True),
-            Cell(", ".join(strongest) or "–"),
-        ))  # fmt: skip
+        sizes = (*numbers(f"{v.deviation:.3g}", tone=tone), *numbers(f"{v.expected:.3g}"))
+        shares = numbers(*(f"{100 * s:.0f} %" for s in (v.significant, v.alone_constant, v.alone_varying)))
+        rows.append((Cell(v.name), *sizes, Cell(v.unit), *shares, Cell(", ".join(strongest) or "–")))
     return Table(
         ("parameter", "σ of α(t)", "τ′", "unit", "beyond noise", "explains, constant", "varying", "goes with"),
         tuple(rows),
@@ -225,7 +223,7 @@ def _variation_picture(one: TimeDomain, shown: Sequence[Variation]) -> Picture:
 
     caption = (
         f"α(t) of the {len(shown)} parameters that explain most, with twice its noise (shaded) and ±τ′ (dashed). "
-        "No line where no joint that shows the parameter moves."
+        "The line is interrupted where no joint moves that depends on the parameter."
     )
     return Picture(drawn(draw, 1.35 * rows + 0.3), caption)
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from model import layout as at
 from model.dynamics import rod_arm
 from model.dynamics.compilation import compiled, internal
 from model.dynamics.dual import sin_cos
 from model.dynamics.effective_inertia import SIZE
 from model.kinematics.chain import ChainArrays
-from model.machine_model import layout as at
 
 
 @internal

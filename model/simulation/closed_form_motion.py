@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from numpy.typing import NDArray
-
+from model import layout as at
+from model.arrays import Array
 from model.drives.piecewise import magnitude
 from model.dynamics import effective_inertia as lumped
 from model.dynamics.compilation import inlined, internal
 from model.dynamics.dual import sin_cos
 from model.dynamics.linear_solve import solve_3
 from model.dynamics.three_joint import horizontal_gravity_torques, mass_matrix_and_bias
-from model.machine_model import layout as at
 from model.simulation.joint_torques import (
     DEFLECTION,
     POSITION,
@@ -24,6 +23,7 @@ from model.simulation.joint_torques import (
     motor_gain,
     special_torque,
 )
+from model.simulation.run_arrays import Arm
 
 
 @inlined
@@ -46,13 +46,13 @@ def friction_levels(theta_2: Any, theta_3: Any, arms: Any, plain: Any, weight_2:
 
 @internal
 def advance(  # noqa: PLR0915 (a step in registers: three joints written out, nothing allocated)
-    state: NDArray[Any], volts: NDArray[Any], start: complex, duration: complex, steps: int,
-    joints: NDArray[Any], body: NDArray[Any], flags: NDArray[Any],
-) -> None:  # fmt: skip
+    state: Array, volts: Array, start: complex, duration: complex, steps: int, arm: Arm
+) -> None:
     """Advance the state (3, STATE) by `duration` s in equal steps at constant motor volts; rigid transmissions.
 
-    `body` holds the effective parameters (22), then m2 g and the weight of link 3 with its load.
+    The arm's body holds the effective parameters (22), then m2 g and the weight of link 3 with its load.
     """
+    joints, body, flags = arm.joints, arm.body, arm.flags
     h = duration / steps
     half, sixth = 0.5 * h, h / 6.0
     g1, g2, g3 = (

@@ -10,13 +10,13 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
+from model import layout as at
 from model.dynamics import effective_inertia as lumped
 from model.dynamics import recursive, three_joint
 from model.dynamics.compilation import compiled, internal
 from model.dynamics.dual import sin_cos
 from model.dynamics.three_joint_motion import accelerations
 from model.kinematics.chain import ChainArrays
-from model.machine_model import layout as at
 from model.simulation.bodies import chain_body, rod_arm_body
 from model.simulation.closed_form_motion import friction_levels
 from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from model import layout as at
+from model.arrays import Array
 from model.dynamics.compilation import internal
-from model.machine_model import layout as at
 from model.simulation.dynamics_of_run import accelerate, friction_levels_of, gravity_of
 from model.simulation.joint_torques import (
     DEFLECTION,
@@ -29,6 +27,7 @@ from model.simulation.joint_torques import (
     transmitted,
 )
 from model.simulation.own_torque import own_torque
+from model.simulation.run_arrays import Arm
 
 # Rows of the work array (WORK, n): stage values, accelerations, weighted sums.
 Q, V, M, W, TORQUE, A, B, LEVEL, SUM_V, SUM_A, SUM_W, SUM_B, LOAD = range(13)
@@ -37,14 +36,13 @@ WORK = 13
 
 @internal
 def advance(
-    own: NDArray[np.int64], kind: Any, state: NDArray[Any], volts: NDArray[Any], start: complex,
-    duration: complex, steps: int, joints: NDArray[Any], body: Any, flags: NDArray[Any], settings: NDArray[Any],
-    work: NDArray[Any],
-) -> None:  # fmt: skip
+    kind: Any, state: Array, volts: Array, start: complex, duration: complex, steps: int, arm: Arm, work: Array
+) -> None:
     """Advance the state (n, STATE) by `duration` s in equal steps at constant motor volts.
 
-    `own` (n, e, 2) are the user's own effects (`own_torque`); `kind` is a tag that chooses the dynamics.
+    `kind` is a tag that chooses the dynamics; `work` (WORK, n) is overwritten.
     """
+    joints, body, flags, own = arm.joints, arm.body, arm.flags, arm.own
     n = joints.shape[0]
     h = duration / steps
     for step in range(steps):
@@ -52,7 +50,7 @@ def advance(
         for stage in range(4):
             reach = 0.0 * h if stage == 0 else (h if stage == 3 else 0.5 * h)
             _to_stage(state, work, reach)
-            friction_levels_of(kind, work[Q], joints, body, settings, work[LEVEL])
+            friction_levels_of(kind, work[Q], joints, body, arm.settings, work[LEVEL])
             now = start + step * h + reach
             if own.shape[1] > 0:
                 work[LOAD] = gravity_of(kind, work[Q], joints, body)
@@ -88,7 +86,7 @@ def advance(
 
 
 @internal
-def _begin(state: NDArray[Any], work: NDArray[Any]) -> None:
+def _begin(state: Array, work: Array) -> None:
     """A step begins: stage values are those of the state, accelerations and sums are zero."""
     for j in range(state.shape[0]):
         work[V, j], work[W, j] = state[j, SPEED], state[j, ROTOR_SPEED]
@@ -98,7 +96,7 @@ def _begin(state: NDArray[Any], work: NDArray[Any]) -> None:
 
 
 @internal
-def _to_stage(state: NDArray[Any], work: NDArray[Any], reach: complex) -> None:
+def _to_stage(state: Array, work: Array, reach: complex) -> None:
     """Stage values from the state and the rates of the stage before."""
     for j in range(state.shape[0]):
         work[Q, j] = state[j, POSITION] + reach * work[V, j]
@@ -108,7 +106,7 @@ def _to_stage(state: NDArray[Any], work: NDArray[Any], reach: complex) -> None:
 
 
 @internal
-def _add_stage(work: NDArray[Any], weight: float) -> None:
+def _add_stage(work: Array, weight: float) -> None:
     """The stage's rates, weighted, into the sums."""
     for j in range(work.shape[1]):
         work[SUM_V, j] += weight * work[V, j]
@@ -118,7 +116,7 @@ def _add_stage(work: NDArray[Any], weight: float) -> None:
 
 
 @internal
-def _end(state: NDArray[Any], work: NDArray[Any], sixth: complex, joints: NDArray[Any]) -> None:
+def _end(state: Array, work: Array, sixth: complex, joints: Array) -> None:
     """The state after the step."""
     for j in range(state.shape[0]):
         moved = sixth * work[SUM_V, j]

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import TraceError
 from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.drives import controller as pid
-
-Floats = NDArray[np.float64]
 
 REST_COUNTS = 2.0
 """Counts of the sensor within which the readings before the first new set point count as one posture."""
@@ -90,10 +88,21 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
     if trace.velocity is not None:
         initial[:, 0], initial[:, 1] = measured[0], trace.velocity[0, columns]
     return RunInputs(
-        joints, period, trace.time[0] + period * np.arange(count), set_points, drive,
-        readings_on_grid(measured, rows, count), initial, drive[0].copy(), rows, _gains(machine, trace),
-        np.zeros((count, len(joints))), trace.record.trace_id, trace.set_point is not None, trace.drive is not None,
-    )  # fmt: skip
+        joints,
+        period,
+        trace.time[0] + period * np.arange(count),
+        set_points,
+        drive,
+        readings_on_grid(measured, rows, count),
+        initial,
+        drive[0].copy(),
+        rows,
+        _gains(machine, trace),
+        np.zeros((count, len(joints))),
+        trace.record.trace_id,
+        trace.set_point is not None,
+        trace.drive is not None,
+    )
 
 
 def _check_unit(trace: Trace, measured: Floats, machine: Machine) -> None:

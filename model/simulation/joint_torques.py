@@ -11,12 +11,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model import layout as at
+from model.arrays import Array
 from model.drives.piecewise import clamped, magnitude, outside
 from model.dynamics.compilation import inlined, internal
 from model.dynamics.dual import sin_cos
-from model.machine_model import layout as at
 
 RESTICK_SPEED = 1e-3
 """rad/s (m/s): a sliding joint slower than this sticks again."""
@@ -49,13 +49,13 @@ def deflection(z: Any, displacement: Any, softness: Any, shape: Any) -> Any:
 
 
 @inlined
-def motor_gain(joint: NDArray[Any], rise: Any) -> Any:
+def motor_gain(joint: Array, rise: Any) -> Any:
     """Joint torque a volt (N·m/V), n K_T / R, for a winding warmed by `rise`."""
     return joint[at.GEAR] * joint[at.TORQUE_CONSTANT] / (joint[at.RESISTANCE] * (1.0 + rise))
 
 
 @inlined
-def motor_damping(joint: NDArray[Any], rise: Any) -> Any:
+def motor_damping(joint: Array, rise: Any) -> Any:
     """Joint torque a rad/s (N·m·s/rad): back-EMF through the winding, and viscous friction (7.30)."""
     back_emf = joint[at.BACK_EMF] * (1.0 + joint[at.BACK_EMF_ERROR])
     electrical = joint[at.TORQUE_CONSTANT] * back_emf / (joint[at.RESISTANCE] * (1.0 + rise))
@@ -63,7 +63,7 @@ def motor_damping(joint: NDArray[Any], rise: Any) -> Any:
 
 
 @inlined
-def steady_current(joint: NDArray[Any], rise: Any, volts: Any, speed: Any) -> Any:
+def steady_current(joint: Array, rise: Any, volts: Any, speed: Any) -> Any:
     """Current once it has settled, A; `speed` is the joint's, on the motor's side of the transmission."""
     back_emf = joint[at.BACK_EMF] * (1.0 + joint[at.BACK_EMF_ERROR])
     return (volts - back_emf * joint[at.GEAR] * speed) / (joint[at.RESISTANCE] * (1.0 + rise))
@@ -83,9 +83,7 @@ def winding_functions(x: Any) -> Any:
 
 
 @inlined
-def stage_current(
-    joint: NDArray[Any], rise: Any, current: Any, volts: Any, begun: Any, speed: Any, stage: int, h: Any
-) -> Any:
+def stage_current(joint: Array, rise: Any, current: Any, volts: Any, begun: Any, speed: Any, stage: int, h: Any) -> Any:
     """Current at a stage (0 to 3) of a step of RK4, such that the step gets the impulse, and the way, of the exact one.
 
     The current's excess over the settled one, e, follows ė = −R/L e − d(settled)/dt. The stages' weights 1, 2, 2, 1 are
@@ -106,7 +104,7 @@ def stage_current(
 
 
 @inlined
-def current_after(joint: NDArray[Any], rise: Any, current: Any, volts: Any, begun: Any, speed: Any, h: Any) -> Any:
+def current_after(joint: Array, rise: Any, current: Any, volts: Any, begun: Any, speed: Any, h: Any) -> Any:
     """Current after a step of h s in which the speed changed evenly from `begun` to `speed`: exact for that."""
     turns = joint[at.RESISTANCE] * (1.0 + rise) / joint[at.INDUCTANCE] * h
     first, _, _ = winding_functions(turns)
@@ -117,9 +115,8 @@ def current_after(joint: NDArray[Any], rise: Any, current: Any, volts: Any, begu
 
 @internal
 def extra_torque(
-    joint: NDArray[Any], flags: int, time: complex, q: complex, speed: complex, z: complex, stuck: complex,
-    through: complex,
-) -> Any:  # fmt: skip
+    joint: Array, flags: int, time: complex, q: complex, speed: complex, z: complex, stuck: complex, through: complex
+) -> Any:
     """Torque on the joint from effects that most models leave out, N·m; zero at their null values.
 
     `stuck` is 1 where the joint sticks, else 0; `through` is what the gear transmits, seen at the joint: the motor's
@@ -147,9 +144,19 @@ def extra_torque(
 
 @inlined
 def special_torque(
-    joint: NDArray[Any], flags: int, stage: int, time: Any, h: Any, q: Any, speed: Any, rotor_speed: Any, begun: Any,
-    z: Any, state: NDArray[Any], volts: Any,
-) -> Any:  # fmt: skip
+    joint: Array,
+    flags: int,
+    stage: int,
+    time: Any,
+    h: Any,
+    q: Any,
+    speed: Any,
+    rotor_speed: Any,
+    begun: Any,
+    z: Any,
+    state: Array,
+    volts: Any,
+) -> Any:
     """What inductance and added torques add to a joint's torque at a stage of a step of `h` s, which began with the
     rotor's speed at `begun`."""
     steady = steady_current(joint, state[RISE], volts, rotor_speed)
@@ -164,8 +171,8 @@ def special_torque(
 
 @internal
 def after_step(
-    state: NDArray[Any],
-    joint: NDArray[Any],
+    state: Array,
+    joint: Array,
     flags: int,
     level: complex,
     rotor_speed: complex,
@@ -185,7 +192,7 @@ def after_step(
 
 
 @internal
-def still_stuck(joint: NDArray[Any], level: complex, speed: complex, z: NDArray[Any], stuck: NDArray[Any]) -> None:
+def still_stuck(joint: Array, level: complex, speed: complex, z: Array, stuck: Array) -> None:
     """Breaks away when the contact is stretched to its end; sticks again when motion stops or turns.
 
     Sticking again keeps the torque: the contact takes up the smaller deflection that carries it.
@@ -201,7 +208,7 @@ def still_stuck(joint: NDArray[Any], level: complex, speed: complex, z: NDArray[
 
 
 @inlined
-def transmitted(joint: NDArray[Any], twist: Any, twist_rate: Any) -> Any:
+def transmitted(joint: Array, twist: Any, twist_rate: Any) -> Any:
     """Torque through a transmission that gives and has play, N·m, for rotor less link angle (rad at the joint)."""
     stretched = outside(twist, 0.5 * joint[at.GAP])
     if stretched.real == 0.0:

@@ -117,8 +117,10 @@ def _check_values(kind: Effect, real: Any, dual: Any) -> None:
             seeded[k] += 1j * DUAL_STEP
             exact = _value(dual, seeded)
             if not np.isclose(exact.real, _value(real, point), rtol=1e-9, atol=1e-12):
-                raise SpecError(f"effect {kind.name}: its torque differs in real and in dual numbers; is it a function "
-                                "of its arguments alone?")  # fmt: skip
+                raise SpecError(
+                    f"effect {kind.name}: its torque differs in real and in dual numbers; is it a function "
+                    "of its arguments alone?"
+                )
             wrong[k] += not np.isclose(exact.imag / DUAL_STEP, slope, rtol=TOLERANCE, atol=TOLERANCE)
         _check_null(kind, real, point)
     for k, name in enumerate(names):

@@ -15,8 +15,8 @@ from numba.extending import intrinsic
 from numba.np import arrayobj
 from numpy.typing import NDArray
 
+from model import layout as at
 from model.dynamics.compilation import internal
-from model.machine_model import layout as at
 
 # numba's tools for compiled code have no types of their own that hold here
 cgutils: Any = builders
@@ -35,8 +35,8 @@ def own_torque(
     torque = 0.0 * (q + joint[0])
     for e in range(own.shape[0]):
         if own[e, ADDRESS] != 0:
-            motion = (q + 0.0 * torque, speed + 0.0 * torque, volts + 0.0 * torque, load + 0.0 * torque,
-                      time + 0.0 * torque)  # fmt: skip
+            none = 0.0 * torque
+            motion = (q + none, speed + none, volts + none, load + none, time + none)
             torque += called(own[e, ADDRESS], motion, joint[at.USER + own[e, BEYOND] :])
     return torque
 

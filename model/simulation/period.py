@@ -5,17 +5,30 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model import layout as at
+from model.arrays import Array
 from model.drives.amplifier import warmed
 from model.drives.controller import LAST_READING, board_pid, cascade, sampled_pid
 from model.drives.sensor import reading
 from model.dynamics.compilation import internal
-from model.machine_model import layout as at
 from model.simulation.joint_torques import POSITION, RISE, ROTOR_POSITION, ROTOR_SPEED, SPEED
+from model.simulation.run_arrays import Arm, RecordRow
 
 QUEUE = 16
-"""Commands kept: the drive may act up to 14 periods late."""
+"""Number of commands kept: the drive may act up to 14 periods late."""
+
+EXTRA_TORQUES = (
+    at.STRIBECK,
+    at.DIRECTION,
+    at.GEAR_LOSS,
+    at.RIPPLE_SINE,
+    at.RIPPLE_COSINE,
+    at.SPRING,
+    at.DISTURBANCE_SINE,
+    at.DISTURBANCE_COSINE,
+)
+"""Columns of a joint that add a torque unless they are zero."""
 
 # What a run gives a period and joint.
 OUT_POSITION, OUT_SPEED, OUT_READING, OUT_ERROR, OUT_POWER, OUT_DRIVE = range(6)
@@ -23,30 +36,26 @@ OUTPUTS = 6
 
 
 @internal
-def sample(
-    k: int, j: int, state: NDArray[Any], set_points: NDArray[Any], recorded: NDArray[Any], noise: NDArray[Any],
-    readings: NDArray[Any], following: float, gains: NDArray[Any], shared: NDArray[Any], joints: NDArray[Any],
-    settings: NDArray[Any], memory: NDArray[Any], out: NDArray[Any],
-) -> Any:  # fmt: skip
+def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Array, out: Array) -> Any:
     """Reading, error and power of joint index j in period k, written to `out`; returns the commanded motor volts.
 
     The controller reads `following` of the way from the model's reading to the recorded one, where there is one.
     """
-    joint = joints[j]
-    kind, quantise = settings[at.CONTROLLER], settings[at.QUANTISE] != 0
+    joint, period, set_points = arm.joints[j], arm.shared[at.PERIOD], record.set_points
+    kind, quantise = record.settings[at.CONTROLLER], record.settings[at.QUANTISE] != 0
     has_sensor = joint[at.RAD_PER_COUNT].real != 0.0
-    read = reading(state[j, POSITION], noise[k, j], quantise, joint)
+    read = reading(state[j, POSITION], record.noise[k, j], quantise, joint)
     wanted = set_points[k, j] - joint[at.LOST] * (set_points[k, j] - set_points[max(k - 1, 0), j])
     unit = joint[at.RAD_PER_COUNT] if has_sensor else 1.0 + 0.0 * joint[at.RAD_PER_COUNT]
     zero = joint[at.AT_ZERO] if has_sensor else 0.0 * joint[at.AT_ZERO]
     out[OUT_READING, k, j] = zero + unit * read
-    if following != 0.0 and not np.isnan(readings[k, j]):
-        read += following * ((readings[k, j] - zero) / unit - read)
+    if record.following != 0.0 and not np.isnan(record.readings[k, j]):
+        read += record.following * ((record.readings[k, j] - zero) / unit - read)
     if kind == at.BOARD_PID:
         error = wanted - read
         if k == 0:
             memory[j, 1] = error
-        power = board_pid(error, gains[j], joint, quantise, memory[j])
+        power = board_pid(error, record.gains[j], joint, quantise, memory[j])
         drive = power * joint[at.VOLTS_PER_COUNT]
         error = error * unit
     else:
@@ -55,13 +64,13 @@ def sample(
             memory[j, 1], memory[j, LAST_READING] = error, read
         scale = 1.0 + joint[at.GAIN_ERROR]
         if kind == at.SAMPLED_PID:
-            drive = scale * sampled_pid(error, shared[at.PERIOD], gains[j], memory[j])
+            drive = scale * sampled_pid(error, period, record.gains[j], memory[j])
         elif kind == at.CASCADE:
-            speed = unit * (read - memory[j, LAST_READING]) / shared[at.PERIOD]
-            drive = scale * cascade(error, speed, shared[at.PERIOD], gains[j], memory[j])
+            speed = unit * (read - memory[j, LAST_READING]) / period
+            drive = scale * cascade(error, speed, period, record.gains[j], memory[j])
             memory[j, LAST_READING] = read
         else:
-            drive = recorded[k, j] + 0.0 * error
+            drive = record.recorded[k, j] + 0.0 * error
         power = drive / joint[at.VOLTS_PER_COUNT]
     out[OUT_POSITION, k, j] = state[j, POSITION]
     out[OUT_SPEED, k, j] = state[j, SPEED]
@@ -72,10 +81,10 @@ def sample(
 
 
 @internal
-def switching_times(shared: NDArray[Any], joints: NDArray[Any], order: NDArray[Any], times: NDArray[Any]) -> Any:
+def switching_times(shared: Array, joints: Array, order: Array, times: Array) -> Any:
     """When in a period each joint's drive changes (`times`, s), in which order, and whole periods of delay per joint.
 
-    Compared by their real parts; equal ones keep the joints' order, so that dual parts give exact derivatives.
+    Times are compared by their real parts; equal ones keep the joints' order: dual parts then give exact derivatives.
     """
     n = joints.shape[0]
     periods = np.zeros(n, dtype=np.int64)
@@ -104,7 +113,7 @@ BEGUN = 3
 
 
 @internal
-def warms(joints: NDArray[Any]) -> bool:
+def warms(joints: Array) -> bool:
     """Whether any winding warms: then each step of integration has its own resistance, and the steps stay the same."""
     found = False
     for j in range(joints.shape[0]):
@@ -113,10 +122,7 @@ def warms(joints: NDArray[Any]) -> bool:
 
 
 @internal
-def begin_stretch(
-    state: NDArray[Any], volts: NDArray[Any], duration: complex, joints: NDArray[Any], flags: NDArray[Any],
-    begun: NDArray[Any],
-) -> None:  # fmt: skip
+def begin_stretch(state: Array, volts: Array, duration: complex, joints: Array, flags: Array, begun: Array) -> None:
     """Remembers in `begun` (BEGUN, n) where each motor is; gives windings the resistance of the stretch's middle."""
     for j in range(joints.shape[0]):
         if joints[j, at.HEATING] != 0.0:
@@ -129,33 +135,24 @@ def begin_stretch(
 
 
 @internal
-def end_stretch(
-    state: NDArray[Any], volts: NDArray[Any], duration: complex, joints: NDArray[Any], flags: NDArray[Any],
-    begun: NDArray[Any],
-) -> None:  # fmt: skip
+def end_stretch(state: Array, volts: Array, duration: complex, joints: Array, flags: Array, begun: Array) -> None:
     """Resistance of each winding after the stretch, from the motion that it had."""
     for j in range(joints.shape[0]):
         if joints[j, at.HEATING] != 0.0:
             gives = flags[j] & at.HAS_FLEXIBILITY != 0
             ended = state[j, ROTOR_SPEED] if gives else state[j, SPEED]
             moved = (state[j, ROTOR_POSITION] if gives else state[j, POSITION]) - begun[BEGUN_POSITION, j]
-            state[j, RISE] = warmed(
-                begun[BEGUN_RISE, j], state[j, RISE], volts[j], begun[BEGUN_SPEED, j], ended, moved / duration,
-                duration, joints[j],
-            )  # fmt: skip
+            rise, hot, start = begun[BEGUN_RISE, j], state[j, RISE], begun[BEGUN_SPEED, j]
+            state[j, RISE] = warmed(rise, hot, volts[j], start, ended, moved / duration, duration, joints[j])
 
 
 @internal
-def extra_flags(joints: NDArray[Any], flags: NDArray[Any]) -> NDArray[Any]:
+def extra_flags(joints: Array, flags: Array) -> Array:
     """The joints' mode flags with the bit of every added torque that is not at its null value."""
     result = np.empty(flags.shape[0], dtype=np.int64)
     for j in range(joints.shape[0]):
-        joint = joints[j]
         result[j] = flags[j]
-        if (
-            joint[at.STRIBECK] != 0.0 or joint[at.DIRECTION] != 0.0 or joint[at.GEAR_LOSS] != 0.0
-            or joint[at.RIPPLE_SINE] != 0.0 or joint[at.RIPPLE_COSINE] != 0.0 or joint[at.SPRING] != 0.0
-            or joint[at.DISTURBANCE_SINE] != 0.0 or joint[at.DISTURBANCE_COSINE] != 0.0
-        ):  # fmt: skip
-            result[j] |= at.HAS_EXTRA_TORQUE
+        for column in EXTRA_TORQUES:
+            if joints[j, column] != 0.0:
+                result[j] |= at.HAS_EXTRA_TORQUE
     return result

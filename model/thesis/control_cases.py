@@ -19,15 +19,15 @@ from model.thesis.tables import BASIC_WITH_BACK_EMF, VISCOUS, VISCOUS_AND_COULOM
 Floats = NDArray[np.float64]
 
 START = (math.pi, math.pi / 4, 0.0)
-"""rad: 180°, 45°, 0° (section 8.2.1)."""
+"""Start posture, rad: 180°, 45°, 0° (section 8.2.1)."""
 OTHER_START = (math.pi, math.pi / 2, 0.0)
-"""rad: joint 2 at 90° (section 8.3)."""
+"""Start posture with joint 2 at 90°, rad (section 8.3)."""
 AMPLITUDE = math.radians(60)
 PERIOD = 3.0
 PHASE = (0.0, -math.pi / 2, 0.0)
-"""rad. Joint 2's is not given: with this one it starts at the lower end of its sinusoid and stays in range."""
+"""Phases of the joints' sinusoids, rad. Joint 2's is not given; with this one it starts at its lower end, in range."""
 DURATION = 9.0
-"""s: three periods; the source does not give it."""
+"""Length of a run, s: three periods; the source does not give it."""
 
 BackEmf = Literal["tabled", "plant"]
 Triple = tuple[float, float, float]
@@ -41,7 +41,7 @@ class ControlCase(_Part):
     """One run. Angles in rad, one series a joint.
 
     `back_emf`: whether the law compensates the back-EMF with its own table's constants or with the plant's.
-    `amplitude_ratio` is swing of the position over swing of the wanted one in the first period and in the last;
+    `amplitude_ratio` is the swing of the position over that of the wanted motion in the first period and in the last;
     `rms` the root mean square error over the run (rad); `overshoot` how far the position goes beyond the wanted one
     on the other side of an initial error, or beyond the wanted sinusoid's ends (rad).
     """

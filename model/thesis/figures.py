@@ -24,7 +24,7 @@ from model.thesis.tables import (
 
 
 class TorqueFigures(BaseModel):
-    """Torques along the simulated motion of a trace's set points, and what the source reads from its figures."""
+    """Torques along the simulated motion of a trace's set points, and what the source states of them."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -1,4 +1,4 @@
-"""The four models of chapter 7 fitted one after the other: does each step explain more?"""
+"""The four models of chapter 7 fitted one after the other, to see whether each explains more than the one before."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from daq.contracts.trace import Trace
 from model.fitting.fit import fit
 from model.fitting.options import FitOptions, Prior
 from model.machine_model.model import Model
-from model.simulation.simulate import Options
+from model.simulation.prepared import Options
 from model.thesis.check import Check, Choice
 from model.thesis.published_models import FRICTION_SYMBOLS, PARAMETER, model_of, unfitted
 from model.thesis.tables import (
@@ -35,15 +35,15 @@ from model.validation.squared_error import squared_error
 Method = Literal["nelder_mead", "least_squares"]
 
 MASS_AND_LENGTH_FACTOR = 5.0
-"""Upper bounds of masses and lengths over table 7.2; the source's own factor for link 1 (section 7.2)."""
+"""Upper bounds of masses and lengths, as multiples of table 7.2; the source has it for link 1 (section 7.2)."""
 LARGEST_BACK_EMF = 0.15
-"""V·s/rad; the source found its upper bound by trial."""
+"""Upper bound of back-EMF constants, V·s/rad; the source found its own by trial."""
 LARGEST_VISCOUS = 3e-4
-"""N·m·s/rad on the motor's side; by trial in the source, so a little above what it found (2.5e-4)."""
+"""Upper bound of viscous friction, N·m·s/rad on the motor's side: a little above the source's result (2.5e-4)."""
 LARGEST_FRICTION_ARM = 0.5
-"""m; by trial in the source."""
+"""Upper bound of the friction arm, m; found by trial in the source."""
 BACK_EMF_DEVIATION = DATA_SHEET_BACK_EMF_2 * gaussian_share("source")
-"""V·s/rad, τ′ of K_b2 at its data-sheet value."""
+"""τ′ of K_b2 at its data-sheet value, V·s/rad."""
 CURVE_POINTS = 25
 RECOVERED = 0.25
 """Relative error within which a fitted parameter counts as that of the plant."""
@@ -58,7 +58,7 @@ PLAIN = FitOptions(
     whiten=False,
     rounds=1,
 )
-"""The source's squared error: no priors, weights, nuisances or noise."""
+"""Options of a fit to the source's squared error, which has no priors, weights, nuisances or noise."""
 
 
 class _Part(BaseModel):
@@ -186,7 +186,7 @@ def _value(model: Model, symbol: str) -> float:
 
 
 def _prior(symbol: str) -> Prior:
-    """Where a parameter stays if the record does not move it. Hill climbing takes its first steps from it, no more."""
+    """The value a parameter keeps if the record does not change it. Hill climbing only takes its first step from it."""
     if symbol == "Kb2":
         return Prior(expected=DATA_SHEET_BACK_EMF_2, deviation=BACK_EMF_DEVIATION)
     if symbol in FRICTION_SYMBOLS:
@@ -258,7 +258,7 @@ def ladder_checks(steps: Sequence[LadderStep]) -> tuple[Check, ...]:
 
 
 def not_recovered(ladder: Ladder) -> str:
-    """In a sentence: which parameters of the last model come out far from table 7.9, with which the plant was made."""
+    """A sentence that names the parameters of the last model that are far from those of the plant, table 7.9."""
     last = ladder.steps[-1]
     truth = last.published_values
     off = [s for s, v in last.values.items() if abs(v / truth[s] - 1) > RECOVERED]
@@ -271,7 +271,7 @@ def not_recovered(ladder: Ladder) -> str:
 
 
 def joint_2_damping(values: dict[str, float]) -> float:
-    """K_b2 + v_eff2 R/K_T, V·s/rad: what the motion of joint 2 shows of back-EMF and viscous friction together."""
+    """K_b2 + v_eff2 R/K_T, V·s/rad: the sum of back-EMF and viscous friction, all that joint 2 shows."""
     return values["Kb2"] + values.get("v_eff2", 0.0) * RESISTANCE[1] / TORQUE_CONSTANT[1]
 
 

@@ -55,6 +55,11 @@ def _recomputed(model: PublishedModel, convention: Convention) -> RecomputedFide
         for symbol, value in model.values.items()
     }
     return RecomputedFidelity(
-        name=model.name, table=model.table, deviation_table=model.deviation_table, convention=convention,
-        published=model.sum_lambda, ours=math.fsum(contributions.values()), contributions=contributions,
-    )  # fmt: skip
+        name=model.name,
+        table=model.table,
+        deviation_table=model.deviation_table,
+        convention=convention,
+        published=model.sum_lambda,
+        ours=math.fsum(contributions.values()),
+        contributions=contributions,
+    )

@@ -1,4 +1,4 @@
-"""The models of chapter 7 as models of this library, with the published values or as they start."""
+"""The models of chapter 7 as models of this library, with the published values or with those that a fit starts from."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from model.machine_model.model import Model, base_model
 from model.thesis.tables import DATA_SHEET_BACK_EMF_2, SHARED_BACK_EMF, SYMBOLS, UNOPTIMISED, PublishedModel
 
 PARAMETER = {symbol.name: symbol.parameter for symbol in SYMBOLS}
-"""Names in a model by symbol."""
+"""Names of parameters in a model, by the symbols of the source."""
 FRICTION_SYMBOLS = ("v_eff1", "v_eff2", "v_eff3", "μ̃")
 
 

@@ -17,7 +17,7 @@ from model.thesis.ladder import Ladder, Method, climb_ladder, not_recovered
 from model.thesis.published_fidelity import RecomputedFidelity, recomputed_fidelities
 
 RECOMPUTED_TOLERANCE = 0.03
-"""Relative difference within which Σλ² recomputed from the tables counts as the published one."""
+"""Largest relative difference at which Σλ² recomputed from the tables counts as the published one."""
 
 
 class _Part(BaseModel):
@@ -43,9 +43,13 @@ class Reproduction(_Part):
 
 
 def reproduce_thesis(
-    traces: Sequence[Trace], methods: Sequence[Method] = ("nelder_mead", "least_squares"), *,
-    evaluations: int | None = None, progress: Progress = silent, cancel: Cancel | None = None,
-) -> Reproduction:  # fmt: skip
+    traces: Sequence[Trace],
+    methods: Sequence[Method] = ("nelder_mead", "least_squares"),
+    *,
+    evaluations: int | None = None,
+    progress: Progress = silent,
+    cancel: Cancel | None = None,
+) -> Reproduction:
     """Reproduce chapters 5, 7 and 8.
 
     Args:
@@ -71,25 +75,28 @@ def reproduce_thesis(
         ladders.append(climb_ladder(traces, method, evaluations=evaluations, progress=tell, cancel=cancel))
     figures = torque_figures(traces[0])
     control = control_chapter(lambda f, text: progress(0.85 + 0.15 * f, text), cancel)
-    checks = (
-        *(_recomputed(f) for f in fidelity if f.convention == "source"), *_tables(influence),
-        *(c.model_copy(update={"name": f"{ladder.method}: {c.name}"}) for ladder in ladders for c in ladder.checks),
-        *figures.checks, *control.checks,
-    )  # fmt: skip
+    sums = [_recomputed(f) for f in fidelity if f.convention == "source"]
+    steps = [c.model_copy(update={"name": f"{x.method}: {c.name}"}) for x in ladders for c in x.checks]
     progress(1.0, "done")
     return Reproduction(
-        fidelity=fidelity, influence=influence, ladders=tuple(ladders), figures=figures, control=control, checks=checks,
+        fidelity=fidelity,
+        influence=influence,
+        ladders=tuple(ladders),
+        figures=figures,
+        control=control,
+        checks=(*sums, *_tables(influence), *steps, *figures.checks, *control.checks),
         choices=(*_experiment(traces), *ladders[0].choices, *control.choices),
         findings=(*FINDINGS, *(not_recovered(ladder) for ladder in ladders), *control.findings),
-    )  # fmt: skip
+    )
 
 
 def _recomputed(f: RecomputedFidelity) -> Check:
     return Check(
         name=f"Σλ² of the {f.name} model from tables {f.table} and {f.deviation_table}",
-        holds=abs(f.relative_difference) <= RECOMPUTED_TOLERANCE, ours=f"{f.ours:.4f} ({f.relative_difference:+.1%})",
+        holds=abs(f.relative_difference) <= RECOMPUTED_TOLERANCE,
+        ours=f"{f.ours:.4f} ({f.relative_difference:+.1%})",
         published=f"{f.published:.4f}",
-    )  # fmt: skip
+    )
 
 
 def _tables(influence: Sequence[Influence]) -> list[Check]:
@@ -99,10 +106,8 @@ def _tables(influence: Sequence[Influence]) -> list[Check]:
         said = [f"without effect: {', '.join(too_many)}"] if too_many else []
         said += [f"missing: {', '.join(too_few)}"] if too_few else []
         where = f"link {entry.joint}" if entry.table == "5.3" else f"joint {entry.joint}"
-        checks.append(
-            Check(name=f"table {entry.table}, {where}", holds=not said, ours="; ".join(said) or "as published",
-                  published=f"{len(entry.published)} parameters")
-        )  # fmt: skip
+        ours, published = "; ".join(said) or "as published", f"{len(entry.published)} parameters"
+        checks.append(Check(name=f"table {entry.table}, {where}", holds=not said, ours=ours, published=published))
     return checks
 
 
@@ -111,13 +116,14 @@ def _experiment(traces: Sequence[Trace]) -> tuple[Choice, ...]:
     start = ", ".join(f"{q:.3f}" for q in first.position[0])
     length = float(first.time[-1] - first.time[0])
     gains = "as in the machine file" if first.record.gains is None else str(first.record.gains)
+    taken = f"settings {gains}; counts to volts as in the machine file"
+    missing = "P = 2 is given, the physical gain and the converter's span are not"
     return (
         Choice(what="start posture of the ramp", value=f"{start} rad", why="not given"),
         Choice(what="length of the record", value=f"{length:.2f} s, {len(first)} samples", why="not given"),
-        Choice(what="actual gain", value=f"settings {gains}; counts to volts as in the machine file",
-               why="P = 2 is given, the physical gain and the converter's span are not"),
+        Choice(what="actual gain", value=taken, why=missing),
         Choice(what="plant", value="the trace's: " + first.record.source, why="the measured traces of 1991 are lost"),
-    )  # fmt: skip
+    )
 
 
 FINDINGS = (

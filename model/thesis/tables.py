@@ -18,7 +18,7 @@ class Symbol:
 
 
 SHARED_BACK_EMF = "joints1+3.motor.back_emf_constant"
-"""Joints 1 and 3 have the same motor: one back-EMF constant, K_b1-3."""
+"""Name of the back-EMF constant K_b1-3, which joints 1 and 3 share because they have the same motor."""
 
 SYMBOLS = (
     Symbol("m1", "kg", "link1.mass"),
@@ -40,7 +40,7 @@ SYMBOLS = (
 DATA_SHEET_BACK_EMF_2 = 0.0334
 """K_b of the Escap motor, V·s/rad (table 7.1)."""
 DATA_SHEET_BACK_EMF_1_3 = 0.0208
-"""K_b of the Maxon motors as it follows from K_T in SI units; the source starts at 0.030 instead."""
+"""K_b of the Maxon motors, V·s/rad, as it follows from K_T in SI units; the source starts at 0.030 instead."""
 
 RESISTANCE = (5.49, 4.5, 5.49)
 TORQUE_CONSTANT = (0.0208, 0.033, 0.0208)
@@ -77,15 +77,11 @@ class PublishedModel:
         """The arm that the table describes."""
         v = self.values
         rotor = tuple(g * g * j for g, j in zip(GEAR, ROTOR_INERTIA, strict=True))
-        body = RodArm(
-            v["m1"], v["R1"], v["m2"], v["m3"], v["MLOAD"], v["A2"], v["A3"],
-            rotor_inertia=(rotor[0], rotor[1], rotor[2]), gravity=(0.0, 0.0, -9.81),
-            published_inertia=published_inertia,
-        )  # fmt: skip
-        arm = DrivenArm(
-            body, RESISTANCE, TORQUE_CONSTANT,
-            (v["Kb1-3"], v.get("Kb2", DATA_SHEET_BACK_EMF_2), v["Kb1-3"]), GEAR,
-        )  # fmt: skip
+        links = (v["m1"], v["R1"], v["m2"], v["m3"], v["MLOAD"], v["A2"], v["A3"])
+        body = RodArm(*links, rotor_inertia=(rotor[0], rotor[1], rotor[2]), published_inertia=published_inertia)
+        body = replace(body, gravity=(0.0, 0.0, -9.81))
+        back_emf = (v["Kb1-3"], v.get("Kb2", DATA_SHEET_BACK_EMF_2), v["Kb1-3"])
+        arm = DrivenArm(body, RESISTANCE, TORQUE_CONSTANT, back_emf, GEAR)
         viscous = (v.get("v_eff1", 0.0), v.get("v_eff2", 0.0), v.get("v_eff3", 0.0))
         return replace(arm, viscous=viscous, friction_arm=v.get("μ̃", 0.0))
 
@@ -103,57 +99,74 @@ UNOPTIMISED = PublishedModel(
 )
 
 BASIC = PublishedModel(
-    "basic", "7.3", "7.4",
-    _values(2.93606, 1.22802, 0.64424, 1.11327, 0.05376, 0.89820, 0.32245, 0.03776),
-    _column(None, 0.9342, 0.4001, 0.6560, None, 0.1674, 0.0557, 0.0263),
-    1.4651e-3, 0.2449,
-)  # fmt: skip
+    name="basic",
+    table="7.3",
+    deviation_table="7.4",
+    values=_values(2.93606, 1.22802, 0.64424, 1.11327, 0.05376, 0.89820, 0.32245, 0.03776),
+    deviations=_column(None, 0.9342, 0.4001, 0.6560, None, 0.1674, 0.0557, 0.0263),
+    mean_squared_error=1.4651e-3,
+    sum_lambda=0.2449,
+)
 
 BASIC_WITH_BACK_EMF = PublishedModel(
-    "basic + Kb2", "7.5", "7.6",
-    _values(2.050781, 0.401821, 0.229105, 1.017110, 0.049466, 0.235155, 0.129856, 0.037760, 0.074697),
-    _column(None, 0.2734, 0.1207, 0.4238, None, 0.0294, 0.0133, 0.0255, 0.0692),
-    9.9884e-4, 0.4431,
-)  # fmt: skip
+    name="basic + Kb2",
+    table="7.5",
+    deviation_table="7.6",
+    values=_values(2.050781, 0.401821, 0.229105, 1.017110, 0.049466, 0.235155, 0.129856, 0.037760, 0.074697),
+    deviations=_column(None, 0.2734, 0.1207, 0.4238, None, 0.0294, 0.0133, 0.0255, 0.0692),
+    mean_squared_error=9.9884e-4,
+    sum_lambda=0.4431,
+)
 
 VISCOUS = PublishedModel(
-    "viscous", "7.7", "7.8",
-    _values(2.475884, 0.497314, 0.286792, 1.219998, 0.060944, 0.280288, 0.167525, 0.034953, 0.037130,
-            3.0e-6, 2.46e-4, 1.7e-5),
-    _column(None, 0.2930, 0.1380, 0.4547, None, 0.0313, 0.0158, 0.0218, 0.0311, 8.0e-6, 3.95e-4, 3.3e-5),
-    9.4940e-4, 0.5973,
-)  # fmt: skip
+    name="viscous",
+    table="7.7",
+    deviation_table="7.8",
+    values=_values(
+        *(2.475884, 0.497314, 0.286792, 1.219998, 0.060944, 0.280288, 0.167525, 0.034953, 0.037130),
+        *(3.0e-6, 2.46e-4, 1.7e-5),
+    ),
+    deviations=_column(None, 0.2930, 0.1380, 0.4547, None, 0.0313, 0.0158, 0.0218, 0.0311, 8.0e-6, 3.95e-4, 3.3e-5),
+    mean_squared_error=9.4940e-4,
+    sum_lambda=0.5973,
+)
 
 VISCOUS_AND_COULOMB = PublishedModel(
-    "viscous + Coulomb", "7.9", "7.10",
-    _values(2.517390, 0.506972, 0.290461, 1.250307, 0.062899, 0.285755, 0.168410, 0.033444, 0.036948,
-            2.0e-6, 2.53e-4, 2.4e-5, 0.128486),
-    _column(None, 0.2113, 0.0989, 0.3684, None, 0.0253, 0.0127, 0.0193, 0.0296, 4.0e-6, 3.14e-4, 3.8e-5, 0.1129),
-    7.4877e-4, 0.9313,
-)  # fmt: skip
+    name="viscous + Coulomb",
+    table="7.9",
+    deviation_table="7.10",
+    values=_values(
+        *(2.517390, 0.506972, 0.290461, 1.250307, 0.062899, 0.285755, 0.168410, 0.033444, 0.036948),
+        *(2.0e-6, 2.53e-4, 2.4e-5, 0.128486),
+    ),
+    deviations=_column(
+        None, 0.2113, 0.0989, 0.3684, None, 0.0253, 0.0127, 0.0193, 0.0296, 4.0e-6, 3.14e-4, 3.8e-5, 0.1129
+    ),
+    mean_squared_error=7.4877e-4,
+    sum_lambda=0.9313,
+)
 
 LADDER = (BASIC, BASIC_WITH_BACK_EMF, VISCOUS, VISCOUS_AND_COULOMB)
 """The four fitted models, in the order of chapter 7."""
 
+
+def _names(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
 INFLUENCE_FAST_WAIST = (
-    frozenset({"I1yy", "m2", "c2x", "c2y", "c2z", "I2xx", "I2xy", "I2xz", "I2yy", "I2yz", "I2zz",
-               "m3", "c3x", "c3y", "c3z", "I3xx", "I3xy", "I3xz", "I3yy", "I3yz", "I3zz"}),
-    frozenset({"m2", "c2x", "c2y", "I2xx", "I2xy", "I2xz", "I2yy", "I2yz", "I2zz",
-               "m3", "c3x", "c3y", "c3z", "I3xx", "I3xy", "I3xz", "I3yy", "I3yz", "I3zz"}),
-    frozenset({"m3", "c3x", "c3y", "I3xx", "I3xy", "I3xz", "I3yy", "I3yz", "I3zz"}),
-)  # fmt: skip
+    _names("I1yy m2 c2x c2y c2z I2xx I2xy I2xz I2yy I2yz I2zz m3 c3x c3y c3z I3xx I3xy I3xz I3yy I3yz I3zz"),
+    _names("m2 c2x c2y I2xx I2xy I2xz I2yy I2yz I2zz m3 c3x c3y c3z I3xx I3xy I3xz I3yy I3yz I3zz"),
+    _names("m3 c3x c3y I3xx I3xy I3xz I3yy I3yz I3zz"),
+)
 """Table 5.1: parameters that act on joints 1 to 3 while link 1 moves fast."""
 
 INFLUENCE_SLOW_WAIST = (
-    frozenset({"m3", "c3x", "c3y", "I3zz", "m2", "c2x", "c2y", "I2zz", "I1yy"}),
-    frozenset({"m3", "c3x", "c3y", "I3zz", "m2", "c2x", "c2y", "I2zz"}),
-    frozenset({"m3", "c3x", "c3y", "I3zz"}),
+    _names("m3 c3x c3y I3zz m2 c2x c2y I2zz I1yy"),
+    _names("m3 c3x c3y I3zz m2 c2x c2y I2zz"),
+    _names("m3 c3x c3y I3zz"),
 )
-"""Table 5.2: the same while link 1 hardly moves."""
+"""Table 5.2: parameters that act on joints 1 to 3 while link 1 hardly moves."""
 
-RODS_INFLUENCE = (
-    frozenset({"I1yy"}),
-    frozenset({"m2", "c2x", "I2yy", "I2zz"}),
-    frozenset({"m3", "c3x", "I3yy", "I3zz"}),
-)
+RODS_INFLUENCE = (_names("I1yy"), _names("m2 c2x I2yy I2zz"), _names("m3 c3x I3yy I3zz"))
 """Table 5.3: effective inertial parameters of links 1 to 3 when links 2 and 3 are rods."""

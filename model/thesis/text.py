@@ -11,10 +11,8 @@ from model.thesis.tables import SYMBOLS
 
 def as_text(result: Reproduction) -> str:
     """Lines for a terminal or a file, without colour."""
-    return "\n".join(
-        [*_fidelity(result), *(line for ladder in result.ladders for line in _ladder(ladder)), *_checks(result),
-         *_choices(result), *_findings(result)]
-    )  # fmt: skip
+    ladders = [line for ladder in result.ladders for line in _ladder(ladder)]
+    return "\n".join([*_fidelity(result), *ladders, *_checks(result), *_choices(result), *_findings(result)])
 
 
 def _fidelity(result: Reproduction) -> Iterator[str]:

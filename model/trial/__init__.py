@@ -1,1 +1,1 @@
-"""The blind trial: answers of the diagnosis beside what arms had hidden. Pure: no files, no mock."""
+"""The blind trial: scores answers of the diagnosis against the effects hidden in arms. Pure: no files, no mock."""

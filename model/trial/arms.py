@@ -1,4 +1,4 @@
-"""Which arms a trial looks at: the mock's seeds, 100·number + 10·kind + load, and how a registration draws them."""
+"""The arms of a trial: the mock's seeds, 100·number + 10·kind + load, and how a registration draws them."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 
 KINDS: dict[str, int] = {"clean": 1, "single": 2, "open-set": 3, "pair": 4, "shared": 5, "wrong-priors": 6}
-"""Kinds of arms and their digit."""
+"""Kinds of arms, and the digit of each in a secret."""
 LOADS: dict[str, int] = {"nominal": 0, "light": 1, "heavy": 2}
-"""Announced loads and their digit."""
+"""Announced loads, and the digit of each in a secret."""
 LOAD_CYCLE = ("nominal", "nominal", "nominal", "light", "heavy")
-"""Loads in turn, by number."""
+"""Loads that arms carry in turn, by their number."""
 LARGEST_NUMBER = 10**15
 """Largest number of an arm: those that a commit draws have 48 bits."""
 MOST_NUMBERS = 100_000
-"""Arms of one trial: a case takes a minute, so this is months."""
+"""Most arms of one trial; a case takes a minute, so this is months."""
 _FIRST_DRAWN = 10**6
-"""Numbers below are for tuning and tests."""
+"""Smallest number that a commit draws; smaller ones are for tuning and tests."""
 
 
 def parse_numbers(text: str) -> list[int]:
@@ -42,7 +42,7 @@ def parse_numbers(text: str) -> list[int]:
 
 
 def parse_choice(text: str, allowed: Iterable[str], what: str) -> tuple[str, ...]:
-    """Words with commas, each one of `allowed`. Raises SpecError."""
+    """Words separated by commas, each one of `allowed`. Raises SpecError."""
     words = tuple(word.strip() for word in text.split(","))
     for word in words:
         if word not in allowed:
@@ -56,7 +56,7 @@ def compose(number: int, kind: str, load: str) -> int:
 
 
 def arms(numbers: Sequence[int], kinds: Sequence[str], loads: Sequence[str] = LOAD_CYCLE) -> list[int]:
-    """Seeds of all kinds for each number; the load goes in turn by number."""
+    """Seeds of all kinds for each number; the loads take turns by number."""
     return [compose(number, kind, loads[number % len(loads)]) for number in numbers for kind in kinds]
 
 

@@ -1,4 +1,4 @@
-"""Every case of a trial as one line of a table that anybody can count again."""
+"""Every case of a trial as one line of a table, from which its rates can be counted again."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterable
 from model.trial.score import Score
 
 _AS_IT_STANDS = (
-    "seed", "kind", "load", "detectable", "verdict", "named_right", "merged_right", "in_answer", "in_first",
-    "joint_right", "at_least_one", "alarm", "honest", "excess_removed",
-    "excess_removed_whole", "seconds", "robot_seconds",
-)  # fmt: skip
+    *("seed", "kind", "load", "detectable", "verdict", "named_right", "merged_right", "in_answer", "in_first"),
+    *("joint_right", "at_least_one", "alarm", "honest", "excess_removed", "excess_removed_whole"),
+    *("seconds", "robot_seconds"),
+)
 _MADE: dict[str, Callable[[Score], str]] = {
     "hidden": lambda score: " + ".join(score.effects),
     "joints": lambda score: " + ".join("".join(map(str, joints)) or "-" for joints in score.joints),

@@ -17,7 +17,7 @@ Translation = Callable[[Values, int, Truth, Machine], dict[str, float]]
 
 
 def _same(**names: str) -> Translation:
-    """model name = mock's name, where both mean the same."""
+    """Translations of parameters that differ in name only, given as model=mock."""
     return lambda values, _joint, _truth, _machine: {ours: values[theirs] for ours, theirs in names.items()}
 
 
@@ -36,7 +36,7 @@ def _load_dependent(values: Values, joint: int, truth: Truth, machine: Machine) 
 
 
 def _supply(values: Values, joint: int, _truth: Truth, machine: Machine) -> dict[str, float]:
-    """The limit that is left."""
+    """The voltage limit that the reduction leaves."""
     limit = _motor(machine, joint).supply_limit
     return {} if limit is None else {"voltage": limit.value - values["reduction"]}
 
@@ -76,7 +76,7 @@ TRANSLATIONS: dict[str, Translation] = {
     "wrong_gain": _factor,
     "lost_set_points": _same(share="share"),
 }
-"""By effect: parameters of the model (the last part of their names) from those of the mock."""
+"""Translations by effect, from the mock's parameters to the model's (the last part of their names)."""
 
 LEFT_OUT: dict[str, str] = {
     "stiction": "the mock's bond fades with speed, the model's breaks: their breakaway torques are not one quantity",
@@ -88,11 +88,11 @@ LEFT_OUT: dict[str, str] = {
     "backlash: damping, contact": "how teeth meet: free here, with a prior, and only there to shape the contact",
     "joint_compliance: damping": "as that of backlash",
 }
-"""Effects, or parameters of them, that no interval is counted for."""
+"""Effects, or parameters of effects, whose intervals are not counted, with the reason."""
 
 
 def true_parameters(effect: HiddenEffect, joint: int | None, truth: Truth, machine: Machine) -> dict[str, float]:
-    """The truth in the model's parameters (last part of the name), at a joint; empty for what is left out."""
+    """The truth at a joint in the model's parameters (last part of the name); empty for effects in `LEFT_OUT`."""
     translation = TRANSLATIONS.get(effect.known_as)
     if translation is None:
         return {}

@@ -1,4 +1,4 @@
-"""A trial written down before it is run: cases, experiments, and the hashes of the code that is to be judged."""
+"""A trial that is written down before it is run: cases, experiments, and hashes of the code under trial."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class Run(_Part):
 class Registration(_Part):
     """A registration file.
 
-    `hashes`: SHA-256 of files and folders of the source tree, by path. `versions`: of libraries; there are none in
-    files from before they were registered.
+    `hashes`: SHA-256 of files and folders of the source tree, by path. `versions`: of libraries; the first
+    registrations have none.
     """
 
     version: Literal[1]

@@ -1,4 +1,4 @@
-"""One answer beside one truth. docs/trial.md says what counts as right; this is where it is counted."""
+"""Scores one answer against one truth, by the rules of docs/trial.md."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from model.trial.conventions import true_parameters
 from model.trial.truth import Detectability, HiddenEffect, Kind, Truth, merged
 
 FIRST = 3
-"""Names that are looked at for "among the first three"."""
+"""Number of names that count for "among the first three"."""
 
 Place = Literal["named", "group", "unknown-effect", "nothing-significant", "failed"]
 
@@ -23,7 +23,7 @@ class _Scored(BaseModel):
 
 
 class Covered(_Scored):
-    """A stated interval held against the truth, both in the model's conventions."""
+    """A stated interval and the true value, both in the model's conventions."""
 
     parameter: str
     value: float
@@ -33,12 +33,12 @@ class Covered(_Scored):
 
     @property
     def inside(self) -> bool:
-        """Whether the truth is in it."""
+        """Whether the interval contains the true value."""
         return self.low <= self.truth <= self.high
 
 
 class Score(_Scored):
-    """What an answer is worth. None: the question does not arise for this case.
+    """What an answer is worth. None means that the question does not arise for this case.
 
     `named_right`: every effect that was there was named, and no other. `merged_right`: the same with all friction kinds
     as one, for which a group of friction kinds alone is that one name. `in_first`: the effect is among the
@@ -79,7 +79,7 @@ class Score(_Scored):
 
 
 def score(truth: Truth, seen: Detectability, answer: Diagnosis, machine: Machine) -> Score:
-    """The answer's worth. `machine`: with the load that was announced."""
+    """Score an answer. `machine`: with the load that was announced."""
     names = tuple(effect.known_as for effect in truth.effects)
     named, group = named_effects(answer), group_of(answer)
     common = {
@@ -114,7 +114,7 @@ def score(truth: Truth, seen: Detectability, answer: Diagnosis, machine: Machine
 
 
 def score_of_failure(truth: Truth, seen: Detectability, seconds: float) -> Score:
-    """A diagnosis that gave no answer: wrong in everything that it was asked."""
+    """The score of a diagnosis that gave no answer: it is wrong in every question."""
     known = truth.kind not in ("clean", "open_set")
     wrong = False if known else None
     return Score(
@@ -150,7 +150,7 @@ def _case(truth: Truth, seen: Detectability) -> dict[str, Any]:
 
 
 def named_effects(answer: Diagnosis) -> tuple[str, ...]:
-    """Effects that were named: of steps that were adopted and gave one name, be it at one of several joints."""
+    """Effects of the adopted steps that gave one name; a group of one effect at several joints counts as a name."""
     found = [step.effect for step in answer.steps if step.adopted and step.effect is not None and _one_name(step)]
     return tuple(dict.fromkeys(found))
 
@@ -161,7 +161,7 @@ def _one_name(step: Step) -> bool:
 
 
 def group_of(answer: Diagnosis) -> tuple[str, ...]:
-    """Effects of the group that was given instead of a name: of an answer that is a group, in a step that was taken.
+    """Effects of the group that was given instead of a name, in an adopted step of an ambiguous answer.
 
     Groups that were withdrawn, or refused by held-out traces, are no answer.
     """
@@ -184,7 +184,7 @@ def excess_removed(answer: Diagnosis) -> float | None:
 
 
 def excess_removed_whole(answer: Diagnosis) -> float | None:
-    """The same from the model as it was given to the one that came out, tolerance parameters fitted."""
+    """The same share from the model as given to the resulting one, so that fitted tolerance parameters count too."""
     return share_removed(answer.rmse_holdout)
 
 
@@ -209,7 +209,7 @@ def _merged_right(names: tuple[str, ...], named: tuple[str, ...], group: tuple[s
 
 
 def _in_first(names: tuple[str, ...], answer: Diagnosis) -> bool:
-    """The effect, of several any, is among the first names of the ranking that the answer began with."""
+    """Whether the effect (any of several) is among the first names of the ranking of the first step."""
     if not answer.steps:
         return False
     ranked = dict.fromkeys(candidate.effect for candidate in answer.steps[0].candidates)
@@ -219,16 +219,16 @@ def _in_first(names: tuple[str, ...], answer: Diagnosis) -> bool:
 
 
 def _joint_right(effect: HiddenEffect, answer: Diagnosis) -> bool | None:
-    """Whether the joints are those that the effect acts on; of answers that say there is something."""
+    """Whether the answered joints are those of the effect; None for answers in which nothing is significant."""
     if not effect.joints or answer.verdict == "nothing-significant":
         return None
     return _answered_joints(effect, answer) == set(effect.joints)
 
 
 def _answered_joints(effect: HiddenEffect, answer: Diagnosis) -> set[int]:
-    """Joints of the steps taken that name the effect; else of the first step, which may say where without saying what.
+    """Joints of the adopted steps that name the effect; else those of the first step, which may know the place alone.
 
-    Without any step, the joint whose remaining torque the answer tells first; none where it tells of no joint.
+    Without any step, the joint whose remaining torque comes first in the answer; none if it names no joint.
     """
     same = [step for step in answer.steps if step.adopted and step.effect == effect.known_as]
     if same:

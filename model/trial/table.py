@@ -1,4 +1,4 @@
-"""The trial's table: every rate with its interval, effect by effect, and what was taken for what."""
+"""The trial's table: every rate with its interval, effect by effect, and which effect was taken for which."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Line(_Told):
 
 
 class Quantiles(_Told):
-    """Of a quantity over cases."""
+    """Quantiles of a quantity over cases."""
 
     cases: int
     median: float | None
@@ -49,7 +49,7 @@ class EffectLine(_Told):
 
 
 class TrialTable(_Told):
-    """All of it."""
+    """The whole table."""
 
     cases: int
     not_acquired: int

@@ -1,4 +1,4 @@
-"""What an arm had hidden, as `python -m mock_controller.reveal` tells it, and how well it could be seen."""
+"""The effects hidden in an arm, as `python -m mock_controller.reveal` prints them, and their detectability."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from daq.contracts.effects import effect_names
 Kind = Literal["clean", "single", "open_set", "pair", "shared_by_joints", "wrong_priors"]
 
 DETECTABLE = 5.0
-"""d′ from which on an effect counts as detectable."""
+"""Least d′ at which an effect counts as detectable."""
 MERGED_FRICTION = "friction"
-"""What all kinds of friction are called where they are merged."""
+"""Name of all kinds of friction where they are merged."""
 FRICTION_OF_MOCK = ("tight_spot", "quadratic_drag", "cable_hysteresis", "ageing_friction")
 """Effects that only the mock knows and that are friction too."""
 
@@ -69,7 +69,7 @@ class Detectability(_Told):
 
 
 def merged(name: str) -> str:
-    """The name with all kinds of friction as one."""
+    """The effect's name, or one common name for all kinds of friction."""
     known = effect_names().get(name)
     return MERGED_FRICTION if known is not None and known.family == "friction" else name
 

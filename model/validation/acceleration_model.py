@@ -8,19 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from model import layout as at
 from model.drives.amplifier import motor_volts
 from model.dynamics.compilation import compiled
 from model.dynamics.dual import DUAL_STEP
-from model.machine_model import layout as at
 from model.machine_model.model import Model
+from model.machine_model.nominal import is_rod_arm
 from model.simulation.dynamics_of_run import accelerate, body_of, friction_levels_of, gravity_of
-from model.simulation.engines import is_rod_arm
 from model.simulation.joint_torques import extra_torque, motor_damping, motor_gain
 from model.simulation.own_table import own_table
 from model.simulation.own_torque import own_torque
@@ -46,6 +46,25 @@ class MeasuredMotion:
     drive: Floats
     period: float
     width: float
+
+
+class _Signals(NamedTuple):
+    """A motion for compiled code, real or dual: position, speed, friction, volts (k, n) at the motors; time (k,)."""
+
+    position: NDArray[Any]
+    speed: NDArray[Any]
+    friction: NDArray[Any]
+    volts: NDArray[Any]
+    time: NDArray[Any]
+
+
+class _Numbers(NamedTuple):
+    """A model for compiled code: its parameters, real or dual, what it has and how it is computed."""
+
+    vector: NDArray[Any]
+    flags: NDArray[Any]
+    settings: NDArray[Any]
+    own: NDArray[Any]
 
 
 def expected_accelerations(model: Model, motion: MeasuredMotion, names: Sequence[str]) -> tuple[Floats, Floats]:
@@ -84,11 +103,12 @@ def _accelerations(model: Model, motion: MeasuredMotion, vector: NDArray[Any]) -
     settings[at.PUBLISHED_LOADS] = int(rods)
     volts = smoothed(averaged_volts(motion.drive, motion.period, vector), motion.width)
     out = np.zeros(motion.position.shape, dtype=vector.dtype)
+    measured = (motion.position, motion.speed, motion.friction, volts)
+    position, speed, friction, volts = (np.ascontiguousarray(s, dtype=vector.dtype) for s in measured)
+    signals = _Signals(position, speed, friction, volts, motion.time)
+    numbers = _Numbers(np.ascontiguousarray(vector), model.flags, settings, own_table(model, vector.dtype))
     run = _along_rods if rods else _along_chain
-    signals = (
-        np.ascontiguousarray(s, dtype=vector.dtype) for s in (motion.position, motion.speed, motion.friction, volts)
-    )
-    run(*signals, motion.time, np.ascontiguousarray(vector), model.flags, settings, own_table(model, vector.dtype), out)
+    run(signals, numbers, out)
     return out
 
 
@@ -130,11 +150,9 @@ def _after_amplifier(drive: NDArray[Any], joints: NDArray[Any], volts: NDArray[A
 
 
 @compiled
-def _along(
-    kind: Any, position: NDArray[Any], speed: NDArray[Any], friction: NDArray[Any], volts: NDArray[Any],
-    time: NDArray[Any], vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any],
-    own: NDArray[Any], out: NDArray[Any],
-) -> None:  # fmt: skip
+def _along(kind: Any, signals: _Signals, numbers: _Numbers, out: NDArray[Any]) -> None:
+    position, speed, friction, volts, time = signals
+    vector, flags, settings, own = numbers
     n = position.shape[1]
     shared = vector[: at.SHARED]
     joints = vector[at.SHARED :].reshape(n, at.PER_JOINT)
@@ -161,18 +179,10 @@ def _along(
 
 
 @entry
-def _along_rods(
-    position: NDArray[Any], speed: NDArray[Any], friction: NDArray[Any], volts: NDArray[Any], time: NDArray[Any],
-    vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any],
-    own: NDArray[Any], out: NDArray[Any],
-) -> None:  # fmt: skip
-    _along(ClosedForm(0), position, speed, friction, volts, time, vector, flags, settings, own, out)
+def _along_rods(signals: _Signals, numbers: _Numbers, out: NDArray[Any]) -> None:
+    _along(ClosedForm(0), signals, numbers, out)
 
 
 @entry
-def _along_chain(
-    position: NDArray[Any], speed: NDArray[Any], friction: NDArray[Any], volts: NDArray[Any], time: NDArray[Any],
-    vector: NDArray[Any], flags: NDArray[Any], settings: NDArray[Any],
-    own: NDArray[Any], out: NDArray[Any],
-) -> None:  # fmt: skip
-    _along(AnyChain(0), position, speed, friction, volts, time, vector, flags, settings, own, out)
+def _along_chain(signals: _Signals, numbers: _Numbers, out: NDArray[Any]) -> None:
+    _along(AnyChain(0), signals, numbers, out)

@@ -1,4 +1,4 @@
-"""The same distortions judged by another convention of τ′: the changes that double the error stay as they are."""
+"""Distortions judged by another convention of τ′. The changes that double the error do not depend on it."""
 
 from __future__ import annotations
 
@@ -14,13 +14,8 @@ def in_convention(found: Fidelity, model: Model, convention: Convention) -> Fide
     parameters = []
     for one in found.parameters:
         expected, basis = expected_deviation(model.parameter(one.name), convention)
-        parameters.append(
-            one.model_copy(
-                update={
-                    "expected": expected, "basis": basis, "contribution": contribution(one.required, expected)
-                }
-            )
-        )  # fmt: skip
+        judged = {"expected": expected, "basis": basis, "contribution": contribution(one.required, expected)}
+        parameters.append(one.model_copy(update=judged))
     total = math.fsum(p.contribution for p in parameters)
     return found.model_copy(
         update={"parameters": tuple(parameters), "convention": convention, "sum_of_contributions": total}

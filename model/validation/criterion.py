@@ -18,11 +18,11 @@ class _Part(BaseModel):
 
 
 class ParameterDistortion(_Part):
-    """What one parameter alone would have to do.
+    """How one parameter alone would have to vary to explain the residual.
 
     `change_down` and `change_up` (magnitudes, in `unit`) double the total mean squared error; None where no change
-    within the bounds does. `required` is σ, the standard deviation that would explain the residual: None is a very
-    large one, an insensitive parameter. `expected` is τ′, `contribution` is λ² = τ′²/σ².
+    within the bounds does. `required` is σ, the standard deviation that would explain the residual; None for an
+    insensitive parameter, whose σ is very large. `expected` is τ′, `contribution` is λ² = τ′²/σ².
     """
 
     name: str
@@ -90,5 +90,5 @@ def required_deviation(doubling_change: float, damping_ratio: float = DAMPING_RA
 
 
 def contribution(required: float | None, expected: float) -> float:
-    """λ² = τ′²/σ² (4.92); none for a parameter that is insensitive."""
+    """λ² = τ′²/σ² (4.92); zero for an insensitive parameter."""
     return 0.0 if required is None else (expected / required) ** 2

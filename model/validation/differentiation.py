@@ -1,8 +1,8 @@
-"""Speeds and accelerations from sampled positions, with known noise: averages over the same window for both sides.
+"""Speeds and accelerations from sampled positions, with known noise and without a bias from smoothing.
 
-A second difference of samples T apart is exactly the acceleration averaged over ±T with triangular weights. What is to
-be compared with it is averaged with the same weights, and both are smoothed with the same kernel: smoothing then takes
-away detail and noise, but makes no error of its own.
+A second difference of samples T apart is exactly the acceleration averaged over ±T with triangular weights. What is
+compared with it is averaged with the same weights, and both are smoothed with the same kernel: smoothing then removes
+detail and noise, but adds no error of its own.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from daq.contracts.errors import SpecError
 Floats = NDArray[np.float64]
 
 WIDTHS = tuple(float(w) for w in np.arange(0.5, 6.01, 0.25))
-"""Standard deviations of the kernel (samples) that `chosen_width` tries."""
+"""Standard deviations of the kernel that `chosen_width` tries, samples."""
 TRUNCATION = 4.0
-"""Standard deviations at which the kernel is cut."""
+"""Half width of the kernel, in its standard deviations."""
 
 
 def kernel(width: float) -> Floats:
@@ -30,7 +30,7 @@ def kernel(width: float) -> Floats:
 
 
 def smoothed(signal: Floats, width: float) -> Floats:
-    """Columns of a signal (k, n), real or complex, smoothed; beyond its ends the signal is taken to stay as it is."""
+    """Columns of a signal (k, n), real or complex, smoothed; beyond its ends the signal is taken as constant."""
     weights = kernel(width)
     reach = len(weights) // 2
     padded = np.concatenate((np.repeat(signal[:1], reach, axis=0), signal, np.repeat(signal[-1:], reach, axis=0)))
@@ -47,7 +47,7 @@ def accelerations(position: Floats, period: float) -> Floats:
 def speeds(position: Floats, period: float) -> Floats:
     """Speeds (k, n) averaged over ±period with the same triangular weights, zero at both ends.
 
-    A central difference averages with equal weights; a third difference takes away what it has too much.
+    A central difference averages with equal weights; a third difference corrects them to triangular ones.
     """
     result = np.zeros_like(position)
     result[1:-1] = (position[2:] - position[:-2]) / (2 * period)
@@ -65,7 +65,7 @@ class NoiseGain:
 
 
 def noise_gain(width: float, period: float) -> NoiseGain:
-    """How much noise differentiation with this smoothing lets through."""
+    """The noise that differentiation with this smoothing lets through."""
     weights = np.pad(kernel(width), 4)[:, None]
     return NoiseGain(
         float(np.sqrt((speeds(weights, period) ** 2).sum())),

@@ -1,4 +1,4 @@
-"""The changes of single parameters that double an error: 2p root searches in step, so that runs can be batched."""
+"""The changes of single parameters that double an error: 2p root searches in lockstep, so that runs can be batched."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ GROWTH = 2.0
 TOLERANCE = 1e-3
 """Relative accuracy of a doubling change."""
 LONGEST_SEARCH = 60
-"""Rounds, widening included."""
+"""Most rounds of a search, those of widening included."""
 
 
 @dataclass
@@ -51,7 +51,7 @@ class Search:
         return self.outside
 
     def take(self, ratio: float) -> None:
-        """The error ratio E/E₀ at `trial`; chooses the next trial."""
+        """Take in the error ratio E/E₀ at `trial`, and choose the next trial."""
         level = math.inf if not math.isfinite(ratio) else math.copysign(math.sqrt(abs(ratio - 1)), ratio - 1) - 1
         if math.isfinite(ratio):
             self.lowest = min(self.lowest, ratio)
@@ -69,7 +69,7 @@ class Search:
         self.trial = self._between()
 
     def _between(self) -> float:
-        """False position, or the middle after the same end moved twice."""
+        """The next trial: by false position, or the middle after the same end moved twice."""
         assert self.outside is not None
         width = self.outside - self.inside
         stuck = len(self.last_sides) >= 2 and self.last_sides[-1] == self.last_sides[-2]
@@ -84,7 +84,7 @@ class Search:
 
 @dataclass(frozen=True)
 class Doubling:
-    """Changes (magnitudes) that double the error downwards and upwards; None where nothing within the bounds does.
+    """Changes (magnitudes) that double the error, downwards and upwards; None where no change within the bounds does.
 
     `lowest` is the smallest E/E₀ met on the way: clearly below one means that the point was no minimum.
     """
@@ -101,15 +101,20 @@ class Doubling:
 
 
 def doubling_changes(
-    errors: Errors, best: Floats, low: Floats, high: Floats, first: Floats,
-    progress: Progress = silent, cancel: Cancel | None = None,
-) -> tuple[float, list[Doubling]]:  # fmt: skip
-    """Error at `best`, and for each of its p parameters the changes that double it.
+    errors: Errors,
+    best: Floats,
+    low: Floats,
+    high: Floats,
+    first: Floats,
+    progress: Progress = silent,
+    cancel: Cancel | None = None,
+) -> tuple[float, list[Doubling]]:
+    """The error at `best`, and for each of its p parameters the changes that double it.
 
     Args:
         errors: of many parameter sets at once.
         best: (p,) the fitted parameters. low, high: (p,) finite bounds, within which changes are sought.
-        first: (p,) positive changes to begin with; any size will do, a good guess saves runs.
+        first: (p,) positive changes to begin with; any size works, a good guess saves runs.
 
     Raises:
         SpecError: for bounds that do not hold `best`, or an error at it that is not positive and finite.

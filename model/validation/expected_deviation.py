@@ -11,7 +11,7 @@ from model.machine_model.parameter import Parameter
 LENGTH_SHARE = 0.03
 """Expected standard deviation of a length or radius, as a share of its value."""
 MASS_SHARE = 0.10
-"""The same of a mass."""
+"""Expected standard deviation of a mass, as a share of its value."""
 
 Convention = Literal["source", "three_sigma"]
 """Gaussian parameters: `source` is τ′ = â/(3√2), with which the published sums come out; `three_sigma` is â/3."""
@@ -23,7 +23,7 @@ Basis = Literal["length", "mass", "gaussian", "stated"]
 def gaussian_share(convention: Convention) -> float:
     """τ′/â of a parameter that must be positive: zero lies three standard deviations away.
 
-    The source takes the three as the argument of erf instead of the normal density's, hence its √2.
+    The source takes the three as the argument of erf, not as a deviate of the normal density, hence its √2.
     """
     return 1 / (3 * math.sqrt(2)) if convention == "source" else 1 / 3
 

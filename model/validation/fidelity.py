@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-from model.simulation.simulate import Options
+from model.simulation.prepared import Options
 from model.validation.criterion import (
     DAMPING_RATIO,
     Curve,
@@ -23,24 +24,42 @@ from model.validation.criterion import (
     required_deviation,
 )
 from model.validation.doubling import Doubling, doubling_changes
-from model.validation.expected_deviation import Convention, expected_deviation
+from model.validation.expected_deviation import expected_deviation
 from model.validation.squared_error import SquaredError, squared_error
 
 Floats = NDArray[np.float64]
 
 SEARCH_DEVIATIONS = 50.0
-"""Changes up to so many expected deviations are tried; what needs more would add less than 0.0003 to Σλ²."""
+"""Largest change that is tried, in expected deviations; a parameter that needs more adds less than 0.0003 to Σλ²."""
 CURVE_REACH = 1.5
-"""Curves reach from −1.5 to +1.5 doubling changes (expected deviations where none doubles)."""
+"""A curve reaches this many doubling changes to either side (expected deviations where no change doubles)."""
 MINIMUM_TOLERANCE = 0.98
-"""An error below this share of the one at the given parameters shows that they are no minimum."""
+"""Share of the error at the given parameters; a smaller error elsewhere shows that they are not the minimum."""
+
+
+@dataclass(frozen=True)
+class _Varied:
+    """Parameters to vary one at a time: values, expected deviations and bounds of the search, (p,) each."""
+
+    parameters: tuple[Parameter, ...]
+    best: Floats
+    expected: Floats
+    low: Floats
+    high: Floats
 
 
 def validate_by_distortion(
-    model: Model, traces: Sequence[Trace], names: Sequence[str], *, outputs: Sequence[int] | None = None,
-    convention: Convention = "source", damping_ratio: float = DAMPING_RATIO, curve_points: int = 0,
-    options: Options | None = None, progress: Progress = silent, cancel: Cancel | None = None,
-) -> Fidelity:  # fmt: skip
+    model: Model,
+    traces: Sequence[Trace],
+    names: Sequence[str],
+    *,
+    outputs: Sequence[int] | None = None,
+    damping_ratio: float = DAMPING_RATIO,
+    curve_points: int = 0,
+    options: Options | None = None,
+    progress: Progress = silent,
+    cancel: Cancel | None = None,
+) -> Fidelity:
     """How far each of the named parameters alone would have to vary to explain what the model misses.
 
     Args:
@@ -57,46 +76,59 @@ def validate_by_distortion(
         raise SpecError("no parameters: name at least one that was fitted")
     required_deviation(1.0, damping_ratio)
     error = squared_error(model, traces, names, outputs, options)
-    parameters = [model.parameter(name) for name in names]
-    best = np.array([p.value for p in parameters])
-    expected = np.array([expected_deviation(p, convention)[0] for p in parameters])
-    low, high = _search_bounds(parameters, expected)
+    varied = _varied(tuple(model.parameter(name) for name in names))
     share = 0.8 if curve_points else 1.0
     least, doublings = doubling_changes(
-        error.total, best, low, high, expected, lambda f, text: progress(share * f, text), cancel
+        error.total,
+        varied.best,
+        varied.low,
+        varied.high,
+        varied.expected,
+        lambda f, text: progress(share * f, text),
+        cancel,
     )
-    distortions = [_distortion(p, d, convention, damping_ratio) for p, d in zip(parameters, doublings, strict=True)]
-    curves = _curves(error, parameters, distortions, low, high, curve_points, progress, cancel) if curve_points else ()
+    distortions = [_distortion(p, d, damping_ratio) for p, d in zip(varied.parameters, doublings, strict=True)]
     return Fidelity(
-        model=model.identity, traces=tuple(t.record.trace_id for t in traces), outputs=error.outputs,
-        convention=convention, damping_ratio=damping_ratio, error=least,
-        error_by_joint=tuple(float(e) for e in error.by_joint(best[None])[0]), parameters=tuple(distortions),
-        sum_of_contributions=math.fsum(d.contribution for d in distortions), curves=curves,
-        notes=tuple(_notes(parameters, doublings)),
-    )  # fmt: skip
+        model=model.identity,
+        traces=tuple(t.record.trace_id for t in traces),
+        outputs=error.outputs,
+        convention="source",
+        damping_ratio=damping_ratio,
+        error=least,
+        error_by_joint=tuple(float(e) for e in error.by_joint(varied.best[None])[0]),
+        parameters=tuple(distortions),
+        sum_of_contributions=math.fsum(d.contribution for d in distortions),
+        curves=_curves(error, varied, distortions, curve_points, progress, cancel) if curve_points else (),
+        notes=tuple(_notes(varied.parameters, doublings)),
+    )
 
 
-def _search_bounds(parameters: Sequence[Parameter], expected: Floats) -> tuple[Floats, Floats]:
+def _varied(parameters: tuple[Parameter, ...]) -> _Varied:
     value = np.array([p.value for p in parameters])
+    expected = np.array([expected_deviation(p, "source")[0] for p in parameters])
     reach = SEARCH_DEVIATIONS * expected
     low = np.maximum([p.low for p in parameters], value - reach)
     high = np.minimum([p.high for p in parameters], value + reach)
     # a length, a mass or a resistance of exactly zero is no machine
     positive = (low == 0) & (value > 0)
-    return np.where(positive, 1e-6 * value, low), high
+    return _Varied(parameters, value, expected, np.where(positive, 1e-6 * value, low), high)
 
 
-def _distortion(
-    parameter: Parameter, doubling: Doubling, convention: Convention, damping_ratio: float
-) -> ParameterDistortion:
-    expected, basis = expected_deviation(parameter, convention)
+def _distortion(parameter: Parameter, doubling: Doubling, damping_ratio: float) -> ParameterDistortion:
+    expected, basis = expected_deviation(parameter, "source")
     change = doubling.mean
     required = None if change is None else required_deviation(change, damping_ratio)
     return ParameterDistortion(
-        name=parameter.name, unit=parameter.unit, value=parameter.value, change_down=doubling.down,
-        change_up=doubling.up, required=required, expected=expected, basis=basis,
+        name=parameter.name,
+        unit=parameter.unit,
+        value=parameter.value,
+        change_down=doubling.down,
+        change_up=doubling.up,
+        required=required,
+        expected=expected,
+        basis=basis,
         contribution=contribution(required, expected),
-    )  # fmt: skip
+    )
 
 
 def _notes(parameters: Sequence[Parameter], doublings: Sequence[Doubling]) -> list[str]:
@@ -113,23 +145,29 @@ def _notes(parameters: Sequence[Parameter], doublings: Sequence[Doubling]) -> li
 
 
 def _curves(
-    error: SquaredError, parameters: Sequence[Parameter], distortions: Sequence[ParameterDistortion], low: Floats,
-    high: Floats, points: int, progress: Progress, cancel: Cancel | None,
-) -> tuple[Curve, ...]:  # fmt: skip
-    cancel = cancel or Never()
-    best = np.array([p.value for p in parameters])
+    error: SquaredError,
+    varied: _Varied,
+    distortions: Sequence[ParameterDistortion],
+    points: int,
+    progress: Progress,
+    cancel: Cancel | None,
+) -> tuple[Curve, ...]:
     curves = []
-    for k, (parameter, distortion) in enumerate(zip(parameters, distortions, strict=True)):
-        stop_if(cancel)
-        progress(0.8 + 0.2 * k / len(parameters), f"error curve of {parameter.name}")
-        down, up = distortion.change_down, distortion.change_up
-        fallback = up or down or 5 * distortion.expected
-        first = max(low[k], best[k] - CURVE_REACH * (down or fallback))
-        last = min(high[k], best[k] + CURVE_REACH * (up or fallback))
-        values = np.linspace(first, last, points)  # fmt: skip
-        sets = np.tile(best, (points, 1))
-        sets[:, k] = values
-        errors = tuple(float(e) if np.isfinite(e) else None for e in error.total(sets))
-        curves.append(Curve(name=parameter.name, unit=parameter.unit, values=tuple(map(float, values)), errors=errors))
+    for k, distortion in enumerate(distortions):
+        stop_if(cancel or Never())
+        progress(0.8 + 0.2 * k / len(distortions), f"error curve of {distortion.name}")
+        curves.append(_curve(error, varied, k, distortion, points))
     progress(1.0, "error curves: done")
     return tuple(curves)
+
+
+def _curve(error: SquaredError, varied: _Varied, k: int, distortion: ParameterDistortion, points: int) -> Curve:
+    down, up = distortion.change_down, distortion.change_up
+    fallback = up or down or 5 * distortion.expected
+    first = max(varied.low[k], varied.best[k] - CURVE_REACH * (down or fallback))
+    last = min(varied.high[k], varied.best[k] + CURVE_REACH * (up or fallback))
+    values = np.linspace(first, last, points)
+    sets = np.tile(varied.best, (points, 1))
+    sets[:, k] = values
+    errors = tuple(float(e) if np.isfinite(e) else None for e in error.total(sets))
+    return Curve(name=distortion.name, unit=distortion.unit, values=tuple(map(float, values)), errors=errors)

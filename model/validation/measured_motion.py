@@ -1,4 +1,4 @@
-"""What a trace says about the motion: positions on the grid of periods, smoothed, with speeds and their noise."""
+"""The motion that a trace shows: positions on the grid of control periods, smoothed, with speeds and their noise."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from scipy.interpolate import CubicSpline
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
+from model import layout as at
 from model.dynamics.compilation import compiled
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
 from model.validation import differentiation as d
@@ -21,13 +21,13 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 NOISE_SHARE = 0.05
-"""Smoothing is chosen so that noise stays below this share of the acceleration."""
+"""Largest noise of an acceleration, as a share of the acceleration; the smoothing is chosen by it."""
 MOVING = 4.0
-"""A joint moves where its speed exceeds so many standard deviations of its noise."""
+"""Speed above which a joint counts as moving, in standard deviations of the speed's noise."""
 FINE = 8
-"""Points a period at which friction's change of direction is looked for."""
+"""Points a control period at which friction's change of direction is looked for."""
 SHORTEST = 12
-"""Samples that a trace needs at least."""
+"""Least number of samples of a trace."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,8 @@ class Observation:
     """A trace as the time-domain form uses it.
 
     motion: smoothed. acceleration: (k, n) rad/s², with the same smoothing. usable: (k, n) where a joint moves and
-    nothing is missing. noise: (n,) standard deviation that noise and rounding of the readings give the difference of
-    measured and expected acceleration: through second differences, and through the expected one's answer to the
-    speeds of all joints.
+    no sample is missing. noise: (n,) standard deviation of measured − expected acceleration that comes from noise and
+    rounding of the readings: through second differences, and through the speeds, on which the expected one depends.
     """
 
     motion: MeasuredMotion
@@ -47,7 +46,7 @@ class Observation:
 
 
 def observe(model: Model, trace: Trace, smoothing: float | None = None) -> Observation:
-    """Smoothed motion of a trace; `smoothing` is the kernel's standard deviation in s, chosen from the noise if None.
+    """The smoothed motion of a trace; `smoothing`: standard deviation of the kernel in s, by default chosen from noise.
 
     Raises:
         TraceError: for a trace without recorded drive, or too short.
@@ -63,10 +62,10 @@ def observe(model: Model, trace: Trace, smoothing: float | None = None) -> Obser
     measured = np.stack([np.interp(grid, inputs.rows, trace.position[:, c]) for c in columns], axis=1)
     present = np.isin(np.arange(len(grid)), np.round(inputs.rows).astype(np.int64))
     deviation = position_noise(model)
-    width = (
-        d.chosen_width(measured, deviation, inputs.period, NOISE_SHARE) if smoothing is None
-        else max(d.WIDTHS[0], smoothing / inputs.period)
-    )  # fmt: skip
+    if smoothing is None:
+        width = d.chosen_width(measured, deviation, inputs.period, NOISE_SHARE)
+    else:
+        width = max(d.WIDTHS[0], smoothing / inputs.period)
     position = d.smoothed(measured, width)
     speed = d.speeds(position, inputs.period)
     friction = d.smoothed(_friction_deflection(model, measured), width)
@@ -98,7 +97,7 @@ def position_noise(model: Model) -> Floats:
 def _friction_deflection(model: Model, measured: Floats) -> Floats:
     """Deflection of the friction contact (k, n) that follows the motion from rest, averaged as accelerations are.
 
-    Motion between samples is interpolated: friction turns around within a period, and when it does counts.
+    Motion between samples is interpolated: friction changes sign within a period, and the moment matters.
     """
     presliding = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)[:, at.PRESLIDING]
     count = len(measured)
@@ -120,5 +119,5 @@ def _follow(moves: Floats, contact: Floats) -> None:
 
 
 def _spread(mask: Mask, reach: int) -> Mask:
-    """True within `reach` samples of any True."""
-    return np.asarray(np.convolve(mask, np.ones(2 * reach + 1))[reach : reach + len(mask)] > 0.5)  # also a short one
+    """True within `reach` samples of any True, also in a mask that is shorter than that."""
+    return np.asarray(np.convolve(mask, np.ones(2 * reach + 1))[reach : reach + len(mask)] > 0.5)

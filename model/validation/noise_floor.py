@@ -1,10 +1,10 @@
-"""What the time-domain form leaves of a record that the model's own law has made: its noise floor, rad/s².
+"""The noise floor of the time-domain form: the residual that is left of a record made by the model itself, rad/s².
 
-Three things come together there, and only the first follows from a formula. (1) Noise and rounding of the readings go
-through differentiation and through the model's answer to speed (`measured_motion.observe`). (2) Between two samples the
-drive steps and the speed is not what samples show. (3) Where a motion turns, friction turns with it, and one count of
-noise decides when. So the model takes the arm's place: the record's set points, noise drawn anew, readings rounded, and
-what the very same differentiation leaves of that.
+Three causes add up, and only the first follows from a formula. (1) Noise and rounding of the readings are amplified by
+differentiation and by the model's dependence on speed (`measured_motion.observe`). (2) Between two samples the drive
+steps and the speed differs from what the samples show. (3) Where a motion turns, friction changes sign, and one count
+of noise decides when. The model therefore takes the arm's place: it repeats the record's set points with noise drawn
+anew and readings rounded, and the same differentiation is applied to the result.
 """
 
 from __future__ import annotations
@@ -19,22 +19,25 @@ from daq.contracts.machine import NoController
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.measured_motion import Observation, observe
 
 Floats = NDArray[np.float64]
 
-FEWEST, MOST, SECONDS, SEED = 12, 40, 400.0, 1991
-"""Replicas of a record: enough for so many seconds, since friction turns but a few times in a short one."""
+FEWEST, MOST = 12, 40
+"""Least and largest number of replicas of a record."""
+SECONDS = 400.0
+"""s of motion that the replicas of a record have together: in a short record friction changes sign only a few times."""
+SEED = 1991
 
 
 def noise_floor(model: Model, trace: Trace, observation: Observation) -> tuple[Floats, bool]:
-    """Root mean square (n,) of each joint's acceleration residual where the model is right, rad/s² (m/s²): the median
-    over records that it makes.
+    """Root mean square (n,) of each joint's acceleration residual if the model is right, rad/s² (m/s²).
 
-    Returns also whether it was simulated. Where it cannot be, or on a joint that does not move in the simulation: the
-    readings' noise alone, as `observation` has it.
+    It is the median over simulated records. Also returned is whether they could be simulated. If not, and on a joint
+    that does not move in them, the floor is the readings' noise alone, as `observation` has it.
     """
     smoothing = observation.motion.width * observation.motion.period
     rng = np.random.default_rng(SEED)
@@ -52,7 +55,7 @@ def noise_floor(model: Model, trace: Trace, observation: Observation) -> tuple[F
 
 
 def _made_by(model: Model, trace: Trace, rng: np.random.Generator) -> Trace:
-    """The record that the model would have left: closed loop where there are set points, else from the drive."""
+    """The record that the model would have made: in closed loop if there are set points, else from the drive."""
     machine = model.machine
     closed = trace.set_point is not None and not isinstance(machine.controller, NoController)
     sensors = [machine.joint(j).sensor for j in machine.modelled_joints]

@@ -1,19 +1,19 @@
-"""What a variation may go with: position, speed, direction, load and so on of a joint, and how strongly it does."""
+"""What a variation may depend on (position, speed, direction, load and so on of a joint), and how strongly it does."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from model.analysis.bodies import gravity_loads
 from model.machine_model.model import Model
+from model.simulation.chain_of_model import gravity_loads
 from model.validation.measured_motion import Observation
 from model.validation.variation import Correlation
 
 Floats = NDArray[np.float64]
 
 FEWEST = 6
-"""Independent samples below which no correlation is given."""
+"""Least number of independent samples for a correlation."""
 
 
 def regressors(model: Model, observation: Observation) -> dict[str, Floats]:
@@ -53,7 +53,7 @@ def correlations(
 def _pearson(x: Floats, y: Floats) -> float | None:
     x, y = x - x.mean(), y - y.mean()
     size = float(np.sqrt((x**2).sum() * (y**2).sum()))
-    # a constant regressor (one direction only, one posture) goes with nothing
+    # a constant regressor (one direction only, one posture) is correlated with nothing
     if size <= 1e-9 * len(x) * max(1e-300, float(np.abs(x).max() * np.abs(y).max())):
         return None
     return float((x * y).sum() / size)

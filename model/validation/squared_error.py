@@ -13,7 +13,8 @@ from daq.contracts.trace import Trace
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
 from model.simulation.period import OUT_READING
-from model.simulation.simulate import Options, at_rows, parameter_vectors, simulate_many
+from model.simulation.prepared import Options
+from model.simulation.simulate import at_rows, parameter_vectors, simulate_many
 
 Floats = NDArray[np.float64]
 
@@ -37,9 +38,8 @@ class SquaredError:
         vectors = parameter_vectors(self.model, self.names, values)
         sums, samples = np.zeros((len(vectors), len(self.outputs))), 0
         modelled = [self.model.machine.modelled_joints.index(j) for j in self.outputs]
-        for trace, run, out in zip(
-            self.traces, inputs, simulate_many(self.model, inputs, vectors, self.options), strict=True
-        ):
+        simulated = simulate_many(self.model, inputs, vectors, self.options)
+        for trace, run, out in zip(self.traces, inputs, simulated, strict=True):
             readings = at_rows(np.moveaxis(out[:, OUT_READING][:, :, modelled], 1, 0), run.rows)
             measured = trace.position[:, [trace.column(j) for j in self.outputs]]
             with np.errstate(over="ignore", invalid="ignore"):

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
 from model.validation.acceleration_model import expected_accelerations
-from model.validation.expected_deviation import Convention, expected_deviation
-from model.validation.measured_motion import Observation, observe
+from model.validation.expected_deviation import expected_deviation
+from model.validation.measured_motion import Mask, Observation, observe
 from model.validation.noise_floor import noise_floor
 from model.validation.regressors import correlations, regressors
 from model.validation.variation import JointResidual, TimeDomain, Variation
@@ -22,10 +21,23 @@ from model.validation.variation import JointResidual, TimeDomain, Variation
 Floats = NDArray[np.float64]
 
 SIGNIFICANT = 2.0
-"""Standard deviations of noise beyond which a variation counts as real."""
-
-
+"""A variation counts as real beyond this many standard deviations of its noise."""
 READINGS_ALONE = "the noise floor is that of the readings alone: the model cannot be simulated along this record"
+
+
+@dataclass(frozen=True)
+class _Equations:
+    """J_a α = r at every sample of a motion.
+
+    residual (k, n) and jacobian (k, n, p) are zero where a joint rests; deviations (p,) are τ′.
+    """
+
+    model: Model
+    observation: Observation
+    names: tuple[str, ...]
+    residual: Floats
+    jacobian: Floats
+    deviations: Floats
 
 
 @dataclass(frozen=True)
@@ -34,13 +46,10 @@ class _Solution:
 
     alpha: Floats
     noise: Floats
-    active: NDArray[np.bool_]
+    active: Mask
 
 
-def vary_in_time(
-    model: Model, trace: Trace, names: Sequence[str], *, convention: Convention = "source",
-    smoothing: float | None = None, progress: Progress = silent, cancel: Cancel | None = None,
-) -> TimeDomain:  # fmt: skip
+def vary_in_time(model: Model, trace: Trace, names: Sequence[str]) -> TimeDomain:
     """How the named parameters would have to vary with time for the model to explain a trace.
 
     At each sample J_a α = q̈ − f is solved for the least α in units of expected deviations, as far as noise allows
@@ -49,75 +58,78 @@ def vary_in_time(
 
     Raises:
         TraceError: for a trace without drive, or too short. SpecError: for an unknown parameter, no motion, or a
-            flexible transmission. CancelledError: when cancelled.
+            flexible transmission.
     """
-    cancel = cancel or Never()
     if not names:
         raise SpecError("no parameters: name at least one")
-    observation = observe(model, trace, smoothing)
-    progress(0.1, "noise floor")
+    observation = observe(model, trace)
     floor, simulated = noise_floor(model, trace, observation)
     observation = replace(observation, noise=floor)
-    stop_if(cancel)
-    progress(0.3, "exact Jacobians along the motion")
+    equations = _equations(model, observation, tuple(names))
+    solution = _solve(equations)
+    known = regressors(model, observation)
+    motion = observation.motion
+    return TimeDomain(
+        model=model.identity,
+        trace=trace.record.trace_id,
+        convention="source",
+        smoothing=motion.width * motion.period,
+        time=tuple(map(float, motion.time)),
+        joints=tuple(_joint(equations, j, known) for j in range(model.joint_count)),
+        parameters=tuple(_variation(equations, solution, k, known) for k in range(len(names))),
+        notes=tuple(_notes(equations, solution, simulated=simulated)),
+    )
+
+
+def _equations(model: Model, observation: Observation, names: tuple[str, ...]) -> _Equations:
     expected, jacobian = expected_accelerations(model, observation.motion, names)
-    stop_if(cancel)
-    progress(0.7, "solving for the variations")
     residual = np.where(observation.usable, observation.acceleration - expected, 0.0)
     jacobian = np.moveaxis(jacobian, 0, 2) * observation.usable[:, :, None]
-    deviations = np.array([expected_deviation(model.parameter(n), convention)[0] for n in names])
-    solution = _solve(residual, jacobian, observation, deviations)
-    known = regressors(model, observation)
-    result = TimeDomain(
-        model=model.identity, trace=trace.record.trace_id, convention=convention,
-        smoothing=observation.motion.width * observation.motion.period, time=tuple(map(float, observation.motion.time)),
-        joints=tuple(_joint(model, j, residual, observation, known) for j in range(model.joint_count)),
-        parameters=tuple(
-            _variation(model, name, k, solution, residual, jacobian, observation, deviations[k], known)
-            for k, name in enumerate(names)
-        ),
-        notes=tuple(_notes(names, solution, observation, simulated=simulated)),
-    )  # fmt: skip
-    progress(1.0, "time-domain form: done")
-    return result
+    deviations = np.array([expected_deviation(model.parameter(n), "source")[0] for n in names])
+    return _Equations(model, observation, names, residual, jacobian, deviations)
 
 
-def _solve(residual: Floats, jacobian: Floats, observation: Observation, deviations: Floats) -> _Solution:
+def _solve(given: _Equations) -> _Solution:
     """α = S Jᵀ (J S Jᵀ + R)⁻¹ r at every sample, with S = τ′² and R the noise; its noise through the same gain."""
-    scaled = jacobian * deviations
+    observation, deviations = given.observation, given.deviations
+    scaled = given.jacobian * deviations
     noise = np.diag(observation.noise**2)
     spread = scaled @ np.swapaxes(scaled, 1, 2) + noise
     gain = np.swapaxes(np.linalg.solve(spread, scaled), 1, 2)
-    alpha = deviations * np.einsum("kpj,kj->kp", gain, residual)
+    alpha = deviations * np.einsum("kpj,kj->kp", gain, given.residual)
     band = deviations * np.sqrt(np.einsum("kpj,j,kpj->kp", gain, observation.noise**2, gain))
     seen = (np.abs(scaled) > 1e-9 * np.abs(scaled).max(initial=1e-300)) & observation.usable[:, :, None]
     return _Solution(alpha, band, seen.any(axis=1))
 
 
-def _variation(
-    model: Model, name: str, k: int, solution: _Solution, residual: Floats, jacobian: Floats, observation: Observation,
-    expected: float, known: dict[str, Floats],
-) -> Variation:  # fmt: skip
-    parameter = model.parameter(name)
+def _variation(given: _Equations, solution: _Solution, k: int, known: dict[str, Floats]) -> Variation:
+    parameter = given.model.parameter(given.names[k])
     active, alpha, band = solution.active[:, k], solution.alpha[:, k], solution.noise[:, k]
     some = bool(active.any())
     square = float((alpha[active] ** 2 - band[active] ** 2).mean()) if some else 0.0
-    own = [j - 1 for j in parameter.joints] or list(range(model.joint_count))
-    constant, varying = _alone(residual, jacobian[:, :, k], observation)
+    own = [j - 1 for j in parameter.joints] or list(range(given.model.joint_count))
+    constant, varying = _alone(given, k)
     return Variation(
-        name=name, unit=parameter.unit, value=parameter.value, values=_optional(alpha, active),
-        noise=_optional(band, active), deviation=float(np.sqrt(max(square, 0.0))), expected=expected,
+        name=parameter.name,
+        unit=parameter.unit,
+        value=parameter.value,
+        values=_optional(alpha, active),
+        noise=_optional(band, active),
+        deviation=float(np.sqrt(max(square, 0.0))),
+        expected=given.deviations[k],
         mean=float(alpha[active].mean()) if some else 0.0,
         significant=float((np.abs(alpha[active]) > SIGNIFICANT * band[active]).mean()) if some else 0.0,
-        alone_constant=constant, alone_varying=varying,
-        against=correlations(alpha, active, known, own, observation.motion.width),
-    )  # fmt: skip
+        alone_constant=constant,
+        alone_varying=varying,
+        against=correlations(alpha, active, known, own, given.observation.motion.width),
+    )
 
 
-def _alone(residual: Floats, column: Floats, observation: Observation) -> tuple[float, float]:
+def _alone(given: _Equations, k: int) -> tuple[float, float]:
     """Shares of the residual's energy, less noise, that one parameter explains: as a constant, and varying."""
-    r, j = residual / observation.noise, column / observation.noise
-    energy = float((r**2).sum()) - float(observation.usable.sum())
+    noise = given.observation.noise
+    r, j = given.residual / noise, given.jacobian[:, :, k] / noise
+    energy = float((r**2).sum()) - float(given.observation.usable.sum())
     squares = (j**2).sum(axis=1)
     if energy <= 0 or squares.max(initial=0.0) == 0.0:
         return 0.0, 0.0
@@ -128,25 +140,27 @@ def _alone(residual: Floats, column: Floats, observation: Observation) -> tuple[
     return min(1.0, max(0.0, constant / energy)), min(1.0, max(0.0, varying / energy))
 
 
-def _joint(model: Model, j: int, residual: Floats, observation: Observation, known: dict[str, Floats]) -> JointResidual:
+def _joint(given: _Equations, j: int, known: dict[str, Floats]) -> JointResidual:
+    observation, values = given.observation, given.residual[:, j]
     usable = observation.usable[:, j]
-    values = residual[:, j]
     return JointResidual(
-        joint=model.machine.modelled_joints[j], values=_optional(values, usable), noise=float(observation.noise[j]),
+        joint=given.model.machine.modelled_joints[j],
+        values=_optional(values, usable),
+        noise=float(observation.noise[j]),
         rms=float(np.sqrt((values[usable] ** 2).mean())) if usable.any() else 0.0,
         against=correlations(values, usable, known, [j], observation.motion.width),
-    )  # fmt: skip
+    )
 
 
-def _optional(values: Floats, present: NDArray[np.bool_]) -> tuple[float | None, ...]:
+def _optional(values: Floats, present: Mask) -> tuple[float | None, ...]:
     return tuple(float(v) if p else None for v, p in zip(values, present, strict=True))
 
 
-def _notes(names: Sequence[str], solution: _Solution, observation: Observation, *, simulated: bool) -> list[str]:
+def _notes(given: _Equations, solution: _Solution, *, simulated: bool) -> list[str]:
     notes = [] if simulated else [READINGS_ALONE]
-    notes += [f"{name}: does not act on the accelerations of this record" for k, name in enumerate(names)
-             if not solution.active[:, k].any()]  # fmt: skip
-    if len(names) > solution.alpha.shape[1] or len(names) > observation.acceleration.shape[1]:
-        joints = observation.acceleration.shape[1]
-        notes.append(f"{len(names)} parameters for {joints} accelerations a sample: α is the least in units of τ′")
+    absent = [name for k, name in enumerate(given.names) if not solution.active[:, k].any()]
+    notes += [f"{name}: does not act on the accelerations of this record" for name in absent]
+    parameters, joints = len(given.names), given.residual.shape[1]
+    if parameters > joints:
+        notes.append(f"{parameters} parameters for {joints} accelerations a sample: α is the least in units of τ′")
     return notes

@@ -1,4 +1,4 @@
-"""What validation in the time domain finds, as data: whoever only shows it loads no compiler."""
+"""What validation in the time domain finds, as data; a module that only shows it need not load the compiler."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Correlation(_Part):
 
 
 class Variation(_Part):
-    """α(t) of one parameter, all parameters moving together as little as explains the motion.
+    """α(t) of one parameter, where all parameters together vary as little as explains the motion.
 
     `values` and `noise` (the standard deviation that the noise floor gives α) are in `unit` at the result's
     times; None where no joint that the parameter acts on moves. `deviation` is the rms of α (4.23), corrected for
@@ -58,7 +58,7 @@ class Variation(_Part):
 
 
 class JointResidual(_Part):
-    """Measured less expected acceleration of a joint (rad/s²; None where it does not move) and what it goes with.
+    """Measured − expected acceleration of a joint (rad/s²; None where it does not move) and what it depends on.
 
     `noise` is its noise floor: the root mean square that is left of records which the model itself has made.
     """

@@ -27,8 +27,8 @@ from server.access.origin import SAFE_METHODS, beside, is_from_elsewhere, is_kno
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
 from server.access.turns import Turns
+from server.database_errors import DamagedError
 from server.problems import ProblemError, of_damage, of_database, response
-from server.store.database_errors import DamagedError
 
 STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
 """The one address whose POST no limit of requests holds up."""

@@ -21,7 +21,7 @@ from daq.contracts.service.queue import Role
 from server.access.caller import Caller
 from server.access.digest import digest_of
 from server.clock import Clock
-from server.store.database_errors import DamagedError
+from server.database_errors import DamagedError
 from server.store.engine import Store
 from server.store.tables import TokenRow
 

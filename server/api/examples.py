@@ -89,19 +89,42 @@ def _experiments() -> list[BaseModel]:
         ExperimentRequest(spec=SPEC, at=NOON, priority=10),
         ExperimentChange(priority=5),
         Experiment(
-            id=EXPERIMENT, robot=ROBOT, spec=SPEC, state="running", priority=10, at=NOON, submitted=NOON,
-            submitted_by="anna", started=NOON, progress=0.4, progress_text="120 of 300 samples", trace=TRACE,
+            id=EXPERIMENT,
+            robot=ROBOT,
+            spec=SPEC,
+            state="running",
+            priority=10,
+            at=NOON,
+            submitted=NOON,
+            submitted_by="anna",
+            started=NOON,
+            progress=0.4,
+            progress_text="120 of 300 samples",
+            trace=TRACE,
         ),
         ExperimentPreset(name="ramp", description="the ramp of the 1991 thesis", spec=SPEC),
         ScheduleRequest(spec=SPEC, every=86400, starts=NOON, count=30),
         ScheduleChange(active=False),
         Schedule(
-            id="51c0ffee0a1b", robot=ROBOT, spec=SPEC, every=86400, starts=NOON, count=30, priority=0, active=True,
-            submitted_runs=3, next=NOON + timedelta(days=3), created=NOON, created_by="anna",
+            id="51c0ffee0a1b",
+            robot=ROBOT,
+            spec=SPEC,
+            every=86400,
+            starts=NOON,
+            count=30,
+            priority=0,
+            active=True,
+            submitted_runs=3,
+            next=NOON + timedelta(days=3),
+            created=NOON,
+            created_by="anna",
         ),
         MotionPreview(
-            time=(0.0, 0.02, 0.04), set_points=((3.14, 1.57, 1.57), (3.14, 1.58, 1.57), (3.14, 1.59, 1.57)),
-            moving=(2,), duration=0.04, violations=(),
+            time=(0.0, 0.02, 0.04),
+            set_points=((3.14, 1.57, 1.57), (3.14, 1.58, 1.57), (3.14, 1.59, 1.57)),
+            moving=(2,),
+            duration=0.04,
+            violations=(),
             marks=(MotionMark(time=0.02, kind="ramp_start", message="ramp starts"),),
         ),
         QUEUE,
@@ -109,33 +132,66 @@ def _experiments() -> list[BaseModel]:
         NOBODY,
         ControlRequest(moves_real_arm=True),
         ControlLease(lease="hJ4l0q", expires=NOON, remaining=10.0, heartbeat_every=3.0),
-    ]  # fmt: skip
+    ]
 
 
 def _robot() -> list[BaseModel]:
     angles = (3.14, 1.57, 1.57)
     sample = Sample(
-        tick=90210, host_time=512.34, utc=NOON.timestamp(), age=0.011, joints=(1, 2, 3), set_point=angles,
-        position=(3.13, 1.57, 1.57), error=(0.01, 0.0, 0.0), drive=(0.4, 0.0, 0.0), frozen=False,
-    )  # fmt: skip
+        tick=90210,
+        host_time=512.34,
+        utc=NOON.timestamp(),
+        age=0.011,
+        joints=(1, 2, 3),
+        set_point=angles,
+        position=(3.13, 1.57, 1.57),
+        error=(0.01, 0.0, 0.0),
+        drive=(0.4, 0.0, 0.0),
+        frozen=False,
+    )
     message = SampleMessage(
-        tick=90210, host_time=512.34, joints=(1, 2, 3), set_point=angles, position=(3.13, 1.57, 1.57),
-        error=(0.01, 0.0, 0.0), drive=(0.4, 0.0, 0.0), frozen=False, lateness=0.0007,
-    )  # fmt: skip
+        tick=90210,
+        host_time=512.34,
+        joints=(1, 2, 3),
+        set_point=angles,
+        position=(3.13, 1.57, 1.57),
+        error=(0.01, 0.0, 0.0),
+        drive=(0.4, 0.0, 0.0),
+        frozen=False,
+        lateness=0.0007,
+    )
     robot = RobotMessage(
-        connection="connected", connection_problem="", identity=IDENTITY, arm="idle", cause="", activity="none",
-        experiment=None, limp=(), control=NOBODY,
-    )  # fmt: skip
+        connection="connected",
+        connection_problem="",
+        identity=IDENTITY,
+        arm="idle",
+        cause="",
+        activity="none",
+        experiment=None,
+        limp=(),
+        control=NOBODY,
+    )
     return [
         RobotSummary(robot=ROBOT, machine="ma2000", connection="connected", arm="idle"),
         RobotStatus(
-            robot=ROBOT, machine="ma2000", port="serial:///dev/ttyUSB0?baud=115200", connection="connected",
-            identity=IDENTITY, arm="idle", activity="none", sample=sample,
-            link=LinkStatus(state="connected", counters={"retries": 0.0}, age=0.3), control=NOBODY, queue=QUEUE,
+            robot=ROBOT,
+            machine="ma2000",
+            port="serial:///dev/ttyUSB0?baud=115200",
+            connection="connected",
+            identity=IDENTITY,
+            arm="idle",
+            activity="none",
+            sample=sample,
+            link=LinkStatus(state="connected", counters={"retries": 0.0}, age=0.3),
+            control=NOBODY,
+            queue=QUEUE,
             utc=NOON,
         ),
         StopResult(
-            delivered=True, confirmed=True, tick=90211, seconds=0.014,
+            delivered=True,
+            confirmed=True,
+            tick=90211,
+            seconds=0.014,
             text="stopped, confirmed by the board: set points frozen at tick 90211.",
         ),
         ResetRequest(here=False),
@@ -148,7 +204,7 @@ def _robot() -> list[BaseModel]:
         LiveFrame(now=512.35, utc=NOON.timestamp(), messages=(message, robot)),
         Ticket(ticket="q8d1mV", seconds=30.0),
         load_machine("ma2000"),
-    ]  # fmt: skip
+    ]
 
 
 def _teaching() -> list[BaseModel]:
@@ -161,22 +217,41 @@ def _teaching() -> list[BaseModel]:
         PROGRAM,
         StoredProgram(entry=PROGRAM, program=PICK),
         CalibrationRequest(joints=(1, 2)),
-        MeasuredGain(
-            joint=1, gain=2.04, standard_error=0.01, lowest=2.0, highest=2.1, volts_per_rad=42.0, reason=""
-        ),
-    ]  # fmt: skip
+        MeasuredGain(joint=1, gain=2.04, standard_error=0.01, lowest=2.0, highest=2.1, volts_per_rad=42.0, reason=""),
+    ]
 
 
 def _traces() -> list[BaseModel]:
     entry = CatalogueEntry(
-        id=TRACE, robot=ROBOT, file=f"2026-03-02T12-00-00Z_ramp_{TRACE[:6]}.mcap", created=NOON, source="real",
-        kind="ramp", name="morning-ramp", joints=(1, 2, 3), outcome="complete", samples=158, duration=3.14, size=81234,
-        operator="anna", experiment=EXPERIMENT, tags=("wear",), notes="after the belts were tightened",
-    )  # fmt: skip
+        id=TRACE,
+        robot=ROBOT,
+        file=f"2026-03-02T12-00-00Z_ramp_{TRACE[:6]}.mcap",
+        created=NOON,
+        source="real",
+        kind="ramp",
+        name="morning-ramp",
+        joints=(1, 2, 3),
+        outcome="complete",
+        samples=158,
+        duration=3.14,
+        size=81234,
+        operator="anna",
+        experiment=EXPERIMENT,
+        tags=("wear",),
+        notes="after the belts were tightened",
+    )
     figures = JointFigureSet(
-        joint=1, unit="°", moved=True, start=180.0, end=201.6, overshoot=1.9, rise_time=0.42, largest_error=5.4,
-        final_error=0.1, largest_drive=9.8,
-    )  # fmt: skip
+        joint=1,
+        unit="°",
+        moved=True,
+        start=180.0,
+        end=201.6,
+        overshoot=1.9,
+        rise_time=0.42,
+        largest_error=5.4,
+        final_error=0.1,
+        largest_drive=9.8,
+    )
     event = TraceEvent(time=0.5, kind="ramp_start", message="ramp starts", tick=25)
     record = TraceRecord(
         trace_id=TRACE, created=NOON, software="ma2000-daq 0.1.0", source="real", spec=SPEC, outcome="complete"
@@ -186,29 +261,54 @@ def _traces() -> list[BaseModel]:
         TraceChange(tags=("wear", "after service"), notes="belts tightened"),
         TraceDetails(entry=entry, record=record, figures=(figures,), events=(event,), missing_samples=0),
         TraceSignals(
-            id=TRACE, joints=(1,), samples=158, time=(0.0, 0.02), position=((3.14, 3.15),),
-            set_point=((3.14, 3.16),), error=((0.0, 0.01),), drive=((0.0, 0.4),), drive_unit="V", events=(event,),
+            id=TRACE,
+            joints=(1,),
+            samples=158,
+            time=(0.0, 0.02),
+            position=((3.14, 3.15),),
+            set_point=((3.14, 3.16),),
+            error=((0.0, 0.01),),
+            drive=((0.0, 0.4),),
+            drive_unit="V",
+            events=(event,),
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _models() -> list[BaseModel]:
     entry = ModelEntry(
-        id=MODEL, robot=ROBOT, name="with friction", created=NOON, created_by="anna", parent=None, job=JOB,
+        id=MODEL,
+        robot=ROBOT,
+        name="with friction",
+        created=NOON,
+        created_by="anna",
+        parent=None,
+        job=JOB,
         traces=(TRACE,),
-    )  # fmt: skip
+    )
     parameter = ModelParameter(name="joint2.coulomb", unit="N·m", value=0.41, low=0.0, high=5.0, deviation=0.2)
     fit = FitRequest(
         traces=(TRACE,), effects=(EffectChoice(name="coulomb_friction", joints=(2, 3)),), name="with friction"
     )
     job = Job(
-        id=JOB, robot=ROBOT, request=fit, state="running", submitted=NOON, submitted_by="anna", started=NOON,
-        progress=0.35, progress_text="12 evaluations",
-    )  # fmt: skip
+        id=JOB,
+        robot=ROBOT,
+        request=fit,
+        state="running",
+        submitted=NOON,
+        submitted_by="anna",
+        started=NOON,
+        progress=0.35,
+        progress_text="12 evaluations",
+    )
     effect = KnownEffect(
-        name="coulomb_friction", family="friction", title="Coulomb friction", physics="τ = τ_c sign(q̇)", joints=(),
+        name="coulomb_friction",
+        family="friction",
+        title="Coulomb friction",
+        physics="τ = τ_c sign(q̇)",
+        joints=(),
         whole_machine=False,
-    )  # fmt: skip
+    )
     return [
         fit,
         ValidateRequest(traces=(TRACE,), model=MODEL),
@@ -228,14 +328,25 @@ def _models() -> list[BaseModel]:
 def _comparison() -> ComparisonJobResult:
     joint = JointAgreement(joint=1, unit="rad", rmse=0.004, largest=0.011, floor=0.001, count=0.0046, share=0.0008)
     agreement = ModelAgreement(
-        label=f"with friction ({MODEL})", model=MODEL, effects=("coulomb_friction",),
-        traces=(TraceAgreement(trace=TRACE, held_out=None, samples=158, joints=(joint,)),), in_sample=(joint,),
+        label=f"with friction ({MODEL})",
+        model=MODEL,
+        effects=("coulomb_friction",),
+        traces=(TraceAgreement(trace=TRACE, held_out=None, samples=158, joints=(joint,)),),
+        in_sample=(joint,),
         held_out=None,
-    )  # fmt: skip
+    )
     overlay = Overlay(
-        trace=TRACE, held_out=None, joints=(1,), units=("rad",), samples=158, time=(0.0, 0.02),
-        measured=((3.14, 3.15),), set_point=None, simulated=(((3.14, 3.151),),), residual=(((0.0, -0.001),),),
-    )  # fmt: skip
+        trace=TRACE,
+        held_out=None,
+        joints=(1,),
+        units=("rad",),
+        samples=158,
+        time=(0.0, 0.02),
+        measured=((3.14, 3.15),),
+        set_point=None,
+        simulated=(((3.14, 3.151),),),
+        residual=(((0.0, -0.001),),),
+    )
     difference = ParameterDifference(name="joint2.coulomb", unit="N·m", values=(None, 0.41), deviations=None)
     data = ComparisonData(models=(agreement,), signals=(overlay,), differences=(difference,))
     return ComparisonJobResult(id=JOB, data=data)
@@ -243,17 +354,28 @@ def _comparison() -> ComparisonJobResult:
 
 def _system() -> list[BaseModel]:
     storage = StorageStatus(
-        traces_folder="/var/lib/ma2000-daq/traces", traces_free=50_000_000_000, traces_reserve=20_000_000, traces=412,
-        database="sqlite", database_size=1_200_000,
-    )  # fmt: skip
+        traces_folder="/var/lib/ma2000-daq/traces",
+        traces_free=50_000_000_000,
+        traces_reserve=20_000_000,
+        traces=412,
+        database="sqlite",
+        database_size=1_200_000,
+    )
     return [
         Health(status="ok", version="0.1.0", checks={"database": "", "traces": "", f"robot {ROBOT}": ""}),
         Me(name="anna", role="operator"),
         SystemStatus(
-            version="0.1.0", uptime=86400.0, storage=storage, live_clients=3, live_dropped=0, jobs_at_once=1,
-            short_jobs_at_once=1, unattended=False, stop_port=8301,
+            version="0.1.0",
+            uptime=86400.0,
+            storage=storage,
+            live_clients=3,
+            live_dropped=0,
+            jobs_at_once=1,
+            short_jobs_at_once=1,
+            unattended=False,
+            stop_port=8301,
         ),
-    ]  # fmt: skip
+    ]
 
 
 @cache

@@ -17,14 +17,24 @@ from daq.contracts.service.experiments import (
     ExperimentState,
     MotionPreview,
 )
-from server.api.parts import CursorOf, IdempotencyKey, Identity, Limit, Operator, RobotPart, ServicesPart, Turn, Viewer
+from server.api.dependencies import (
+    CursorOf,
+    IdempotencyKey,
+    Identity,
+    Limit,
+    Operator,
+    RobotDep,
+    ServicesDep,
+    Turn,
+    Viewer,
+)
 from server.bounded.messages import WorkOutMotion
-from server.bounded.motion import worked_out
+from server.bounded.motion import preview_of
 from server.bounded.workers import ExhaustedError
+from server.catalogue.room import require_room
+from server.experiments.length import LONGEST, least_length, points_of
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
-from server.queue.length import LONGEST, least_length, points_of
-from server.queue.room import require_room
 from server.services import RobotServices, Services
 
 MOST_SHOWN = 5000
@@ -38,9 +48,9 @@ StateFilter = Annotated[list[ExperimentState] | None, Query(description="Only th
 @router.post("", status_code=201, response_model=Experiment, responses={200: {"model": Experiment}})
 def submit_experiment(
     request: ExperimentRequest,
-    one: RobotPart,
-    found: ServicesPart,
-    who: Operator,
+    rig: RobotDep,
+    services: ServicesDep,
+    caller: Operator,
     response: Response,
     _turn: Turn,
     idempotency_key: IdempotencyKey = None,
@@ -49,20 +59,20 @@ def submit_experiment(
 
     The same Idempotency-Key gives the same experiment (200), and never a second one.
     """
-    experiment, new = found.experiments.made_before(one.robot.name, request, idempotency_key), False
+    experiment, new = services.experiments.made_before(rig.robot.name, request, idempotency_key), False
     if experiment is None:  # what was accepted once stays so, whatever the disk says by now
-        require_possible(found, one, request.spec)
-        require_room(one.catalogue.folder)
-        experiment, new = one.queue.submit(request, who.name, idempotency_key)
+        require_possible(services, rig, request.spec)
+        require_room(rig.catalogue.folder)
+        experiment, new = rig.queue.submit(request, caller.name, idempotency_key)
     response.status_code = 201 if new else 200
-    response.headers["Location"] = f"/api/v1/robots/{one.robot.name}/experiments/{experiment.id}"
-    return one.queue.as_told(experiment)
+    response.headers["Location"] = f"/api/v1/robots/{rig.robot.name}/experiments/{experiment.id}"
+    return rig.queue.with_progress(experiment)
 
 
 @router.get("")
 async def list_experiments(
-    one: RobotPart,
-    found: ServicesPart,
+    rig: RobotDep,
+    services: ServicesDep,
     _: Viewer,
     state: StateFilter = None,
     schedule: Annotated[str | None, Query(max_length=64)] = None,
@@ -71,27 +81,27 @@ async def list_experiments(
     cursor: CursorOf = None,
 ) -> Page[Experiment]:
     """Experiments, those submitted last first, or those that ended last."""
-    page = await found.experiments.page.told(one.robot.name, tuple(state or ()), schedule, cursor, limit, order)
-    return page.model_copy(update={"items": tuple(one.queue.as_told(item) for item in page.items)})
+    page = await services.experiments.page.fetch(rig.robot.name, tuple(state or ()), schedule, cursor, limit, order)
+    return page.model_copy(update={"items": tuple(rig.queue.with_progress(item) for item in page.items)})
 
 
 @router.post("/preview")
 def preview_experiment(
-    request: ExperimentRequest, one: RobotPart, found: ServicesPart, _: Viewer, _turn: Turn
+    request: ExperimentRequest, rig: RobotDep, services: ServicesDep, _: Viewer, _turn: Turn
 ) -> MotionPreview:
     """The motion of an experiment and everything that speaks against it. Nothing is queued, nothing moves."""
-    return _worked_out(found, one, request.spec, MOST_SHOWN)
+    return _preview(services, rig, request.spec, MOST_SHOWN)
 
 
 @router.get("/{experiment}")
 async def get_experiment(
-    experiment: Identity, one: RobotPart, found: ServicesPart, _: Viewer, wait: Wait = 0
+    experiment: Identity, rig: RobotDep, services: ServicesDep, _: Viewer, wait: Wait = 0
 ) -> Experiment:
     """One experiment: its state, how far it is, what became of it. With `wait` the answer comes when it has ended."""
     return await when_ended(
-        one.hub,
+        rig.hub,
         {"events"},
-        lambda: one.queue.as_told(found.experiments.get(one.robot.name, experiment)),
+        lambda: rig.queue.with_progress(services.experiments.get(rig.robot.name, experiment)),
         lambda now: now.state in ENDS,
         wait,
     )
@@ -99,33 +109,35 @@ async def get_experiment(
 
 @router.patch("/{experiment}")
 def change_experiment(
-    experiment: Identity, change: ExperimentChange, one: RobotPart, found: ServicesPart, who: Operator
+    experiment: Identity, change: ExperimentChange, rig: RobotDep, services: ServicesDep, caller: Operator
 ) -> Experiment:
     """A new priority of one that still waits."""
-    changed = found.experiments.set_priority(one.robot.name, experiment, change.priority)
-    found.tell(one.robot.name, "experiment", f"priority {change.priority}", actor=who.name, experiment=experiment)
-    one.queue.wake()
+    changed = services.experiments.set_priority(rig.robot.name, experiment, change.priority)
+    services.record_event(
+        rig.robot.name, "experiment", f"priority {change.priority}", actor=caller.name, experiment=experiment
+    )
+    rig.queue.wake()
     return changed
 
 
 @router.post("/{experiment}/cancel")
-def cancel_experiment(experiment: Identity, one: RobotPart, who: Operator) -> Experiment:
+def cancel_experiment(experiment: Identity, rig: RobotDep, caller: Operator) -> Experiment:
     """Takes back what waits. One that runs is stopped as by a stop: the arm is frozen and needs a reset."""
-    return one.queue.cancel(experiment, who.name)
+    return rig.queue.cancel(experiment, caller.name)
 
 
-def _worked_out(found: Services, one: RobotServices, spec: ExperimentSpec, most_shown: int) -> MotionPreview:
+def _preview(services: Services, rig: RobotServices, spec: ExperimentSpec, most_shown: int) -> MotionPreview:
     """A short motion here, a long one by a process that holds up nobody. Raises SpecError, and a 422 for what is too
     long to be planned."""
     length = least_length(spec)
     if length > LONGEST:
         line = f"spec: takes {length / 3600:.1f} h, allowed are {LONGEST / 3600:g} h"
         raise ProblemError(422, "beyond-limits", line, "make a schedule of shorter ones")
-    order = WorkOutMotion(spec=spec, machine=one.robot.machine, most_shown=most_shown)
+    order = WorkOutMotion(spec=spec, machine=rig.robot.machine, most_shown=most_shown)
     if length <= SHORT and spec.repeats == 1 and points_of(spec) <= FEW_POINTS:
-        return worked_out(order)
+        return preview_of(order)
     try:
-        answer = found.motions.ask(order)
+        answer = services.motions.ask(order)
     except ExhaustedError as error:
         raise ProblemError(422, "beyond-limits", f"spec: {error}", "make it shorter") from error
     if answer.problem:
@@ -133,9 +145,9 @@ def _worked_out(found: Services, one: RobotServices, spec: ExperimentSpec, most_
     return MotionPreview.model_validate(answer.data)
 
 
-def require_possible(found: Services, one: RobotServices, spec: ExperimentSpec) -> None:
+def require_possible(services: Services, rig: RobotServices, spec: ExperimentSpec) -> None:
     """Raises SpecError, and a 422 for a motion beyond the limits."""
-    violations = _worked_out(found, one, spec, 1).violations
+    violations = _preview(services, rig, spec, 1).violations
     if violations:
         more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""
         line = f"spec.trajectory: {violations[0].message}{more}"

@@ -6,8 +6,8 @@ from fastapi import APIRouter, WebSocket
 
 from daq.contracts.service.live import LiveFrame, Ticket
 from server.access.caller import require_viewer
-from server.api.parts import RobotPart, ServicesPart, Viewer, services
-from server.live.stream import stream
+from server.api.dependencies import RobotDep, ServicesDep, Viewer, services_of
+from server.api.stream import stream
 from server.problems import PROBLEMS, ProblemError
 
 router = APIRouter(tags=["live"])
@@ -19,25 +19,25 @@ NOT_ALLOWED = 1008
 async def live(socket: WebSocket, robot: str) -> None:
     """Frames (`LiveFrame`) of what the client has subscribed to (`LiveRequest`)."""
     try:
-        who = require_viewer(socket)
-        one = services(socket).robot(robot)
+        caller = require_viewer(socket)
+        rig = services_of(socket).robot(robot)
     except ProblemError as error:
         await socket.close(NOT_ALLOWED, error.detail)
         return
-    await stream(socket, one, who)
+    await stream(socket, rig, caller)
 
 
 @router.get("/robots/{robot}/live/frame", responses=PROBLEMS)
-def get_live_frame(one: RobotPart, _: Viewer, history: float = 10.0) -> LiveFrame:
+def get_live_frame(rig: RobotDep, _: Viewer, history: float = 10.0) -> LiveFrame:
     """What the WebSocket would send a client that joins now: for a look without one."""
-    clock = one.robot.clock
+    clock = rig.robot.clock
     now = clock.monotonic()
     return LiveFrame(
-        now=now, utc=clock.utc().timestamp(), messages=(one.hub.history.since(now - min(history, 3600.0), 1000),)
+        now=now, utc=clock.utc().timestamp(), messages=(rig.hub.history.since(now - min(history, 3600.0), 1000),)
     )
 
 
 @router.post("/tickets", status_code=201, responses=PROBLEMS)
-def create_ticket(found: ServicesPart, who: Viewer) -> Ticket:
+def create_ticket(services: ServicesDep, caller: Viewer) -> Ticket:
     """A ticket for one WebSocket (`?ticket=…`): browsers cannot send a token with it."""
-    return found.tickets.give(who)
+    return services.tickets.give(caller)

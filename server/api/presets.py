@@ -9,16 +9,16 @@ from fastapi import APIRouter
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.experiments import ExperimentPreset
 from daq.trajectories.presets import PRESETS
-from server.api.parts import RobotPart, Viewer
+from server.api.dependencies import RobotDep, Viewer
 from server.problems import PROBLEMS
 
 router = APIRouter(prefix="/robots/{robot}", tags=["experiments"], responses=PROBLEMS)
 
 
 @router.get("/presets")
-def list_presets(one: RobotPart, _: Viewer) -> tuple[ExperimentPreset, ...]:
+def list_presets(rig: RobotDep, _: Viewer) -> tuple[ExperimentPreset, ...]:
     """Experiments that have a name, for the joints that this robot has: to be run as they are, or to begin from."""
-    count = len(one.robot.machine.joints)
+    count = len(rig.robot.machine.joints)
     return tuple(
         ExperimentPreset(name=name, description=preset.description, spec=preset.spec)
         for name, preset in PRESETS.items()
@@ -27,6 +27,6 @@ def list_presets(one: RobotPart, _: Viewer) -> tuple[ExperimentPreset, ...]:
 
 
 @router.get("/spec-schema")
-def get_spec_schema(_: RobotPart, __: Viewer) -> dict[str, Any]:
+def get_spec_schema(_: RobotDep, __: Viewer) -> dict[str, Any]:
     """JSON Schema of `ExperimentSpec`: fields, defaults and bounds, for forms and editors."""
     return ExperimentSpec.model_json_schema()

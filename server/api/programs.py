@@ -9,7 +9,7 @@ from fastapi import APIRouter, Path, Query, Response
 from daq.contracts.service.teaching import ProgramEntry, TeachingStatus
 from daq.teaching import Program
 from daq.teaching.program import NAME
-from server.api.parts import Arrived, LeaseHeader, Operator, RobotPart, ServicesPart, Viewer
+from server.api.dependencies import Arrived, LeaseHeader, Operator, RobotDep, ServicesDep, Viewer
 from server.problems import PROBLEMS
 from server.store.programs import StoredProgram
 
@@ -22,24 +22,24 @@ Revision = Annotated[
 
 
 @router.get("")
-def list_programs(one: RobotPart, found: ServicesPart, _: Viewer) -> tuple[ProgramEntry, ...]:
+def list_programs(rig: RobotDep, services: ServicesDep, _: Viewer) -> tuple[ProgramEntry, ...]:
     """Programs that are kept, the one changed last first."""
-    return found.programs.all(one.robot.name)
+    return services.programs.all(rig.robot.name)
 
 
 @router.get("/{program}")
-def get_program(program: ProgramName, one: RobotPart, found: ServicesPart, _: Viewer) -> StoredProgram:
+def get_program(program: ProgramName, rig: RobotDep, services: ServicesDep, _: Viewer) -> StoredProgram:
     """One program, with the revision that a change of it names."""
-    return found.programs.get(one.robot.name, program)
+    return services.programs.get(rig.robot.name, program)
 
 
 @router.put("/{program}")
 def put_program(
     program: ProgramName,
     request: Program,
-    one: RobotPart,
-    found: ServicesPart,
-    who: Operator,
+    rig: RobotDep,
+    services: ServicesDep,
+    caller: Operator,
     revision: Revision = None,
 ) -> ProgramEntry:
     """Keeps a program, or a change of it: `revision` is the one that was changed. Moves nothing, and needs no control.
@@ -47,27 +47,27 @@ def put_program(
     A body with another name than the address renames it. What somebody else has changed meanwhile is not overwritten:
     409.
     """
-    return found.programs.put(one.robot.name, program, request, revision, found.clock.utc(), who.name)
+    return services.programs.put(rig.robot.name, program, request, revision, services.clock.utc(), caller.name)
 
 
 @router.delete("/{program}", status_code=204)
-def delete_program(program: ProgramName, one: RobotPart, found: ServicesPart, who: Operator) -> Response:
+def delete_program(program: ProgramName, rig: RobotDep, services: ServicesDep, caller: Operator) -> Response:
     """Deletes a program for good."""
-    found.programs.remove(one.robot.name, program)
-    found.tell(one.robot.name, "teaching", f"program {program} was deleted", actor=who.name)
+    services.programs.remove(rig.robot.name, program)
+    services.record_event(rig.robot.name, "teaching", f"program {program} was deleted", actor=caller.name)
     return Response(status_code=204)
 
 
 @router.post("/{program}/run", status_code=202)
 def run_stored_program(
     program: ProgramName,
-    one: RobotPart,
-    found: ServicesPart,
+    rig: RobotDep,
+    services: ServicesDep,
     _: Operator,
     arrived: Arrived,
     lease: LeaseHeader = None,
 ) -> TeachingStatus:
     """Carries out a kept program, as POST …/teaching/program does with one that is sent."""
-    one.require_motion(lease)
-    one.teaching.perform(one.word(lease, arrived), found.programs.get(one.robot.name, program).program)
-    return one.teaching.status()
+    rig.require_motion(lease)
+    rig.teaching.perform(rig.word(lease, arrived), services.programs.get(rig.robot.name, program).program)
+    return rig.teaching.status()

@@ -16,10 +16,10 @@ from sqlalchemy.exc import SQLAlchemyError
 from daq.contracts.service.system import Health, Me, StorageStatus, SystemStatus
 from daq.traces.room import RESERVE
 from server.access.caller import caller_of
-from server.api.parts import ServicesPart, Viewer
+from server.api.dependencies import ServicesDep, Viewer
+from server.catalogue.room import free_room
 from server.jobs.lanes import SHORT_LANE_WORKERS
 from server.problems import PROBLEMS
-from server.queue.room import free_room
 from server.services import Services
 from server.store.tables import TraceRow
 
@@ -36,12 +36,12 @@ async def healthz() -> Health:
 
 
 @plain.get("/readyz", responses={503: {"model": Health}})
-async def readyz(request: Request, found: ServicesPart, response: Response) -> Health:
+async def readyz(request: Request, services: ServicesDep, response: Response) -> Health:
     """200 while experiments can be taken: database and traces' folder can be written. A robot need not be there.
 
     What is wrong is told to whoever may see the robot. The answer is up to a second old.
     """
-    problems = await found.readiness.told(lambda: _checks(found))
+    problems = await services.readiness.check(lambda: _checks(services))
     if caller_of(request) is None:
         problems = {name: problem and NOT_WELL for name, problem in problems.items()}
     if any(problems[name] for name in ("database", "traces")):
@@ -51,62 +51,62 @@ async def readyz(request: Request, found: ServicesPart, response: Response) -> H
 
 
 @plain.get("/metrics", response_class=Response, responses={200: {"content": {"text/plain": {}}}})
-def metrics(found: ServicesPart, _: Viewer) -> Response:
+def metrics(services: ServicesDep, _: Viewer) -> Response:
     """For Prometheus."""
-    return Response(generate_latest(found.metrics.registry), media_type=CONTENT_TYPE_LATEST)
+    return Response(generate_latest(services.metrics.registry), media_type=CONTENT_TYPE_LATEST)
 
 
 @router.get("/me")
-async def get_me(who: Viewer) -> Me:
+async def get_me(caller: Viewer) -> Me:
     """Who the service takes the caller for."""
-    return Me(name=who.name, role=who.role)
+    return Me(name=caller.name, role=caller.role)
 
 
 @router.get("/system")
-def get_system(found: ServicesPart, _: Viewer) -> SystemStatus:
+def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
     """The service: version, storage, watchers."""
-    folder = found.settings.traces.folder.absolute()
-    file = _database_file(found)
-    with found.store.reading() as session:
+    folder = services.settings.traces.folder.absolute()
+    file = _database_file(services)
+    with services.store.reading() as session:
         count = session.scalar(select(func.count()).select_from(TraceRow)) or 0
     return SystemStatus(
         version=VERSION,
-        uptime=found.clock.monotonic() - found.begun,
+        uptime=services.clock.monotonic() - services.begun,
         storage=StorageStatus(
             traces_folder=str(folder),
             traces_free=free_room(folder),
             traces_reserve=RESERVE,
             traces=count,
-            database=make_url(found.store.url).get_backend_name(),
+            database=make_url(services.store.url).get_backend_name(),
             database_size=file.stat().st_size if file is not None and file.is_file() else None,
         ),
-        live_clients=sum(one.hub.clients for one in found.robots()),
-        live_dropped=sum(one.hub.dropped for one in found.robots()),
-        jobs_at_once=found.settings.server.jobs_at_once,
+        live_clients=sum(rig.hub.clients for rig in services.robots()),
+        live_dropped=sum(rig.hub.dropped for rig in services.robots()),
+        jobs_at_once=services.settings.server.jobs_at_once,
         short_jobs_at_once=SHORT_LANE_WORKERS,
-        unattended=found.settings.server.unattended,
-        stop_port=found.stop_port,
+        unattended=services.settings.server.unattended,
+        stop_port=services.stop_port,
     )
 
 
-def _checks(found: Services) -> dict[str, str]:
+def _checks(services: Services) -> dict[str, str]:
     checks = {"database": "", "traces": ""}
-    file = _database_file(found)
+    file = _database_file(services)
     try:
         if file is not None:
             _require_writable(file.parent)
-        found.store.require_writable()
+        services.store.require_writable()
     except (SQLAlchemyError, OSError) as error:
         checks["database"] = " ".join(str(error).split())[:200]
     try:
-        _require_writable(found.settings.traces.folder)
-        free = shutil.disk_usage(found.settings.traces.folder).free
+        _require_writable(services.settings.traces.folder)
+        free = shutil.disk_usage(services.settings.traces.folder).free
         if free < RESERVE:
             checks["traces"] = f"{free / 1e6:.0f} MB are free, {RESERVE / 1e6:.0f} MB stay free"
     except OSError as error:
         checks["traces"] = str(error)
-    for one in found.robots():
-        checks[f"robot {one.robot.name}"] = one.robot.problem if one.robot.identity is None else ""
+    for rig in services.robots():
+        checks[f"robot {rig.robot.name}"] = rig.robot.problem if rig.robot.identity is None else ""
     return checks
 
 
@@ -116,6 +116,6 @@ def _require_writable(folder: Path) -> None:
         probe.write(b"written")
 
 
-def _database_file(found: Services) -> Path | None:
-    url = make_url(found.store.url)
+def _database_file(services: Services) -> Path | None:
+    url = make_url(services.store.url)
     return Path(url.database) if url.get_backend_name() == "sqlite" and url.database else None

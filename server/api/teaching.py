@@ -18,45 +18,45 @@ from daq.contracts.service.teaching import (
 from daq.teaching import Program
 from daq.teaching.program import Absolute, Instruction, Relative
 from daq.traces.reader import read_trace
-from server.api.experiments import submit_experiment
-from server.api.parts import (
+from server.api.dependencies import (
     Arrived,
     IdempotencyKey,
     Identity,
     LeaseHeader,
     Operator,
-    RobotPart,
-    ServicesPart,
+    RobotDep,
+    ServicesDep,
     Turn,
     Viewer,
 )
+from server.api.experiments import submit_experiment
 from server.problems import PROBLEMS
 
 router = APIRouter(prefix="/robots/{robot}", tags=["teaching"], responses=PROBLEMS)
 
 
 @router.get("/teaching")
-def get_teaching(one: RobotPart, _: Viewer) -> TeachingStatus:
+def get_teaching(rig: RobotDep, _: Viewer) -> TeachingStatus:
     """What is being taught now, and how the last one ended."""
-    return one.teaching.status()
+    return rig.teaching.status()
 
 
 @router.post("/teaching/jog")
 def jog_robot(
-    request: JogRequest, one: RobotPart, _: Operator, arrived: Arrived, lease: LeaseHeader = None
+    request: JogRequest, rig: RobotDep, _: Operator, arrived: Arrived, lease: LeaseHeader = None
 ) -> TeachingStatus:
     """Drives joints for 0.3 s at most: whoever holds the key repeats this, ten times a second or so."""
-    one.require_motion(lease)
-    one.teaching.jog(dict(request.velocities), arrived)
-    return one.teaching.status()
+    rig.require_motion(lease)
+    rig.teaching.jog(dict(request.velocities), arrived)
+    return rig.teaching.status()
 
 
 @router.post("/teaching/step", status_code=202)
 def step_robot(
-    request: StepRequest, one: RobotPart, _: Operator, arrived: Arrived, lease: LeaseHeader = None
+    request: StepRequest, rig: RobotDep, _: Operator, arrived: Arrived, lease: LeaseHeader = None
 ) -> TeachingStatus:
     """Begins one step, all joints arriving together. Checked before it moves; GET …/teaching tells its end."""
-    one.require_motion(lease)
+    rig.require_motion(lease)
     if (request.to is None) == (request.by is None):
         raise SpecError("step: give either `to` or `by`")
     kind: type[Absolute | Relative] = Relative if request.to is None else Absolute
@@ -64,48 +64,48 @@ def step_robot(
     if not angles:
         raise SpecError("step: names no joint")
     instruction: Instruction = kind(angles=angles, speed=request.speed)
-    one.teaching.perform(
-        one.word(lease, arrived),
-        Program(name="step", machine=one.robot.machine.name, instructions=(instruction,)),
+    rig.teaching.perform(
+        rig.word(lease, arrived),
+        Program(name="step", machine=rig.robot.machine.name, instructions=(instruction,)),
         "step",
     )
-    return one.teaching.status()
+    return rig.teaching.status()
 
 
 @router.post("/teaching/program", status_code=202)
 def run_program(
-    request: Program, one: RobotPart, _: Operator, arrived: Arrived, lease: LeaseHeader = None
+    request: Program, rig: RobotDep, _: Operator, arrived: Arrived, lease: LeaseHeader = None
 ) -> TeachingStatus:
     """Begins a taught program: steps, paths, waits, process signals. Checked from end to end before it moves."""
-    one.require_motion(lease)
-    one.teaching.perform(one.word(lease, arrived), request)
-    return one.teaching.status()
+    rig.require_motion(lease)
+    rig.teaching.perform(rig.word(lease, arrived), request)
+    return rig.teaching.status()
 
 
 @router.post("/teaching/lead", status_code=202)
 def lead_robot(
-    request: LeadRequest, one: RobotPart, _: Operator, arrived: Arrived, lease: LeaseHeader = None
+    request: LeadRequest, rig: RobotDep, _: Operator, arrived: Arrived, lease: LeaseHeader = None
 ) -> TeachingStatus:
     """Begins to record a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive and sink."""
-    one.require_motion(lease)
-    one.teaching.lead(one.word(lease, arrived), tuple(sorted(set(request.joints))))
-    return one.teaching.status()
+    rig.require_motion(lease)
+    rig.teaching.lead(rig.word(lease, arrived), tuple(sorted(set(request.joints))))
+    return rig.teaching.status()
 
 
 @router.post("/teaching/finish")
-def finish_teaching(one: RobotPart, _: Operator, lease: LeaseHeader = None) -> TeachingStatus:
+def finish_teaching(rig: RobotDep, _: Operator, lease: LeaseHeader = None) -> TeachingStatus:
     """Ends jogging, or leading: its path is in the answer."""
-    one.control.require(lease)
-    one.teaching.finish()
-    return one.teaching.status()
+    rig.control.require(lease)
+    rig.teaching.finish()
+    return rig.teaching.status()
 
 
 @router.post("/calibrations/gain", status_code=201, response_model=Experiment, responses={200: {"model": Experiment}})
 def calibrate_gain(
     request: CalibrationRequest,
-    one: RobotPart,
-    found: ServicesPart,
-    who: Operator,
+    rig: RobotDep,
+    services: ServicesDep,
+    caller: Operator,
     response: Response,
     _turn: Turn,
     idempotency_key: IdempotencyKey = None,
@@ -115,15 +115,15 @@ def calibrate_gain(
     It is checked as any other, and the same Idempotency-Key gives the same experiment (200).
     """
     spec = gain_experiment(tuple(sorted(set(request.joints))))
-    return submit_experiment(ExperimentRequest(spec=spec), one, found, who, response, None, idempotency_key)
+    return submit_experiment(ExperimentRequest(spec=spec), rig, services, caller, response, None, idempotency_key)
 
 
 @router.get("/traces/{trace}/gain")
-def get_measured_gain(trace: Identity, one: RobotPart, _: Viewer, _turn: Turn) -> tuple[MeasuredGain, ...]:
+def get_measured_gain(trace: Identity, rig: RobotDep, _: Viewer, _turn: Turn) -> tuple[MeasuredGain, ...]:
     """The actual proportional gains that a trace shows."""
-    read = read_trace(one.catalogue.path_of(trace), one.catalogue.limits)
+    read = read_trace(rig.catalogue.path_of(trace), rig.catalogue.limits)
     fields = MeasuredGain.model_fields
     return tuple(
-        MeasuredGain.model_validate({name: value for name, value in found.as_data().items() if name in fields})
-        for found in gains_from_trace(read, one.robot.machine)
+        MeasuredGain.model_validate({name: value for name, value in gain.as_data().items() if name in fields})
+        for gain in gains_from_trace(read, rig.robot.machine)
     )

@@ -22,9 +22,19 @@ from daq.contracts.trace import Outcome
 from daq.traces.csv_table import export_csv
 from daq.traces.reader import read_trace
 from daq.traces.summary import joint_figures
-from server.api.parts import CursorOf, Identity, Limit, Operator, RobotPart, ServicesPart, Turn, Viewer, let_others_ask
+from server.api.dependencies import (
+    CursorOf,
+    Identity,
+    Limit,
+    Operator,
+    RobotDep,
+    ServicesDep,
+    Turn,
+    Viewer,
+    let_others_ask,
+)
+from server.api.upload import store_upload
 from server.catalogue.thinning import thinned
-from server.catalogue.upload import store_upload
 from server.problems import PROBLEMS, TITLES
 from server.store.traces import TraceSearch
 
@@ -43,9 +53,9 @@ _BINARY = {"schema": {"type": "string", "format": "binary"}}
 @router.get("")
 async def list_traces(
     connection: Request,
-    one: RobotPart,
-    found: ServicesPart,
-    who: Viewer,
+    rig: RobotDep,
+    services: ServicesDep,
+    caller: Viewer,
     q: Text = None,
     tag: Annotated[str | None, Query(max_length=40)] = None,
     source: Source | None = None,
@@ -59,10 +69,10 @@ async def list_traces(
     """Traces, the newest first."""
     search = TraceSearch(q, tag, source, outcome, kind, since, until)
     if q is None:
-        return await found.traces.page.told(one.robot.name, search, cursor, limit)
+        return await services.traces.page.fetch(rig.robot.name, search, cursor, limit)
     let_others_ask(connection)
-    async with found.lanes.turn(who.name):
-        return await found.traces.page.told(one.robot.name, search, cursor, limit)
+    async with services.lanes.turn(caller.name):
+        return await services.traces.page.fetch(rig.robot.name, search, cursor, limit)
 
 
 @router.post(
@@ -71,16 +81,16 @@ async def list_traces(
     responses={415: PROBLEMS[422] | {"description": TITLES[415]}},
     openapi_extra={"requestBody": {"required": True, "content": {MCAP: _BINARY, CSV: _BINARY}}},
 )
-async def upload_trace(request: Request, one: RobotPart, found: ServicesPart, who: Operator) -> CatalogueEntry:
+async def upload_trace(request: Request, rig: RobotDep, services: ServicesDep, caller: Operator) -> CatalogueEntry:
     """Takes in a trace from elsewhere: MCAP of this project (application/octet-stream) or plain CSV (text/csv)."""
-    return await store_upload(request, one, found, who)
+    return await store_upload(request, rig, services, caller)
 
 
 @router.get("/{trace}")
-def get_trace(trace: Identity, one: RobotPart, found: ServicesPart, _: Viewer, _turn: Turn) -> TraceDetails:
+def get_trace(trace: Identity, rig: RobotDep, services: ServicesDep, _: Viewer, _turn: Turn) -> TraceDetails:
     """What one trace says about itself, its figures and events."""
-    entry = found.traces.get(one.robot.name, trace)
-    read = read_trace(one.catalogue.path_of(trace), one.catalogue.limits)
+    entry = services.traces.get(rig.robot.name, trace)
+    read = read_trace(rig.catalogue.path_of(trace), rig.catalogue.limits)
     return TraceDetails(
         entry=entry,
         record=read.record,
@@ -92,40 +102,40 @@ def get_trace(trace: Identity, one: RobotPart, found: ServicesPart, _: Viewer, _
 
 @router.patch("/{trace}")
 def change_trace(
-    trace: Identity, change: TraceChange, one: RobotPart, found: ServicesPart, _: Operator
+    trace: Identity, change: TraceChange, rig: RobotDep, services: ServicesDep, _: Operator
 ) -> CatalogueEntry:
     """New tags or notes. They are the catalogue's: the file stays as it was recorded."""
-    return found.traces.change(one.robot.name, trace, change)
+    return services.traces.change(rig.robot.name, trace, change)
 
 
 @router.delete("/{trace}", status_code=204)
-def delete_trace(trace: Identity, one: RobotPart, found: ServicesPart, who: Operator) -> Response:
+def delete_trace(trace: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Response:
     """Deletes a trace for good. Refused while a model or a job refers to it."""
-    path = one.catalogue.remove(trace)
-    found.tell(one.robot.name, "trace", f"trace {trace} ({path.name}) was deleted", actor=who.name)
+    path = rig.catalogue.remove(trace)
+    services.record_event(rig.robot.name, "trace", f"trace {trace} ({path.name}) was deleted", actor=caller.name)
     return Response(status_code=204)
 
 
 @router.get("/{trace}/data.mcap", response_class=FileResponse, responses={200: {"content": {MCAP: _BINARY}}})
-def download_trace(trace: Identity, one: RobotPart, _: Viewer) -> FileResponse:
+def download_trace(trace: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
     """The file as it was recorded; opens in Foxglove."""
-    path = one.catalogue.path_of(trace)
+    path = rig.catalogue.path_of(trace)
     return FileResponse(path, media_type=MCAP, filename=path.name)
 
 
 @router.get("/{trace}/data.csv", response_class=FileResponse, responses={200: {"content": {CSV: _BINARY}}})
-def download_trace_as_csv(trace: Identity, one: RobotPart, _: Viewer, _turn: Turn) -> FileResponse:
+def download_trace_as_csv(trace: Identity, rig: RobotDep, _: Viewer, _turn: Turn) -> FileResponse:
     """Time and signals as plain CSV, in s, rad and V."""
-    path = one.catalogue.path_of(trace)
+    path = rig.catalogue.path_of(trace)
     folder = tempfile.TemporaryDirectory(prefix="daq-csv-")
-    made = export_csv(read_trace(path, one.catalogue.limits), Path(folder.name) / f"{path.stem}.csv")
+    made = export_csv(read_trace(path, rig.catalogue.limits), Path(folder.name) / f"{path.stem}.csv")
     return FileResponse(made, media_type=CSV, filename=made.name, background=BackgroundTask(folder.cleanup))
 
 
 @router.get("/{trace}/data.json")
 def get_trace_signals(
     trace: Identity,
-    one: RobotPart,
+    rig: RobotDep,
     _: Viewer,
     _turn: Turn,
     points: Points = 2000,
@@ -133,7 +143,7 @@ def get_trace_signals(
     end: Seconds = None,
 ) -> TraceSignals:
     """Signals for a plot, thinned to about `points` between `start` and `end`; no peak is lost."""
-    read = read_trace(one.catalogue.path_of(trace), one.catalogue.limits)
+    read = read_trace(rig.catalogue.path_of(trace), rig.catalogue.limits)
     few = thinned(read, points, start, end)
     columns = {name: None if s is None else tuple(map(tuple, s.T.tolist())) for name, s in few.signals.items()}
     return TraceSignals(

@@ -10,7 +10,7 @@ from daq.trajectories import plan, start_angles
 from server.bounded.messages import WorkOutMotion
 
 
-def worked_out(order: WorkOutMotion) -> MotionPreview:
+def preview_of(order: WorkOutMotion) -> MotionPreview:
     """Of a longer motion than is shown every second, third, … set point. Raises SpecError."""
     machine = order.machine
     motion = plan(order.spec, machine, start_angles(order.spec, machine))
@@ -21,14 +21,14 @@ def worked_out(order: WorkOutMotion) -> MotionPreview:
         set_points=tuple(map(tuple, motion.angles[::every].tolist())),
         moving=motion.moving,
         duration=motion.duration,
-        violations=tuple(_told(violation) for violation in violations),
+        violations=tuple(_as_json(violation) for violation in violations),
         marks=tuple(
             MotionMark(time=mark.index * motion.period, kind=mark.kind, message=mark.message) for mark in motion.marks
         ),
     )
 
 
-def _told(violation: Violation) -> MotionViolation:
+def _as_json(violation: Violation) -> MotionViolation:
     """JSON knows no infinity."""
     value, limit = (number if math.isfinite(number) else None for number in (violation.value, violation.limit))
     return MotionViolation(

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from daq.contracts.errors import DaqError
 from server.bounded.messages import ORDER, Answer, Limits, ReadUpload
-from server.bounded.motion import worked_out
+from server.bounded.motion import preview_of
 from server.bounded.upload import read_upload
 from server.problems import NO_ROOM
 
@@ -37,18 +37,18 @@ def main() -> int:
     while True:
         line = orders.get()
         _limit_time(limits.seconds)
-        answer = answered(line, limits)
+        answer = answer_order(line, limits)
         sys.stdout.write(answer.model_dump_json() + "\n")
         sys.stdout.flush()
         if answer.spent:
             return 0
 
 
-def answered(line: str, limits: Limits) -> Answer:
+def answer_order(line: str, limits: Limits) -> Answer:
     """One order carried out. Whatever is wrong with what was sent is a line."""
     try:
         order = ORDER.validate_json(line)
-        done = read_upload(order) if isinstance(order, ReadUpload) else worked_out(order)
+        done = read_upload(order) if isinstance(order, ReadUpload) else preview_of(order)
         return Answer(data=done.model_dump(mode="json"), spent=_has_grown())
     except DaqError as error:
         return Answer(problem=_short(str(error)), no_room=_is_of_the_disk(error), spent=_has_grown())

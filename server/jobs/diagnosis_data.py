@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.comparison.difference import differences
-from model.discrepancy.localisation.disagreement import located
+from model.discrepancy.explanation.renderer import where_with_summary
+from model.discrepancy.localisation.disagreement import locate
+from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.statistics import chance_significance
 from model.fitting.records import noise_floor, records_of
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from server.jobs.overlays import overlays
 from server.jobs.results import DiagnosisData, DiagnosisStep, GivenWhere
 
@@ -49,7 +52,8 @@ def where_given(model: Model, traces: Sequence[Trace]) -> GivenWhere | None:
     if not all(np.isfinite(one).all() for one in left):
         return None
     driven = traces if all(trace.drive is not None for trace in traces) else ()
-    where = located(model, records, left, noise_floor(records, model.machine, "position"), traces=driven)
+    floor = noise_floor(records, model.machine, "position")
+    where = where_with_summary(locate(Residuals(model, records, left, floor), driven))
     return GivenWhere(where=where, chance=chance_significance(len(where.cells)))
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from model.effects.names import placed
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -23,8 +25,8 @@ def of_fit(found: FitResult, comparison: Comparison) -> str:
     before, after = comparison.models
     held = before.held_out is not None and after.held_out is not None
     errors = (before.held_out, after.held_out) if held else (before.in_sample, after.in_sample)
-    told = " → ".join("?" if joints is None else _error(joints) for joints in errors)
-    return f"{known} of {len(found.parameters)} parameters known; error {told}{', held out' if held else ''}"
+    change = " → ".join("?" if joints is None else _error(joints) for joints in errors)
+    return f"{known} of {len(found.parameters)} parameters known; error {change}{', held out' if held else ''}"
 
 
 def of_validation(found: Fidelity) -> str:
@@ -35,8 +37,8 @@ def of_validation(found: Fidelity) -> str:
 
 def of_comparison(found: Comparison) -> str:
     """The error of each model over all traces."""
-    told = [f"{m.label.partition(' (')[0]} {_error(m.held_out or m.in_sample or ())}" for m in found.models]
-    return f"error {'; '.join(told)}"
+    errors = [f"{m.label.partition(' (')[0]} {_error(m.held_out or m.in_sample or ())}" for m in found.models]
+    return f"error {'; '.join(errors)}"
 
 
 def of_diagnosis(found: Diagnosis) -> str:
@@ -47,12 +49,11 @@ def of_diagnosis(found: Diagnosis) -> str:
         group = [_named(one) for one in found.steps[-1].group]
         more = "" if len(group) <= UNDECIDED_SHOWN else f" or {len(group) - UNDECIDED_SHOWN} more"
         return f"one of: {' or '.join(group[:UNDECIDED_SHOWN])}{more}"
-    return "nothing significant" if found.verdict == "nothing-significant" else "an effect that is not known"
+    return "nothing significant" if found.verdict == "nothing-significant" else "an unknown effect"
 
 
 def _named(one: Step | Candidate) -> str:
-    joints = f", joint {'+'.join(map(str, one.joints))}" if one.joints else ""
-    return f"{(one.effect or '').replace('_', ' ')}{joints}"
+    return placed(one.effect or "", one.joints)
 
 
 def _error(joints: Sequence[JointAgreement]) -> str:

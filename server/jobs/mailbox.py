@@ -13,8 +13,13 @@ from typing import Any
 TELL_EVERY = 0.2
 """s between two reports of progress, and between two looks at whether the job is to end."""
 REQUEST, PROGRESS, CANCEL, RESULT, REPORT, MODEL = (
-    "request.json", "progress.json", "cancel", "result.json", "report.html", "model.json",
-)  # fmt: skip
+    "request.json",
+    "progress.json",
+    "cancel",
+    "result.json",
+    "report.html",
+    "model.json",
+)
 
 
 @dataclass(frozen=True)

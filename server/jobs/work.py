@@ -109,9 +109,15 @@ class _Worker:
         traces, held = self._traces(request.traces), self._traces(request.held_out)
         begin = _with_effects(self._model(request.model), request.effects)
         options = FitOptions(
-            parameters=request.parameters, held=request.held, bounds=request.bounds, use_priors=request.use_priors,
-            method=request.method, starts=request.starts, seed=request.seed, loop=request.loop,
-        )  # fmt: skip
+            parameters=request.parameters,
+            held=request.held,
+            bounds=request.bounds,
+            use_priors=request.use_priors,
+            method=request.method,
+            starts=request.starts,
+            seed=request.seed,
+            loop=request.loop,
+        )
         found = fit(begin, traces, options, lambda f, text: self._tell(0, FIT_SHARE, f, text), self.mailbox)
         comparison = self._compared(
             [("before", begin), ("fitted", found.model)], [*traces, *held], request.held_out, FIT_SHARE
@@ -124,7 +130,7 @@ class _Worker:
     def validate(self, request: ValidateRequest) -> Ended:
         """As `daq validate`."""
         from model.reports.validation_report import validation_report
-        from model.simulation.simulate import Options
+        from model.simulation.prepared import Options
         from model.validation.conventions import in_convention
         from model.validation.fidelity import validate_by_distortion
         from model.validation.names import names_to_validate
@@ -135,10 +141,16 @@ class _Worker:
         traces, model = self._traces(request.traces), self._model(request.model)
         names = names_to_validate(model, request.parameters)
         fidelity = validate_by_distortion(
-            model, traces, names, outputs=request.joints, damping_ratio=request.damping_ratio,
-            curve_points=CURVE_POINTS, options=Options(quantise=False),
-            progress=lambda f, text: self._tell(0, VALIDATION_SHARE, f, text), cancel=self.mailbox,
-        )  # fmt: skip
+            model,
+            traces,
+            names,
+            outputs=request.joints,
+            damping_ratio=request.damping_ratio,
+            curve_points=CURVE_POINTS,
+            options=Options(quantise=False),
+            progress=lambda f, text: self._tell(0, VALIDATION_SHARE, f, text),
+            cancel=self.mailbox,
+        )
         in_time = []
         for number, trace in enumerate(traces):
             text = f"variation with time, trace {number + 1} of {len(traces)}"
@@ -185,9 +197,14 @@ class _Worker:
         begin = self._model(request.model)
         options = DiagnosisOptions(effects=request.effects, joints=request.joints, most_steps=request.most_steps)
         found = diagnose(
-            begin, traces, held, options, lambda f, text: self._tell(0, DIAGNOSIS_SHARE, f, text), self.mailbox,
+            begin,
+            traces,
+            held,
+            options,
+            lambda f, text: self._tell(0, DIAGNOSIS_SHARE, f, text),
+            self.mailbox,
             ask=asker(begin.machine),
-        )  # fmt: skip
+        )
         comparison, given = None, None
         controlled = not isinstance(begin.machine.controller, NoController)
         if controlled and all(trace.set_point is not None for trace in (*traces, *held)):

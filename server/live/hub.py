@@ -26,7 +26,7 @@ from firmware_protocol.commands import StatusFlag
 from server.clock import Clock
 from server.live.history import DIGITS, History
 from server.live.outbox import Outbox
-from server.owner.messages import ArmReport, LiveSample, Opened, Report, Told
+from server.owner.messages import ArmReport, LiveSample, Opened, Report, TeachingText
 
 LOOK_EVERY = 1.0
 """s between two looks at the status when nothing says that it has changed."""
@@ -120,7 +120,7 @@ class Hub:
         """What clients of these topics see now, encoded."""
         return [message for topic, message in self._shown.items() if topic in topics]
 
-    def hear(self, report: Report) -> None:
+    def on_report(self, report: Report) -> None:
         """A report of the robot's owner. Must not wait."""
         now = self._clock.monotonic()
         match report:
@@ -142,7 +142,7 @@ class Hub:
                 self.publish("events", message)
             case Progress():
                 self._progress(report, now)
-            case Told():
+            case TeachingText():
                 self.publish("teaching", TeachingMessage(text=report.text))
             case ArmReport() | Opened() | _:
                 self.look()

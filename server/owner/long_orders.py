@@ -6,15 +6,15 @@ import time
 
 from daq.acquisition.guardian import EndCause
 from daq.acquisition.messages import Finished
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, ReachError, SafetyError
 from daq.contracts.limp import limp_line
 from daq.contracts.sample import SampleRow
-from daq.runner import Arrangement, Consent, Outside, StoppedError, run_experiment
+from daq.runner import Consent, RunSetup, StoppedError, StopRequests, run_experiment
 from daq.teaching import JogCommand, RecordedPath, check_program, jog, lead_by_nose, plan_program, run_program
 from daq.teaching.jog import top_speed
 from daq.teaching.performer import FollowingPerformer
 from firmware_protocol.errors import ProtocolError
-from server.owner.desk import Desk
 from server.owner.messages import (
     BEGINS_WITHIN,
     Answer,
@@ -26,10 +26,8 @@ from server.owner.messages import (
     RunExperiment,
     RunProgram,
 )
+from server.owner.owned_robot import OwnedRobot
 from server.owner.quick_orders import carry_out
-
-EXIT_WRONG_INPUT = 2
-EXIT_CODES = {"complete": 0, "fault": 5, "interrupted": 5, "stopped": 6}
 
 
 def require_in_time(order: Long) -> None:
@@ -40,19 +38,19 @@ def require_in_time(order: Long) -> None:
         raise ReachError(f"{order.activity}: {line}; nothing moved")
 
 
-def run(desk: Desk, order: RunExperiment) -> Answer:
+def run(robot: OwnedRobot, order: RunExperiment) -> Answer:
     """An experiment, as `daq run` does it."""
     result = run_experiment(
-        Arrangement(
-            desk.controller,
-            desk.control,
+        RunSetup(
+            robot.controller,
+            robot.control,
             order.spec,
-            desk.machine,
-            desk.limits,
-            desk.folder,
-            desk.speaker,
-            Outside(desk.ended, lambda: desk.guardian.cause is EndCause.ORPHANED),
-            desk.robot,
+            robot.machine,
+            robot.limits,
+            robot.folder,
+            robot.speaker,
+            StopRequests(robot.ended, lambda: robot.guardian.cause is EndCause.ORPHANED),
+            robot.name,
             order.trace_id,
         ),
         Consent(order.moves_real_arm),
@@ -65,45 +63,47 @@ def run(desk: Desk, order: RunExperiment) -> Answer:
         counters=result.counters,
         reason=result.reason,
     )
-    return Answer(number=order.number, finished=finished, exit_code=EXIT_CODES[result.outcome])
+    return Answer(number=order.number, finished=finished, exit_code=exit_codes.OF_OUTCOME[result.outcome])
 
 
-def jog_until_finished(desk: Desk, order: JogBegin) -> Answer:
+def jog_until_finished(robot: OwnedRobot, order: JogBegin) -> Answer:
     """Jogging: the newest command drives the arm, for 0.3 s at most."""
-    _require_ready(desk)
+    _require_ready(robot)
     newest: JogCommand | None = None
 
     def commands(_row: SampleRow) -> JogCommand | None:
         nonlocal newest
-        _between_samples(desk)
-        said = desk.inbox.drive()
-        if said is not None and _allowed(desk, said):
+        _between_samples(robot)
+        said = robot.inbox.drive()
+        if said is not None and _allowed(robot, said):
             on_its_way = time.monotonic() - said.said
-            newest = JogCommand(said.velocities, desk.controller.clock.now() - on_its_way)
+            newest = JogCommand(said.velocities, robot.controller.clock.now() - on_its_way)
         return newest
 
-    jog(desk.arm(), desk.machine, desk.limits, commands, desk.inbox.finish.is_set, desk.say)
+    jog(robot.arm(), robot.machine, robot.limits, commands, robot.inbox.finish.is_set, robot.say)
     return Answer(number=order.number)
 
 
-def perform(desk: Desk, order: RunProgram) -> Answer:
+def perform(robot: OwnedRobot, order: RunProgram) -> Answer:
     """A taught program, checked from end to end before its first motion."""
-    _require_ready(desk)
-    here = desk.arm().next_sample()
-    planned = plan_program(order.program, desk.machine, here.set_point)
-    against = check_program(planned, desk.machine, desk.limits)
+    _require_ready(robot)
+    here = robot.arm().next_sample()
+    planned = plan_program(order.program, robot.machine, here.set_point)
+    against = check_program(planned, robot.machine, robot.limits)
     if against:
         raise SafetyError(f"program refused: {against[0]}; nothing moved")
-    with desk.control.frozen_on_error():
-        performer = FollowingPerformer(desk.controller, desk.control, desk.machine, desk.limits, desk.ended, desk.say)
-        run_program(planned, desk.machine, performer, desk.say)
+    with robot.control.frozen_on_error():
+        performer = FollowingPerformer(
+            robot.controller, robot.control, robot.machine, robot.limits, robot.ended, robot.say
+        )
+        run_program(planned, robot.machine, performer, robot.say)
         performer.finish()
     return Answer(number=order.number, data={"text": f"done: {len(planned)} instructions"})
 
 
-def lead(desk: Desk, order: LeadBegin) -> Answer:
+def lead(robot: OwnedRobot, order: LeadBegin) -> Answer:
     """Joints led by hand until finished; the recorded path comes back, also of one that was stopped."""
-    _require_ready(desk)
+    _require_ready(robot)
     kept: dict[str, object] = {}
 
     def keep(path: RecordedPath) -> None:
@@ -111,47 +111,47 @@ def lead(desk: Desk, order: LeadBegin) -> Answer:
 
     problem, exit_code = "", 0
     try:
-        lead_by_nose(desk.arm(), desk.machine, desk.limits, order.joints, desk.inbox.finish.is_set, keep)
+        lead_by_nose(robot.arm(), robot.machine, robot.limits, order.joints, robot.inbox.finish.is_set, keep)
     except DaqError as error:
         problem, exit_code = str(error), error.exit_code
     return Answer(number=order.number, data=kept, problem=problem, exit_code=exit_code)
 
 
-def answered_quickly(desk: Desk, order: Quick) -> Answer:
+def answered_quickly(robot: OwnedRobot, order: Quick) -> Answer:
     """A quick order's answer; its refusal is an answer too."""
     try:
-        return Answer(number=order.number, data=carry_out(desk, order))
+        return Answer(number=order.number, data=carry_out(robot, order))
     except DaqError as error:
         return Answer(number=order.number, problem=str(error), exit_code=error.exit_code)
     except ProtocolError as error:
-        return Answer(number=order.number, problem=str(error), exit_code=EXIT_WRONG_INPUT)
+        return Answer(number=order.number, problem=str(error), exit_code=exit_codes.WRONG_INPUT)
 
 
-def _require_ready(desk: Desk) -> None:
+def _require_ready(robot: OwnedRobot) -> None:
     """Raises SafetyError or StoppedError when neither keys nor programs may move the arm."""
-    if (cause := desk.ended() or desk.control.halted) is not None:
+    if (cause := robot.ended() or robot.control.halted) is not None:
         raise StoppedError(f"the arm has been stopped: {cause}")
-    line = limp_line(desk.read_gains())
+    line = limp_line(robot.read_gains())
     if line:
         raise SafetyError(f"{line}; hold the arm, reset it here, then set their gains; nothing moved")
 
 
-def _between_samples(desk: Desk) -> None:
-    order = desk.inbox.take()
+def _between_samples(robot: OwnedRobot) -> None:
+    order = robot.inbox.take()
     if order is None:
         return
     if isinstance(order, Quick):
-        desk.speaker.ended(answered_quickly(desk, order))
+        robot.speaker.ended(answered_quickly(robot, order))
     else:
-        desk.inbox.done()
-        line = f"the arm is busy ({desk.activity}): end that first"
-        desk.speaker.ended(Answer(number=order.number, problem=line, exit_code=SafetyError.exit_code))
+        robot.inbox.done()
+        line = f"the arm is busy ({robot.activity}): end that first"
+        robot.speaker.ended(Answer(number=order.number, problem=line, exit_code=SafetyError.exit_code))
 
 
-def _allowed(desk: Desk, said: JogDrive) -> bool:
+def _allowed(robot: OwnedRobot, said: JogDrive) -> bool:
     """One that drives a joint that is not there, or too fast, is refused; the arm holds."""
     for joint, velocity in said.velocities.items():
-        if not 1 <= joint <= len(desk.machine.joints) or not abs(velocity) <= top_speed(desk.limits, joint):
-            desk.say(f"jog refused: joint {joint} at {velocity:g} rad/s")
+        if not 1 <= joint <= len(robot.machine.joints) or not abs(velocity) <= top_speed(robot.limits, joint):
+            robot.say(f"jog refused: joint {joint} at {velocity:g} rad/s")
             return False
     return True

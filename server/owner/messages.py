@@ -165,10 +165,23 @@ class Close(_Message):
 
 
 Order = Annotated[
-    Open | RunExperiment | JogBegin | JogDrive | RunProgram | LeadBegin | Finish | HaltRun | ReadGains | WriteGains
-    | ReadProcess | WriteOutput | MoveGripper | Reset | Close,
+    Open
+    | RunExperiment
+    | JogBegin
+    | JogDrive
+    | RunProgram
+    | LeadBegin
+    | Finish
+    | HaltRun
+    | ReadGains
+    | WriteGains
+    | ReadProcess
+    | WriteOutput
+    | MoveGripper
+    | Reset
+    | Close,
     Field(discriminator="kind"),
-]  # fmt: skip
+]
 ORDER: TypeAdapter[Order] = TypeAdapter(Order)
 
 Long = RunExperiment | JogBegin | RunProgram | LeadBegin
@@ -209,7 +222,7 @@ class ArmReport(_Message):
     counters: dict[str, float]
 
 
-class Told(_Message):
+class TeachingText(_Message):
     """A line for whoever is teaching."""
 
     kind: Literal["told"] = "told"
@@ -239,7 +252,7 @@ class CannotOpen(_Message):
 
 
 Report = Annotated[
-    Opened | LiveSample | ArmReport | Told | Answer | CannotOpen | Progress | EventHappened,
+    Opened | LiveSample | ArmReport | TeachingText | Answer | CannotOpen | Progress | EventHappened,
     Field(discriminator="kind"),
 ]
 REPORT: TypeAdapter[Report] = TypeAdapter(Report)

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import sys
-from contextlib import ExitStack
 
-from daq.acquisition.freezer import Freezer
-from daq.acquisition.guardian import Guardian
+from daq.acquisition.session import port_session
 from daq.acquisition.speaker import Speaker
-from daq.acquisition.stop_socket import stop_listener
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
-from daq.runner import ArmControl
 from daq.transport import PortBusyError
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.memory_map import default_memory_map, parse_memory_map
 from server import logs
-from server.owner.desk import Desk
 from server.owner.inbox import Inbox
 from server.owner.messages import CannotOpen, Open, Opened
+from server.owner.owned_robot import OwnedRobot
 from server.owner.owner import serve
 from server.owner.watched_controller import WatchedController
 from server.steady import keep_steady
-
-EXIT_WRONG_INPUT = 2
-EXIT_INTERRUPTED = 130
 
 
 def main() -> int:
@@ -38,38 +32,34 @@ def main() -> int:
             speaker.ended(CannotOpen(problem=str(error), exit_code=error.exit_code, busy=busy))
             return error.exit_code
         except ProtocolError as error:
-            speaker.ended(CannotOpen(problem=str(error), exit_code=EXIT_WRONG_INPUT))
-            return EXIT_WRONG_INPUT
+            speaker.ended(CannotOpen(problem=str(error), exit_code=exit_codes.WRONG_INPUT))
+            return exit_codes.WRONG_INPUT
         except KeyboardInterrupt:
-            return EXIT_INTERRUPTED
+            return exit_codes.INTERRUPTED
     return 0
 
 
 def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
     """Holds the port until the service wants it back. Raises DaqError, ProtocolError when it cannot be had."""
     memory_map = default_memory_map() if opening.memory_map is None else parse_memory_map(opening.memory_map)
-    with (
-        ExitStack() as closed_last,
-        Freezer(opening.robot, opening.url) as freezer,
-        stop_listener(opening.robot) as listener,
-        Guardian(listener, inbox.guardian_end, freezer.freeze) as guardian,
-    ):
-        controller = closed_last.enter_context(WatchedController.connect(opening.url, memory_map))
-        control = freezer.control = ArmControl(controller)
-        desk = Desk(
+    with port_session(
+        WatchedController.connect, opening.robot, opening.url, memory_map, parent=inbox.guardian_end
+    ) as session:
+        controller, control = session.controller, session.take_control()
+        robot = OwnedRobot(
             opening.robot,
             opening.machine,
             opening.limits,
             opening.folder,
             controller,
             control,
-            guardian,
+            session.guardian,
             inbox,
             speaker,
         )
-        if (cause := desk.ended()) is not None:
+        if (cause := robot.ended()) is not None:
             control.stop(cause)
-        desk.read_gains()
+        robot.read_gains()
         identity = controller.identity
         keep_steady()
         speaker.ended(
@@ -81,4 +71,4 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker) -> None:
             )
         )
         with inbox.reading():
-            serve(desk)
+            serve(robot)

@@ -10,7 +10,6 @@ from daq.link import RequestRefusedError
 from daq.runner import StoppedError
 from daq.safety import Event, State
 from firmware_protocol.commands import Refusal
-from server.owner.desk import Desk
 from server.owner.messages import (
     WAITS_AT_MOST,
     MoveGripper,
@@ -21,6 +20,7 @@ from server.owner.messages import (
     WriteGains,
     WriteOutput,
 )
+from server.owner.owned_robot import OwnedRobot
 
 BITS = 8
 _WHILE_TEACHING = (ReadProcess, WriteOutput, MoveGripper, ReadGains)
@@ -32,51 +32,51 @@ class NotFrozenError(DaqError):
     exit_code = 3
 
 
-def carry_out(desk: Desk, order: Quick) -> dict[str, object]:
+def carry_out(robot: OwnedRobot, order: Quick) -> dict[str, object]:
     """The answer's data. Raises DaqError; nothing has changed then, except where its line says so."""
     waited = time.monotonic() - order.asked
     if waited > WAITS_AT_MOST:
         line = f"{order.kind}: the robot's process came to it after {waited:.1f} s, {WAITS_AT_MOST:g} s are allowed"
         raise ReachError(f"{line}; nothing was done")
-    if desk.activity != "none" and not isinstance(order, _WHILE_TEACHING):
-        raise SafetyError(f"not while the arm is busy ({desk.activity}): wait for its end, or stop it")
+    if robot.activity != "none" and not isinstance(order, _WHILE_TEACHING):
+        raise SafetyError(f"not while the arm is busy ({robot.activity}): wait for its end, or stop it")
     match order:
         case ReadGains():
-            return {"gains": desk.read_gains()}
+            return {"gains": robot.read_gains()}
         case WriteGains():
-            return _write_gains(desk, order)
+            return _write_gains(robot, order)
         case ReadProcess():
-            return _process(desk)
+            return _process(robot)
         case WriteOutput():
-            _require_not_stopped(desk, order)
-            desk.controller.write_outputs(1 << order.output, order.on << order.output)
-            return _process(desk)
+            _require_not_stopped(robot, order)
+            robot.controller.write_outputs(1 << order.output, order.on << order.output)
+            return _process(robot)
         case MoveGripper():
-            _require_not_stopped(desk, order)
-            desk.controller.set_gripper(closed=order.closed)
-            return _process(desk)
+            _require_not_stopped(robot, order)
+            robot.controller.set_gripper(closed=order.closed)
+            return _process(robot)
         case Reset():
-            return {"text": _reset(desk, order)}
+            return {"text": _reset(robot, order)}
 
 
-def _write_gains(desk: Desk, order: WriteGains) -> dict[str, object]:
-    readings = desk.controller.next_snapshot().joints
+def _write_gains(robot: OwnedRobot, order: WriteGains) -> dict[str, object]:
+    readings = robot.controller.next_snapshot().joints
     require_no_jump({joint: reading.error for joint, reading in readings}, order.gains)
     for joint, gain in sorted(order.gains.items()):
-        desk.machine.joint(joint)
-        desk.controller.set_gains(joint, *gain)
-    return {"gains": desk.read_gains()}
+        robot.machine.joint(joint)
+        robot.controller.set_gains(joint, *gain)
+    return {"gains": robot.read_gains()}
 
 
-def _require_not_stopped(desk: Desk, order: WriteOutput | MoveGripper) -> None:
+def _require_not_stopped(robot: OwnedRobot, order: WriteOutput | MoveGripper) -> None:
     """Raises StoppedError: after a stop nothing is switched but by somebody who says that they know of it."""
-    cause = desk.ended() or desk.control.halted
+    cause = robot.ended() or robot.control.halted
     if cause is not None and not order.while_stopped:
         raise StoppedError(f"the arm has been stopped ({cause}): nothing was switched; while_stopped switches it still")
 
 
-def _process(desk: Desk) -> dict[str, object]:
-    found = desk.controller.process()
+def _process(robot: OwnedRobot) -> dict[str, object]:
+    found = robot.controller.process()
     return {
         "inputs": [bool(found.inputs >> bit & 1) for bit in range(BITS)],
         "outputs": [bool(found.outputs >> bit & 1) for bit in range(BITS)],
@@ -84,17 +84,17 @@ def _process(desk: Desk) -> dict[str, object]:
     }
 
 
-def _release(desk: Desk, order: Reset) -> None:
+def _release(robot: OwnedRobot, order: Reset) -> None:
     """Raises RequestRefusedError or SafetyError when another stop has come since the reset was asked for.
 
     The stop's number is read before the guardian is asked: a stop through the guardian reaches the guardian first and
     then the board, so one that came before the number was read is known to the guardian, and a later one has another
     number.
     """
-    controller, control = desk.controller, desk.control
+    controller, control = robot.controller, robot.control
     seen = controller.status().stop
-    if desk.guardian.newer_than(order.asked):
-        raise _overtaken(desk)
+    if robot.guardian.newer_than(order.asked):
+        raise _overtaken(robot)
     if order.here:
         # A second stop would change nothing: the board measures the posture when a stop begins.
         controller.release(seen)
@@ -102,34 +102,34 @@ def _release(desk: Desk, order: Reset) -> None:
         if not stopped.acknowledged:
             raise NotFrozenError(f"reset here: {stopped.problem}; the set points are not known to be here")
         seen = controller.status().stop
-    if not desk.guardian.forget(order.asked):
-        raise _overtaken(desk)
+    if not robot.guardian.forget(order.asked):
+        raise _overtaken(robot)
     if control.arm.state in (State.STOPPED, State.FAULT):
         control.handle(Event.RESET, stop=seen)
     else:
         controller.release(seen)
 
 
-def _overtaken(desk: Desk) -> SafetyError:
-    return SafetyError(f"the arm has been stopped since this reset was asked for ({desk.ended()}): reset again")
+def _overtaken(robot: OwnedRobot) -> SafetyError:
+    return SafetyError(f"the arm has been stopped since this reset was asked for ({robot.ended()}): reset again")
 
 
-def _reset(desk: Desk, order: Reset) -> str:
+def _reset(robot: OwnedRobot, order: Reset) -> str:
     """Ends the stop, or the fault, that there was when it was asked for. One that has come since wins."""
-    control, here = desk.control, order.here
+    control, here = robot.control, order.here
     if control.arm.state not in (State.STOPPED, State.FAULT) and not here:
         return "was not stopped"
     try:
-        _release(desk, order)
+        _release(robot, order)
     except RequestRefusedError as error:
         if error.reason != Refusal.OTHER_STOP:
             raise
-        control.stop(desk.ended() or "stopped on the board by somebody else")
+        control.stop(robot.ended() or "stopped on the board by somebody else")
         raise SafetyError("another stop has come meanwhile, and holds: reset again") from error
-    if (cause := desk.ended()) is not None:
+    if (cause := robot.ended()) is not None:
         control.stop(cause)
         raise SafetyError(f"the arm has been stopped again: {cause}")
-    limp = limp_line(desk.read_gains())
+    limp = limp_line(robot.read_gains())
     holds = "the arm takes set points again" if limp else "the arm holds its posture and takes set points again"
     return (
         f"released: {holds}"

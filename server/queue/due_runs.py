@@ -6,9 +6,9 @@ import logging
 from datetime import datetime
 
 from daq.contracts.service.experiments import ExperimentRequest
+from server.catalogue.room import require_room
 from server.problems import ProblemError
-from server.queue.parts import QueueParts
-from server.queue.room import require_room
+from server.queue.context import QueueContext
 
 log = logging.getLogger("server.queue")
 
@@ -16,8 +16,8 @@ log = logging.getLogger("server.queue")
 class DueRuns:
     """Submits the runs of one robot's schedules. Used by the queue's thread alone."""
 
-    def __init__(self, parts: QueueParts) -> None:
-        self._parts = parts
+    def __init__(self, context: QueueContext) -> None:
+        self._context = context
         self._hindered: dict[str, type[Exception]] = {}
         """Schedules whose run is due and cannot be submitted, and what has been said about it."""
         self._left_out: set[str] = set()
@@ -25,15 +25,15 @@ class DueRuns:
 
     def leave_out_missed(self) -> None:
         """At the start: what was due while nobody was there to submit it is not made up for."""
-        parts = self._parts
-        for identity in parts.schedules.leave_out_missed(parts.robot.name, parts.clock.utc()):
+        context = self._context
+        for identity in context.schedules.leave_out_missed(context.robot.name, context.clock.utc()):
             line = "runs that were due while the service was off were skipped"
-            parts.told("schedule", f"schedule {identity}: {line}")
+            context.record_event("schedule", f"schedule {identity}: {line}")
 
     def submit(self) -> None:
         """A run that cannot be submitted stays due, and is tried again; it holds up no other, and not the queue."""
-        now = self._parts.clock.utc()
-        for identity in self._parts.schedules.due(self._parts.robot.name, now):
+        now = self._context.clock.utc()
+        for identity in self._context.schedules.due(self._context.robot.name, now):
             try:
                 self._submit_one(identity, now)
                 self._hindered.pop(identity, None)
@@ -43,27 +43,27 @@ class DueRuns:
                 self._hindered[identity] = type(error)
                 log.exception("schedule %s", identity)
                 why = str(error) if isinstance(error, ProblemError) else f"{type(error).__name__}: see the log"
-                self._parts.told("schedule", f"schedule {identity}: its run has to wait: {why}")
+                self._context.record_event("schedule", f"schedule {identity}: its run has to wait: {why}")
 
     def _submit_one(self, identity: str, now: datetime) -> None:
-        parts = self._parts
-        name = parts.robot.name
-        schedule = parts.schedules.get(name, identity)
-        if parts.experiments.page(name, ("queued", "running"), identity, None, 1).items:
-            parts.schedules.leave_out(name, identity, now)
+        context = self._context
+        name = context.robot.name
+        schedule = context.schedules.get(name, identity)
+        if context.experiments.page(name, ("queued", "running"), identity, None, 1).items:
+            context.schedules.leave_out(name, identity, now)
             if identity not in self._left_out:
                 self._left_out.add(identity)
                 line = "its previous run is still waiting: runs are skipped until that one has ended"
-                parts.told("schedule", f"schedule {identity}: {line}")
+                context.record_event("schedule", f"schedule {identity}: {line}")
             return
-        require_room(parts.robot.place.folder)
-        made, _ = parts.experiments.submit(
+        require_room(context.robot.place.folder)
+        made, _ = context.experiments.submit(
             name,
             ExperimentRequest(spec=schedule.spec, priority=schedule.priority),
             now,
             f"schedule {identity}",
             schedule=identity,
-            also=lambda session: parts.schedules.count_run(session, name, identity, now),
+            also=lambda session: context.schedules.count_run(session, name, identity, now),
         )
         self._left_out.discard(identity)
-        parts.told("experiment", f"queued by schedule {identity}", experiment=made.id)
+        context.record_event("experiment", f"queued by schedule {identity}", experiment=made.id)

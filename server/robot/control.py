@@ -38,7 +38,7 @@ class Lease:
         return now < self.expires
 
 
-class ControlDesk:
+class ControlService:
     """Gives the control of one robot out.
 
     lapsed:     called with the holder's name when a lease ends by silence, on a thread of the desk's own or of the next

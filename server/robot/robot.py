@@ -33,7 +33,7 @@ from server.owner.messages import (
     Opened,
     Order,
     Report,
-    Told,
+    TeachingText,
 )
 from server.robot.owner_process import OwnerProcess
 from server.stopping.arm import Reach
@@ -217,13 +217,13 @@ class Robot:
             memory_map=place.memory_map,
         )
         try:
-            self._owner = OwnerProcess(opening, self._heard, self._gone)
-            _tell_each(self.reached, self.reach())
+            self._owner = OwnerProcess(opening, self._on_report, self._on_end)
+            _notify_each(self.reached, self.reach())
         except OSError as error:  # no memory, or no file is left for another process
             self._problem = f"the robot's process cannot be started: {error.strerror or error}"
             raise ReachError(self._problem) from error
 
-    def _heard(self, report: Report) -> None:
+    def _on_report(self, report: Report) -> None:
         seen = Seen(report, self.clock.monotonic())
         match report:
             case LiveSample():
@@ -234,9 +234,9 @@ class Robot:
                 self._set_opened(report)
             case CannotOpen():
                 self._cannot_open(report)
-            case Progress() | EventHappened() | Told() | _:
+            case Progress() | EventHappened() | TeachingText() | _:
                 pass
-        _tell_each(self.listeners, report)
+        _notify_each(self.listeners, report)
 
     def _set_opened(self, report: Opened) -> None:
         identity = RobotIdentity(
@@ -248,7 +248,7 @@ class Robot:
             self._terminal = terminal_at(port.device) if isinstance(port, SerialPort) else None
             assert self._opened is not None
             self._opened.set_result(identity)
-        _tell_each(self.reached, self.reach())
+        _notify_each(self.reached, self.reach())
 
     def _cannot_open(self, report: CannotOpen) -> None:
         with self._lock:
@@ -257,7 +257,7 @@ class Robot:
                 error = PortBusyError(report.problem) if report.busy else ReachError(report.problem)
                 self._opened.set_exception(error)
 
-    def _gone(self, why: str) -> None:
+    def _on_end(self, why: str) -> None:
         with self._lock:
             was = self._identity is not None
             self._owner = self._identity = self._arm = self._sample = None
@@ -265,11 +265,11 @@ class Robot:
                 self._problem = f"the connection has ended ({why})"
             if self._opened is not None and not self._opened.done():
                 self._opened.set_exception(ReachError(self._problem or f"the robot's process ended: {why}"))
-        _tell_each(self.reached, self.reach())
-        _tell_each(self.disconnected, why)
+        _notify_each(self.reached, self.reach())
+        _notify_each(self.disconnected, why)
 
 
-def _tell_each(listeners: Iterable[Callable[[T], None]], news: T) -> None:
+def _notify_each(listeners: Iterable[Callable[[T], None]], news: T) -> None:
     """A fault of one listener is the log's, and no other's."""
     for listener in listeners:
         try:

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from datetime import UTC
-from typing import TYPE_CHECKING
 
+from daq.contracts.service.queue import Control, QueueStatus
 from daq.contracts.service.robot import LinkStatus, RobotStatus, Sample
 from firmware_protocol.commands import StatusFlag
-from server.robot.robot import Seen
-
-if TYPE_CHECKING:
-    from server.services import RobotServices
+from server.robot.robot import Robot, Seen
 
 
-def status_of(one: RobotServices) -> RobotStatus:
-    """Now."""
-    robot = one.robot
+def status_of(robot: Robot, control: Control, queue: QueueStatus) -> RobotStatus:
+    """The status of `robot` now, with who has its control and the state of its queue."""
     arm, seen = robot.arm, robot.arm_seen
     now, utc = robot.clock.monotonic(), robot.clock.utc()
     connected = robot.identity is not None
@@ -36,14 +32,14 @@ def status_of(one: RobotServices) -> RobotStatus:
         limp=arm.limp if arm is not None else (),
         sample=sample_of(robot.sample, now, utc.timestamp()),
         link=link,
-        control=one.control.status(),
-        queue=one.queue.status(),
+        control=control,
+        queue=queue,
         utc=utc.astimezone(UTC),
     )
 
 
 def sample_of(seen: Seen | None, now: float, utc: float) -> Sample | None:
-    """A sample as clients see it; `now` on the monotonic clock, `utc` the wall clock at the same moment (s)."""
+    """A sample as clients get it. `now` (monotonic) and `utc` (wall clock) are the same moment (s)."""
     if seen is None:
         return None
     sample = seen.report

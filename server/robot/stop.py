@@ -14,7 +14,7 @@ STOPPERS = 4
 """Threads: one may wait for a process that does not answer, the next stop does not."""
 
 
-class StopDesk:
+class StopService:
     """Stops one robot through the stop socket of the process that owns its port; through the port when nobody does."""
 
     def __init__(self, robot: Robot) -> None:

@@ -16,7 +16,17 @@ from daq.contracts.service.teaching import TaughtPath, TeachingLine, TeachingSta
 from daq.teaching import Program
 from daq.teaching.jog import DEAD_MAN, top_speed
 from daq.teaching.lead import PATIENCE
-from server.owner.messages import Answer, Finish, HaltRun, JogBegin, JogDrive, LeadBegin, Report, RunProgram, Told
+from server.owner.messages import (
+    Answer,
+    Finish,
+    HaltRun,
+    JogBegin,
+    JogDrive,
+    LeadBegin,
+    Report,
+    RunProgram,
+    TeachingText,
+)
 from server.problems import ProblemError, conflict
 from server.robot.robot import ANSWER_WITHIN, Robot
 
@@ -38,15 +48,15 @@ class Word:
     require_control: Callable[[], object] = lambda: None
 
 
-class TeachingDesk:
+class TeachingService:
     """What a client with the control may have the arm do by hand. Safe to use from any thread.
 
-    told: called with one line when a teaching has ended
+    notify: called with one line when a teaching has ended
     """
 
-    def __init__(self, robot: Robot, told: Callable[[str], None]) -> None:
+    def __init__(self, robot: Robot, notify: Callable[[str], None]) -> None:
         self._robot = robot
-        self._told = told
+        self._notify = notify
         self._changed = threading.Condition(threading.RLock())
         self._numbers = itertools.count(1)
         self._lines: deque[TeachingLine] = deque(maxlen=LINES)
@@ -54,7 +64,7 @@ class TeachingDesk:
         self._result = ""
         self._problem = ""
         self._path: TaughtPath | None = None
-        robot.listeners.append(self._heard)
+        robot.listeners.append(self._on_report)
 
     def jog(self, velocities: dict[int, float], said: float) -> None:
         """The newest command of whoever holds the key, and when it arrived here (s, monotonic). One that was held up
@@ -136,10 +146,10 @@ class TeachingDesk:
             if answer is not None and "path" in answer.data:
                 self._path = TaughtPath.model_validate(answer.data["path"])
             line = self._problem or self._result
-        self._told(f"{activity}: {line}")
+        self._notify(f"{activity}: {line}")
 
-    def _heard(self, report: Report) -> None:
-        if isinstance(report, Told):
+    def _on_report(self, report: Report) -> None:
+        if isinstance(report, TeachingText):
             with self._changed:
                 self._lines.append(
                     TeachingLine(number=next(self._numbers), at=self._robot.clock.utc(), text=report.text)

@@ -60,7 +60,7 @@ class StopDoor:
         if not self._ready.wait(READY_WITHIN):
             raise StopDoorError(f"stop listener: its process did not listen within {READY_WITHIN:g} s")
 
-    def owned(self, robot: str, process: int | None, terminal: Terminal | None) -> None:
+    def set_owner(self, robot: str, process: int | None, terminal: Terminal | None) -> None:
         """Which process owns the robot's port from now on."""
         known = None if terminal is None else (terminal.number, terminal.made, terminal.holder)
         told = Owned(robot=robot, process=process, terminal=known)
@@ -68,7 +68,7 @@ class StopDoor:
             self._owned[robot] = told
             self._send(told)
 
-    def knows(self, callers: Mapping[str, Caller]) -> None:
+    def set_tokens(self, callers: Mapping[str, Caller]) -> None:
         """The tokens as the service has read them, by digest: a process that comes after begins with them."""
         tokens = {digest: (caller.name, caller.role) for digest, caller in callers.items()}
         with self._lock:

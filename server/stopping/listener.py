@@ -36,14 +36,14 @@ ANSWERED_WITHIN = 2.0
 log = logging.getLogger("server.stop")
 
 Stop = Callable[[], StopResult]
-Told = Callable[[str, StopResult, Caller], None]
+OnStop = Callable[[str, StopResult, Caller], None]
 
 
 class StopListener:
-    """Listens until closed. `stops` by robot; `told` is given the robot, what became of its stop, and who asked."""
+    """Listens until closed. `stops` by robot; `on_stop` is given the robot, what became of its stop, and who asked."""
 
-    def __init__(self, listener: socket.socket, gate: StopGate, stops: Mapping[str, Stop], told: Told) -> None:
-        self._server = _Server(listener, _handler(gate, stops, told))
+    def __init__(self, listener: socket.socket, gate: StopGate, stops: Mapping[str, Stop], on_stop: OnStop) -> None:
+        self._server = _Server(listener, _handler(gate, stops, on_stop))
         self._thread = threading.Thread(target=self._server.serve_forever, name="stop-listener", daemon=True)
         self._thread.start()
 
@@ -128,7 +128,7 @@ class _Bounded(io.RawIOBase):
         super().close()
 
 
-def _handler(gate: StopGate, stops: Mapping[str, Stop], told: Told) -> type[BaseHTTPRequestHandler]:
+def _handler(gate: StopGate, stops: Mapping[str, Stop], on_stop: OnStop) -> type[BaseHTTPRequestHandler]:
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
         server_version = "daq"
@@ -153,7 +153,7 @@ def _handler(gate: StopGate, stops: Mapping[str, Stop], told: Told) -> type[Base
                 self._answer(problem.status, details_of(problem), MEDIA_TYPE, problem.headers)
                 return
             result = stops[robot]()
-            told(robot, result, caller)  # first: whoever asked may be gone, and the stop has been made
+            on_stop(robot, result, caller)  # first: whoever asked may be gone, and the stop has been made
             self._answer(200, result, "application/json")
 
         def do_OPTIONS(self) -> None:

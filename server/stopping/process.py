@@ -31,7 +31,7 @@ class Robots:
     def __init__(self, urls: dict[str, str]) -> None:
         self._reach = {name: Reach(name, url) for name, url in urls.items()}
 
-    def owned(self, told: Owned) -> None:
+    def set_owner(self, told: Owned) -> None:
         """Another process has the port now, or none."""
         terminal = None if told.terminal is None else Terminal(*told.terminal)
         self._reach[told.robot] = replace(self._reach[told.robot], owner=told.process, terminal=terminal)
@@ -71,9 +71,9 @@ def main() -> int:
     for line in lines:
         order = ORDER.validate_json(line)
         if isinstance(order, Owned):
-            robots.owned(order)
+            robots.set_owner(order)
         elif isinstance(order, Known):
-            tokens.told(_callers(order.tokens) or {})
+            tokens.update(_callers(order.tokens) or {})
     listener.close()
     tokens.close()
     return 0

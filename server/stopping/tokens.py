@@ -72,7 +72,7 @@ class StopTokens:
         with self._changed:
             self._changed.wait_for(lambda: self._ended > 0, within)
 
-    def told(self, callers: Callers) -> None:
+    def update(self, callers: Callers) -> None:
         """As the service knows them; what was read from the database before is newer or the same."""
         with self._changed:
             self._callers = self._callers or callers

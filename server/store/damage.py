@@ -8,7 +8,7 @@ from sqlalchemy import Connection, Engine, inspect, select, text
 from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.service.experiments import ExperimentState
-from server.store.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line
+from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line
 from server.store.tables import ExperimentRow, JobRow, Table
 
 

@@ -19,9 +19,9 @@ from sqlalchemy import Engine, event, text
 from sqlalchemy.exc import DatabaseError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 
+from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
 from server.store.address import StoreError, masked, open_engine, parse_address
 from server.store.damage import require_sound
-from server.store.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
 
 BUSY_TIMEOUT_MS = 5000
 """Another process (`daq token`, a backup) may hold the write lock for a moment."""

@@ -15,9 +15,9 @@ from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Experiment, ExperimentOrder, ExperimentRequest, ExperimentState
 from daq.contracts.trace import Outcome
 from daq.traces.naming import new_trace_id
+from server.experiments.order import Waiting
+from server.experiments.states import Event, IllegalEventError, advance, after_restart
 from server.problems import conflict, not_found
-from server.queue.order import Waiting
-from server.queue.states import Event, IllegalEventError, advance, after_restart
 from server.store.engine import Store
 from server.store.pages import Cursor, newest_first, page_of
 from server.store.remembered import Remembered

@@ -15,18 +15,24 @@ from daq.contracts.service.jobs import (
     DiagnoseRequest,
     FitRequest,
     Job,
+    JobFailure,
     JobKind,
     JobRequest,
     JobState,
     ValidateRequest,
 )
+from server.experiments.states import Event, IllegalEventError, advance
 from server.problems import conflict, not_found
-from server.queue.states import Event, IllegalEventError, advance
 from server.store.engine import Store
 from server.store.pages import newest_first
 from server.store.submitted import digest_of, made_before, new_columns
 from server.store.tables import JobRow, TraceRow, TraceUseRow
 
+_FAILURES: dict[Event, JobFailure] = {
+    Event.REFUSED: "refused",
+    Event.FAULT: "program-fault",
+    Event.LOST: "lost",
+}
 _REQUEST: TypeAdapter[FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest] = TypeAdapter(JobRequest)
 
 
@@ -137,12 +143,13 @@ class JobStore:
             try:
                 row.state = advance(row.state, event)  # type: ignore[arg-type]
             except IllegalEventError as error:
-                line = str(error).replace("an experiment", "a job")
+                line = f"a job that is {error.state} cannot be {error.event}"
                 raise conflict("job-state", line, "see its state: only what is queued or running can end") from error
             if event is Event.TAKEN:
                 row.started = now
             else:
                 row.ended, row.reason, row.model, row.headline = now, reason, model, headline
+                row.failure = _FAILURES.get(event)
             session.flush()
             return as_job(row)
 
@@ -150,7 +157,7 @@ class JobStore:
         """What ran when the service ended is interrupted."""
         with self._store.writing() as session:
             for row in session.scalars(select(JobRow).filter_by(robot=robot, state="running")):
-                row.state, row.ended = "interrupted", now
+                row.state, row.ended, row.failure = "interrupted", now, "lost"
                 row.reason = "the service ended while this ran; it does not run again by itself"
 
     def remove(self, robot: str, identity: str) -> None:
@@ -176,6 +183,7 @@ def as_job(row: JobRow) -> Job:
         started=row.started,
         ended=row.ended,
         reason=row.reason,
+        failure=row.failure,
         headline=row.headline,
         model=row.model,
         has_report=row.state == "done",

@@ -36,7 +36,7 @@ class Remembered(Generic[P, Item]):
             self._parts[question] = (changes, found)
         return found
 
-    async def told(self, *args: P.args, **kwargs: P.kwargs) -> Page[Item]:
+    async def fetch(self, *args: P.args, **kwargs: P.kwargs) -> Page[Item]:
         """The same from the event loop: only what has to be read takes a thread."""
         found = self._known((args, tuple(kwargs.items())))
         return await run_in_threadpool(self, *args, **kwargs) if found is None else found

@@ -11,8 +11,8 @@ from sqlalchemy.orm import Session
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Schedule, ScheduleRequest
+from server.experiments.schedule import Plan, following, is_due
 from server.problems import not_found
-from server.queue.schedule import Plan, following, is_due
 from server.store.engine import Store
 from server.store.pages import newest_first
 from server.store.tables import ScheduleRow

@@ -169,6 +169,8 @@ class JobRow(Submitted, Table):
     """What it found."""
     model: Mapped[str | None] = mapped_column(String(64))
     """The model that it made."""
+    failure: Mapped[str | None] = mapped_column(String(32))
+    """Why it failed, for programs."""
 
 
 class ModelRow(Table):

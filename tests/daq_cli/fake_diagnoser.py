@@ -30,12 +30,23 @@ given = {
 asked = None
 if budget is not None and len(traces) == 1 and model.machine.load is not None and model.machine.load.value > 1.5:
     asked = NextExperiment(
-        name="a pause", spec=ExperimentSpec(trajectory=Pause(duration=0.4), joints=(1, 2, 3), settle=0, hold=0.1),
-        duration=0.5, separates=("backlash", "input_delay"), predicted_separation=5.0, reason="",
-    )  # fmt: skip
+        name="a pause",
+        spec=ExperimentSpec(trajectory=Pause(duration=0.4), joints=(1, 2, 3), settle=0, hold=0.1),
+        duration=0.5,
+        separates=("backlash", "input_delay"),
+        predicted_separation=5.0,
+        reason="",
+    )
 answer = Diagnosis(
-    verdict="unknown-effect" if asked else "nothing-significant", summary="", steps=(), next_experiment=asked,
-    model_before=model, model_after=model, traces=tuple(read_trace(file).record.trace_id for file in traces),
-    seconds=0.1, robot_seconds=1.0, notes=(json.dumps(given),),
-)  # fmt: skip
+    verdict="unknown-effect" if asked else "nothing-significant",
+    summary="",
+    steps=(),
+    next_experiment=asked,
+    model_before=model,
+    model_after=model,
+    traces=tuple(read_trace(file).record.trace_id for file in traces),
+    seconds=0.1,
+    robot_seconds=1.0,
+    notes=(json.dumps(given),),
+)
 Path("answer.json").write_text(answer.model_dump_json(), "utf-8")

@@ -49,8 +49,11 @@ def at_a_terminal(words: list[str]) -> Iterator[Person]:
     master, slave = pty.openpty()
     process = subprocess.Popen(
         [sys.executable, "-c", TAKE_THE_TERMINAL, *DAQ, *words],
-        stdin=slave, stdout=slave, stderr=slave, start_new_session=True,
-    )  # fmt: skip
+        stdin=slave,
+        stdout=slave,
+        stderr=slave,
+        start_new_session=True,
+    )
     os.close(slave)
     try:
         yield Person(process, master)

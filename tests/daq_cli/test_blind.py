@@ -82,7 +82,7 @@ def everything_in(file: Path) -> str:
         return "\n".join(repr(record) for record in StreamReader(stream).records)
 
 
-def test_every_stage_leaves_a_line_a_case(done: Campaign) -> None:
+def test_every_stage_writes_one_line_for_each_case(done: Campaign) -> None:
     for stage in STAGES:
         assert set(rows(done, stage)) == set(SECRETS), stage
     table = done.table()
@@ -102,7 +102,7 @@ def test_the_diagnosis_is_given_traces_and_the_model_and_nothing_else(done: Camp
         assert str(seed // 100) not in everything
 
 
-def test_it_is_told_the_load_that_was_announced(done: Campaign) -> None:
+def test_the_diagnosis_is_given_the_announced_load(done: Campaign) -> None:
     assert given(done, SECRETS[0])["load"] == 2.0
     assert given(done, SECRETS[1])["load"] == pytest.approx(1.250307)
     announced = machine_with_load(MACHINE, 0.4).load
@@ -113,7 +113,7 @@ def test_it_is_told_the_load_that_was_announced(done: Campaign) -> None:
     assert announced.deviation == pytest.approx(0.4 * own.deviation / own.value)  # as uncertain as the file's own
 
 
-def test_traces_and_names_do_not_tell_the_secret(done: Campaign) -> None:
+def test_traces_and_case_names_do_not_reveal_the_hidden_effects(done: Campaign) -> None:
     names = [file.name for file in done.folder.path.rglob("*")]
     for seed, row in rows(done, "record").items():
         number = str(seed // 100)
@@ -133,7 +133,7 @@ def test_the_two_traces_of_an_arm_have_different_noise(done: Campaign) -> None:
     assert (first.position != second.position).any()
 
 
-def test_what_an_answer_asked_for_was_run_once_on_the_same_arm(done: Campaign) -> None:
+def test_an_experiment_that_an_answer_asked_for_was_run_once_on_the_same_arm(done: Campaign) -> None:
     assert len(rows(done, "diagnose")[SECRETS[1]]["traces"]) == 1
     row = rows(done, "diagnose")[SECRETS[0]]
     assert len(row["traces"]) == 2
@@ -154,7 +154,7 @@ def resumed(path: Path, done: Campaign, acquire: bool) -> Campaign:
     return copy
 
 
-def test_a_further_run_that_is_not_complete_is_kept_not_used_and_the_last(
+def test_an_incomplete_further_run_is_kept_but_not_used_and_is_the_last(
     done: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     copy = resumed(tmp_path, done, acquire=True)
@@ -168,7 +168,7 @@ def test_a_further_run_that_is_not_complete_is_kept_not_used_and_the_last(
     assert row["further"][0]["duration"] > 0.1
 
 
-def test_a_further_experiment_that_cannot_be_recorded_is_no_wrong_answer(
+def test_a_further_experiment_that_cannot_be_recorded_does_not_count_as_a_wrong_answer(
     done: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def nothing(*_: object) -> Recorded:
@@ -179,7 +179,7 @@ def test_a_further_experiment_that_cannot_be_recorded_is_no_wrong_answer(
         resumed(tmp_path, done, acquire=True)._diagnose(SECRETS[0])
 
 
-def test_without_acquiring_nothing_may_be_asked(done: Campaign, tmp_path: Path) -> None:
+def test_without_acquire_no_experiment_may_be_asked_for(done: Campaign, tmp_path: Path) -> None:
     copy = resumed(tmp_path, done, acquire=False)
     copy.folder.add("diagnose", copy._diagnose(SECRETS[0]))
     told = given(copy, SECRETS[0])
@@ -187,14 +187,14 @@ def test_without_acquiring_nothing_may_be_asked(done: Campaign, tmp_path: Path) 
     assert told["files"] == ["held-out.mcap", "model.json", "trace-1.mcap"]
 
 
-def test_a_trial_that_goes_on_does_nothing_twice(done: Campaign) -> None:
+def test_a_resumed_trial_repeats_no_stage(done: Campaign) -> None:
     before = {stage: (done.folder.path / f"{stage}.jsonl").read_bytes() for stage in STAGES}
     again = trial(done.folder.path, acquire=True)
     again.run(SECRETS, 1, lambda _number, _said: None)
     assert {stage: (done.folder.path / f"{stage}.jsonl").read_bytes() for stage in STAGES} == before
 
 
-def test_the_lines_alone_are_enough_to_go_on_elsewhere(done: Campaign, tmp_path: Path) -> None:
+def test_a_trial_can_be_resumed_from_its_lines_in_another_folder(done: Campaign, tmp_path: Path) -> None:
     for name in ("trial.json", *(f"{stage}.jsonl" for stage in STAGES)):
         (tmp_path / name).write_bytes((done.folder.path / name).read_bytes())
     again = Campaign(TrialFolder.open(tmp_path, "ramp", True, None, ""), MACHINE, ("/no/diagnoser",))
@@ -213,7 +213,7 @@ def test_an_answer_that_was_changed_after_it_was_sealed_is_not_scored(done: Camp
         copy._score(SECRETS[1])
 
 
-def test_cases_run_in_an_order_that_tells_nothing(done: Campaign) -> None:
+def test_the_order_of_cases_reveals_nothing(done: Campaign) -> None:
     seeds = [compose(number, kind, "nominal") for kind in ("clean", "single") for number in range(20)]
     order = done.folder.in_order(seeds)
     assert sorted(order) == sorted(seeds)
@@ -226,7 +226,7 @@ def test_a_folder_of_another_trial_is_refused(done: Campaign) -> None:
         TrialFolder.open(done.folder.path, "diagnostic", False, None, "")
 
 
-def test_a_line_that_a_crash_cut_short_is_done_again(tmp_path: Path) -> None:
+def test_a_stage_whose_line_was_cut_short_is_repeated(tmp_path: Path) -> None:
     folder = trial(tmp_path).folder
     folder.add("detect", {"seed": 110})
     with (tmp_path / "detect.jsonl").open("a", encoding="utf-8") as file:
@@ -237,7 +237,7 @@ def test_a_line_that_a_crash_cut_short_is_done_again(tmp_path: Path) -> None:
     assert [row["seed"] for row in trial(tmp_path).folder.rows("detect")] == [110, 120]
 
 
-def test_shards_write_lines_of_their_own_and_see_all(tmp_path: Path) -> None:
+def test_shards_write_their_own_lines_and_read_all(tmp_path: Path) -> None:
     first, second = (trial(tmp_path, shard=f"-{k}of2").folder for k in (1, 2))
     assert first.asked == second.asked
     first.add("detect", {"seed": 110})
@@ -260,7 +260,7 @@ def test_a_diagnosis_that_gives_no_answer_says_why(tmp_path: Path, done: Campaig
     assert silent._score(SECRETS[0])["place"] == "failed"
 
 
-def test_set_points_for_the_mock_s_side_are_those_that_are_sent(tmp_path: Path) -> None:
+def test_set_points_of_the_detection_are_those_that_a_run_sends(tmp_path: Path) -> None:
     table = write_set_points(trial_experiment("ramp"), MACHINE, tmp_path / "ramp.csv").read_text("utf-8").splitlines()
     assert table[0] == "set_point_1,set_point_2,set_point_3,set_point_4,set_point_5,set_point_6"
     assert len(table) - 1 == pytest.approx(8 * 50, abs=3)
@@ -281,7 +281,7 @@ def test_wrong_options_are_refused_in_one_line(daq: CommandLine, words: tuple[st
     daq("blind", "--folder", "trial", *words).complains(2, says)
 
 
-def test_the_hashes_that_a_registration_holds(daq: CommandLine) -> None:
+def test_hashes_prints_the_tables_of_a_registration(daq: CommandLine) -> None:
     printed = tomllib.loads(daq("blind", "--folder", "trial", "--hashes").out)
     expected = tree_hashes()
     assert printed == {"hashes": expected, "versions": library_versions()}
@@ -298,11 +298,11 @@ AROUND = ("daq_cli", "daq.client", "daq.config")
 
 
 def test_nothing_that_a_stage_imports_is_left_out_of_a_registration() -> None:
-    every = ("daq", "model", "server", "mock_controller", "firmware_protocol")
+    every = ("daq", "daq_cli", "model", "server", "mock_controller", "firmware_protocol")
     graph = grimp.build_graph(*every, exclude_type_checking_imports=True, cache_dir=None)
     begun = {name for name in graph.modules if any(f"{name}.".startswith(f"{stage}.") for stage in STAGE_MODULES)}
     used = begun.union(*(graph.find_upstream_modules(name) for name in begun))
-    assert {"model.discrepancy.workflow", "daq.link.link", "model.identifiability.directions"} <= used
+    assert {"model.discrepancy.workflow", "daq.link.link", "model.fitting.directions"} <= used
     registered = [path.removesuffix(".py").replace("/", ".") for path in REGISTERED]
     packages = {"daq", "model", "server", "server.jobs"}  # of which only the registered parts are used
     left = [name for name in used - packages if not any(f"{name}.".startswith(f"{p}.") for p in (*registered, *AROUND))]

@@ -53,7 +53,7 @@ def test_joints_that_are_offered_are_joints() -> None:
         ("daq traces show l", ["last"]),
     ],
 )
-def test_a_shell_is_answered_without_anything_heavy(words: str, offered: list[str]) -> None:
+def test_completion_loads_no_heavy_library(words: str, offered: list[str]) -> None:
     Path("kept").mkdir()
     for number in (1, 2):
         Path(f"kept/{number}_ramp.mcap").touch()
@@ -66,6 +66,6 @@ def test_a_shell_is_answered_without_anything_heavy(words: str, offered: list[st
     assert set(json.loads(run.stderr.splitlines()[-1])) & HEAVY == set()
 
 
-def test_the_version_is_the_packages(daq: CommandLine) -> None:
+def test_the_version_is_that_of_the_package(daq: CommandLine) -> None:
     said = daq("--version")
     assert (said.code, said.out) == (0, f"daq {version('ma2000-daq')}\n")

@@ -36,7 +36,7 @@ MAPS = ("machine", "memory_map")
 @pytest.mark.parametrize(
     ("words", "kind"), [(words, kind) for words in READERS for kind in FILES if kind not in LEFT_OUT[READERS[words]]]
 )
-def test_a_file_that_nobody_means(daq: CommandLine, words: str, kind: str) -> None:
+def test_a_hostile_file_is_refused_in_one_line(daq: CommandLine, words: str, kind: str) -> None:
     file = hostile_file(kind, READERS[words])
     if words.startswith("--config") and kind == "empty":
         return  # a configuration that says nothing
@@ -47,7 +47,7 @@ def test_a_file_that_nobody_means(daq: CommandLine, words: str, kind: str) -> No
 
 @pytest.mark.parametrize("kind", [kind for kind in FILES if kind not in NO_TOML])
 @pytest.mark.parametrize("key", MAPS)
-def test_a_file_that_the_configuration_names(daq: CommandLine, key: str, kind: str) -> None:
+def test_a_hostile_file_named_in_the_configuration_is_refused(daq: CommandLine, key: str, kind: str) -> None:
     file = hostile_file(kind, ".toml")
     Path("daq.toml").write_text(f'[robot]\n{key} = "{file}"\n')
     refuses(daq("config", "check"))
@@ -70,7 +70,7 @@ def test_a_machine_file_that_is_binary_is_not_called_missing(daq: CommandLine) -
         ("teach program {}", "format = 0x{}"),
     ],
 )
-def test_a_whole_number_that_python_does_not_write(daq: CommandLine, words: str, text: str, digits: int) -> None:
+def test_a_huge_hexadecimal_number_is_refused(daq: CommandLine, words: str, text: str, digits: int) -> None:
     Path("number.toml").write_text(text.format("f" * digits))
     refuses(daq(*words.format("number.toml").split()))
 
@@ -100,18 +100,29 @@ def numbers_of_motions() -> list[tuple[str, str, str]]:
 
 
 @pytest.mark.parametrize(("kind", "option", "value"), numbers_of_motions())
-def test_a_number_that_nobody_means(daq: CommandLine, kind: str, option: str, value: str) -> None:
+def test_a_number_without_meaning_is_refused_in_one_line(daq: CommandLine, kind: str, option: str, value: str) -> None:
     refuses(daq("run", kind, f"--{option}={value}", "--dry-run"))
 
 
 @pytest.mark.parametrize(
     "words",
-    ["teach lead -o lead.json --seconds={}", "serve --port={}", "teach step --by 1={}", "teach jog --speed={}",
-     "gains set 1={}/0/0", "io set {} on", "blind --folder t --seeds={}", "run ramp --joints={}",
-     "run ramp --start=1=1,1={}", "run ramp --gains=1=2/{}/0"],
-)  # fmt: skip
+    [
+        "teach lead -o lead.json --seconds={}",
+        "serve --port={}",
+        "teach step --by 1={}",
+        "teach jog --speed={}",
+        "gains set 1={}/0/0",
+        "io set {} on",
+        "blind --folder t --seeds={}",
+        "run ramp --joints={}",
+        "run ramp --start=1=1,1={}",
+        "run ramp --gains=1=2/{}/0",
+    ],
+)
 @pytest.mark.parametrize("value", [value for value in NUMBERS if value])
-def test_a_number_of_another_command(daq: CommandLine, words: str, value: str) -> None:
+def test_a_number_without_meaning_is_refused_before_anything_is_reached(
+    daq: CommandLine, words: str, value: str
+) -> None:
     refuses(daq("--port", "serial:///dev/nowhere", *words.format(value).split()))
 
 
@@ -135,16 +146,18 @@ def test_a_number_of_another_command(daq: CommandLine, words: str, value: str) -
         ("ramp --amplitude 1e-300", ("amplitude", "half a set point")),
     ],
 )
-def test_a_motion_that_set_points_cannot_show(daq: CommandLine, words: str, expected: tuple[str, ...]) -> None:
+def test_a_motion_that_set_points_cannot_represent_is_refused(
+    daq: CommandLine, words: str, expected: tuple[str, ...]
+) -> None:
     daq("run", *words.split(), "--dry-run").complains(2, *expected)
 
 
 @pytest.mark.parametrize("words", ["ramp --amplitude 0", "ramp --amplitude 1=10,2=0,3=0.1", "ramp --settle 0 --hold 0"])
-def test_standing_still_on_purpose_is_a_motion(daq: CommandLine, words: str) -> None:
+def test_a_motion_of_zero_amplitude_is_allowed(daq: CommandLine, words: str) -> None:
     assert daq("run", *words.split(), "--dry-run").code == 0
 
 
-def test_more_arms_than_a_trial_can_have(daq: CommandLine) -> None:
+def test_more_arms_than_a_trial_can_have_are_refused(daq: CommandLine) -> None:
     daq("blind", "--seeds", "1:1000000000000", "--folder", "t").complains(2, "1000000000000 arms", "at most 100000")
     assert not Path("t").exists()
 
@@ -160,7 +173,7 @@ def test_more_arms_than_a_trial_can_have(daq: CommandLine) -> None:
         ("sqlite:////proc/nothing/service.sqlite", ("/proc/nothing", "cannot be made")),
     ],
 )
-def test_a_database_that_cannot_be_used(daq: CommandLine, database: str, expected: tuple[str, ...]) -> None:
+def test_a_database_that_cannot_be_used_is_refused(daq: CommandLine, database: str, expected: tuple[str, ...]) -> None:
     Path("daq.toml").write_text(f'[server]\ndatabase = "{database}"\n')
     said = daq("token", "ls")
     if not database:
@@ -191,7 +204,7 @@ def test_the_defaults_shown_are_a_configuration(daq: CommandLine) -> None:
     assert load_settings(Path("again.toml"))[0] == defaults
 
 
-def test_a_service_of_no_port_does_not_start() -> None:
+def test_a_service_at_an_invalid_port_does_not_start() -> None:
     command = [sys.executable, "-c", "from daq_cli import main; main()", "--port", "nonsense", "serve"]
     ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=30)
     assert ended.returncode == 2
@@ -206,11 +219,11 @@ def test_the_configuration_is_checked_with_the_port_that_is_named(daq: CommandLi
 
 @pytest.mark.parametrize("name", ["\udcff.json", "a" * 300 + ".json", "new\nline.json", ".", "", "/", "/proc/self/mem"])
 @pytest.mark.parametrize("words", ["--config {} config check", "run spec {} --dry-run", "teach program {}"])
-def test_a_name_that_no_file_has(daq: CommandLine, words: str, name: str) -> None:
+def test_an_impossible_file_name_is_reported(daq: CommandLine, words: str, name: str) -> None:
     refuses(daq(*(word.format(name) for word in words.split(" "))))
 
 
 @pytest.mark.parametrize("name", sorted(" ".join(words) for words in COMMANDS))
-def test_a_wrong_option_is_told_in_one_line(daq: CommandLine, name: str) -> None:
+def test_a_wrong_option_is_reported_in_one_line(daq: CommandLine, name: str) -> None:
     if name != "mock":  # whose options are its own
         refuses(daq(*name.split(), "--no-such\noption"))

@@ -20,7 +20,7 @@ FILES = {
 
 
 @pytest.mark.parametrize("kind", FILES)
-def test_a_trace_made_to_do_harm_gets_one_line(daq: CommandLine, tmp_path: Path, kind: str) -> None:
+def test_a_malicious_trace_is_refused_in_one_line(daq: CommandLine, tmp_path: Path, kind: str) -> None:
     make, complaint = FILES[kind]
     path = tmp_path / f"{kind}.mcap"
     path.write_bytes(make())
@@ -56,7 +56,7 @@ def test_a_trace_made_to_do_harm_gets_one_line(daq: CommandLine, tmp_path: Path,
         ("0,0", "period = 1e-300", "period = 1e-300 s, allowed is 1e-06 to 86400 s"),
     ],
 )
-def test_a_csv_made_to_do_harm_gets_one_line(
+def test_a_malicious_csv_is_refused_in_one_line(
     daq: CommandLine, tmp_path: Path, text: str, toml: str, complaint: str
 ) -> None:
     path = tmp_path / "rig.csv"
@@ -67,7 +67,7 @@ def test_a_csv_made_to_do_harm_gets_one_line(
     assert not list((tmp_path / "traces").glob("*")) if (tmp_path / "traces").exists() else True
 
 
-def test_what_is_no_file_is_not_waited_for(daq: CommandLine, tmp_path: Path) -> None:
+def test_a_pipe_in_place_of_a_file_is_refused_at_once(daq: CommandLine, tmp_path: Path) -> None:
     daq("traces", "import", "/dev/zero").complains(2, "/dev/zero", "it is no file")
     daq("traces", "import", ".").complains(2, "Is a directory")
     (tmp_path / "rig.csv").write_text("time,position_1\n0,0\n1,1\n")
@@ -76,7 +76,7 @@ def test_what_is_no_file_is_not_waited_for(daq: CommandLine, tmp_path: Path) -> 
     daq("traces", "show", "a" * 5000).complains(2, "is not a file")
 
 
-def test_limits_are_configured(daq: CommandLine, tmp_path: Path) -> None:
+def test_configured_limits_of_traces_hold(daq: CommandLine, tmp_path: Path) -> None:
     path = write(tmp_path / "a.mcap", 50)
     Path("daq.toml").write_text("[traces.limits]\njoints = 2\n")
     daq("traces", "show", path).complains(2, "joints = '1 2 3' are not 1 to 2 different", "(traces.limits.joints)")
@@ -84,7 +84,7 @@ def test_limits_are_configured(daq: CommandLine, tmp_path: Path) -> None:
     daq("traces", "show", path).complains(2, "traces.limits.joint", "chunk_bytes")
 
 
-def test_a_trace_does_not_command_the_terminal(daq: CommandLine, tmp_path: Path) -> None:
+def test_control_characters_in_a_trace_are_not_printed(daq: CommandLine, tmp_path: Path) -> None:
     path = write(tmp_path / "a.mcap", 3, notes="\x1b[31mred\x07", operator="\x1b]0;title\x07", robot="a\x1b[2J")
     shown = daq("traces", "show", path)
     assert shown.code == 0
@@ -93,7 +93,7 @@ def test_a_trace_does_not_command_the_terminal(daq: CommandLine, tmp_path: Path)
     assert "\x07" not in shown.out
 
 
-def test_the_name_of_a_file_does_not_command_the_terminal(daq: CommandLine, tmp_path: Path) -> None:
+def test_control_characters_in_a_file_name_are_not_printed(daq: CommandLine, tmp_path: Path) -> None:
     path = write(tmp_path / "a\x1b[2J.mcap", 3)
     for words in (("show", path), ("export", path)):
         shown = daq("traces", *words)
@@ -102,7 +102,7 @@ def test_the_name_of_a_file_does_not_command_the_terminal(daq: CommandLine, tmp_
         assert "\x1b" not in shown.out
 
 
-def test_what_was_not_salvaged_is_told_with_where_it_is(daq: CommandLine, tmp_path: Path) -> None:
+def test_bytes_that_were_not_salvaged_are_named_with_their_file(daq: CommandLine, tmp_path: Path) -> None:
     data = write(tmp_path / "a.mcap", 50).read_bytes()
     (tmp_path / "a.mcap").rename(tmp_path / "a.mcap.part")
     with (tmp_path / "a.mcap.part").open("ab") as stream:
@@ -111,6 +111,7 @@ def test_what_was_not_salvaged_is_told_with_where_it_is(daq: CommandLine, tmp_pa
     said = daq("traces", "salvage", "--folder", tmp_path)
     assert said.code == 5
     first, second = said.out.splitlines()
-    assert first.endswith("a.mcap: salvaged from a.mcap.part up to its damage; "
-                          "the 13 bytes after it are in a.mcap.part.damaged")  # fmt: skip
+    assert first.endswith(
+        "a.mcap: salvaged from a.mcap.part up to its damage; the 13 bytes after it are in a.mcap.part.damaged"
+    )
     assert second.endswith("b.mcap.part: holds no trace; it was renamed to b.mcap.part.unreadable")

@@ -9,13 +9,14 @@ import pytest
 from daq.acquisition.messages import Finished
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Outcome, Trace
+from daq_cli.robot.local import LocalRobot
 from tests.daq.traces.samples import record, write
 from tests.daq_cli.invoke import CommandLine
 
 
 @pytest.mark.parametrize("words", ["calibrate gain", "demo", "thesis"])
 @pytest.mark.parametrize(("outcome", "code"), [("stopped", 6), ("fault", 5), ("interrupted", 5)])
-def test_nothing_is_made_of_it(
+def test_no_result_is_made_of_an_incomplete_run(
     daq: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str, outcome: Outcome, code: int
 ) -> None:
     made = Finished(
@@ -26,7 +27,7 @@ def test_nothing_is_made_of_it(
         missing=0,
         counters={},
     )
-    monkeypatch.setattr("daq_cli.robot.run_result.acquire", lambda *_, **__: made)
+    monkeypatch.setattr(LocalRobot, "acquire", lambda *_, **__: made)
     said = daq(*words.split())
     assert said.code == code
     assert said.out == ""
@@ -34,7 +35,7 @@ def test_nothing_is_made_of_it(
 
 
 @pytest.mark.parametrize("stated", [True, False], ids=["stated", "not stated"])
-def test_a_gain_is_found_with_the_calibration_of_the_trace(
+def test_a_gain_is_measured_with_the_calibration_of_the_trace(
     daq: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stated: bool
 ) -> None:
     """The configured one is for traces that name no machine."""

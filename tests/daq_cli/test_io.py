@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
-import typer
 
 from daq.acquisition.port_stop import stop_at_port
 from daq.driver import Controller
-from daq.driver.controller import Identity
 from daq.transport.mock_process import MockProcess
-from daq_cli.app import consent
 from tests.daq_cli.board import ask
 from tests.daq_cli.invoke import CommandLine
+from tests.daq_cli.operator import asked_operator, pretend_real_arm
 
 SWITCHES = [(("set", "3", "on"), "output 3 on, read back\n"), (("gripper", "close"), "gripper closed, read back\n")]
 UNTOUCHED = "outputs 00000000\ngripper open\n"
@@ -30,7 +28,7 @@ def _untouched(daq: CommandLine, port: str) -> Iterator[None]:
 
 
 @pytest.mark.parametrize(("words", "told"), SWITCHES)
-def test_what_was_switched_is_read_back_and_told(
+def test_a_switched_signal_is_read_back_and_printed(
     daq: CommandLine, port: str, words: tuple[str, ...], told: str
 ) -> None:
     assert daq("--port", port, "io", *words).out == told
@@ -40,24 +38,17 @@ def test_what_was_switched_is_read_back_and_told(
 def test_a_real_arm_is_switched_only_with_the_operators_word(
     daq: CommandLine, port: str, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], told: str
 ) -> None:
-    monkeypatch.setattr(Identity, "simulated", property(lambda _: False))
+    pretend_real_arm(monkeypatch)
     daq("--port", port, "io", *words).complains(4, "is a real arm", "--yes")
     assert daq("--port", port, "io", "show").out.endswith(UNTOUCHED)
     assert daq("--port", port, "io", *words, "--yes").out == told
 
 
-def answered(monkeypatch: pytest.MonkeyPatch, answer: Callable[[], bool]) -> None:
-    """The arm is real, and a person at the terminal answers what is asked."""
-    monkeypatch.setattr(Identity, "simulated", property(lambda _: False))
-    monkeypatch.setattr(consent, "can_be_asked", lambda: True)
-    monkeypatch.setattr(typer, "confirm", lambda *_, **__: answer())
-
-
 @pytest.mark.parametrize(("words", "told"), SWITCHES)
-def test_what_a_person_has_agreed_to_is_switched(
+def test_a_real_arm_is_switched_when_a_person_agrees(
     daq: CommandLine, port: str, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], told: str
 ) -> None:
-    answered(monkeypatch, lambda: True)
+    asked_operator(monkeypatch, lambda _question: True)
     assert daq("--port", port, "io", *words).out == told
 
 
@@ -76,20 +67,20 @@ def test_a_stop_gets_through_while_a_person_is_asked_and_nothing_is_switched_the
         close(controller)
         held.pop()
 
-    def stopped_meanwhile() -> bool:
+    def stopped_meanwhile(_question: str) -> bool:
         assert held == [], "whoever thinks holds no port"
         assert stop_at_port("arm", port).confirmed
         return True
 
     monkeypatch.setattr(Controller, "connect", opened)
     monkeypatch.setattr(Controller, "close", closed)
-    answered(monkeypatch, stopped_meanwhile)
+    asked_operator(monkeypatch, stopped_meanwhile)
     daq("--port", port, "io", *words).complains(4, "the arm has been stopped", "nothing was switched")
     assert daq("--port", port, "io", "show").out.endswith(UNTOUCHED)
 
 
 @pytest.mark.parametrize(("words", "told"), SWITCHES)
-def test_a_stopped_arm_is_switched_only_by_who_says_so(
+def test_a_stopped_arm_is_switched_only_with_while_stopped(
     daq: CommandLine, mock: MockProcess, port: str, words: tuple[str, ...], told: str
 ) -> None:
     assert daq("--port", port, "stop").code == 0

@@ -13,7 +13,7 @@ from daq.contracts.errors import SpecError
 from daq_cli.app.output_file import replacing
 
 
-def test_what_was_there_stays_until_the_new_file_is_whole(nobodys_desk: Path) -> None:
+def test_the_old_file_stays_until_the_new_one_is_whole(nobodys_desk: Path) -> None:
     path = nobodys_desk / "model.json"
     path.write_text("old")
     with replacing(path) as part:
@@ -23,7 +23,7 @@ def test_what_was_there_stays_until_the_new_file_is_whole(nobodys_desk: Path) ->
     assert list(nobodys_desk.iterdir()) == [path]
 
 
-def test_what_was_there_stays_when_the_new_file_fails(nobodys_desk: Path) -> None:
+def test_the_old_file_stays_when_the_new_one_fails(nobodys_desk: Path) -> None:
     path = nobodys_desk / "model.json"
     path.write_text("old")
 
@@ -38,7 +38,7 @@ def test_what_was_there_stays_when_the_new_file_fails(nobodys_desk: Path) -> Non
     assert list(nobodys_desk.iterdir()) == [path]
 
 
-def test_a_link_stays_a_link(tmp_path: Path) -> None:
+def test_a_symbolic_link_stays_a_link(tmp_path: Path) -> None:
     real, link = tmp_path / "real.json", tmp_path / "link.json"
     real.write_text("old")
     link.symlink_to(real)

@@ -17,7 +17,7 @@ from tests.daq_cli.person import at_a_terminal
 LONG = ["run", "ramp", "--hold", "600", "--folder", "traces"]
 
 
-def test_the_main_job_to_its_end_as_json(daq: CommandLine, port: str) -> None:
+def test_a_run_is_recorded_and_printed_as_json(daq: CommandLine, port: str) -> None:
     said = daq("--port", port, "run", "ramp", "--joints", "1-3", "--folder", "traces", "--json", "--hold", "0.2")
     assert said.code == 0, said.err
     result = json.loads(said.out)
@@ -28,7 +28,7 @@ def test_the_main_job_to_its_end_as_json(daq: CommandLine, port: str) -> None:
     assert len(trace) == result["samples"]
 
 
-def test_the_main_job_for_people(daq: CommandLine, port: str) -> None:
+def test_a_run_is_recorded_and_printed_for_people(daq: CommandLine, port: str) -> None:
     said = daq("--port", port, "run", "step", "--joints", "3", "--folder", "traces", "--hold", "0.2")
     assert said.code == 0
     lines = said.out.splitlines()
@@ -53,7 +53,7 @@ def test_a_dry_run_connects_to_nothing_and_leaves_nothing(
     assert not list(nobodys_desk.iterdir())
 
 
-def test_an_experiment_from_a_file(daq: CommandLine) -> None:
+def test_an_experiment_is_read_from_json_and_toml(daq: CommandLine) -> None:
     Path("one.json").write_text(json.dumps({"trajectory": {"kind": "pause", "duration": 1}, "joints": [2]}))
     assert "pause: " in daq("run", "spec", "one.json", "--dry-run").out
     Path("two.toml").write_text('joints = [2]\n[trajectory]\nkind = "pause"\nduration = -1\n')
@@ -61,7 +61,7 @@ def test_an_experiment_from_a_file(daq: CommandLine) -> None:
 
 
 @pytest.mark.parametrize("keys", [b"\x03\x03", b"\x1a"], ids=["Ctrl-C twice", "Ctrl-Z"])
-def test_keys_that_stop_the_arm(keys: bytes) -> None:
+def test_ctrl_c_and_ctrl_z_stop_the_arm(keys: bytes) -> None:
     with at_a_terminal(["--port", "mock://?pty=1&seed=3", *LONG]) as person:
         person.until(b"ramp starts")
         person.type(keys)
@@ -73,7 +73,7 @@ def test_keys_that_stop_the_arm(keys: bytes) -> None:
     assert read_trace(path).record.outcome == "stopped"
 
 
-def test_stop_from_another_terminal(daq: CommandLine) -> None:
+def test_a_stop_from_another_terminal_ends_the_run(daq: CommandLine) -> None:
     with at_a_terminal(["--port", "mock://?pty=1&seed=3", *LONG]) as person:
         person.until(b"ramp starts")
         said = daq("stop", "--json")

@@ -10,12 +10,12 @@ from daq_cli.app.context import console, print_table
 from tests.daq_cli.invoke import CommandLine
 
 
-def test_a_path_in_a_remark(capsys: pytest.CaptureFixture[str]) -> None:
+def test_square_brackets_in_a_path_are_printed_in_a_remark(capsys: pytest.CaptureFixture[str]) -> None:
     console().print("report: [raw]/page.html")
     assert capsys.readouterr().err == "report: [raw]/page.html\n"
 
 
-def test_a_name_in_a_table(capsys: pytest.CaptureFixture[str]) -> None:
+def test_square_brackets_in_a_name_are_printed_in_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     from rich.table import Table
 
     table = Table("[model]", box=None)
@@ -24,6 +24,6 @@ def test_a_name_in_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out.split() == ["[model]", "[raw]"]
 
 
-def test_a_file_in_the_list_of_traces(daq: CommandLine, tmp_path: Path) -> None:
+def test_square_brackets_in_a_file_name_are_printed_in_the_list_of_traces(daq: CommandLine, tmp_path: Path) -> None:
     (tmp_path / "[raw].mcap").write_bytes(b"no trace")
     assert "[raw].mc" in daq("traces", "ls", "--folder", tmp_path).out

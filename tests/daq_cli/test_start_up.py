@@ -30,7 +30,7 @@ def loaded(*words: str) -> set[str]:
 
 
 @pytest.mark.parametrize("words", [["--help"], []], ids=["help", "nothing"])
-def test_help_loads_nothing_that_only_the_work_needs(words: list[str]) -> None:
+def test_help_loads_no_library_that_only_commands_need(words: list[str]) -> None:
     assert loaded(*words) & NOT_FOR_HELP == set()
 
 

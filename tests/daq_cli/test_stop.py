@@ -5,19 +5,23 @@ from __future__ import annotations
 import json
 import os
 import pty
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 import serial
 
-from daq.acquisition.stop_socket import StopAnswer, StopAttempt, stop_listener
+from daq.acquisition.stop_socket import StopAnswer, stop_listener
 from daq.driver import Controller
 from daq.transport.mock_process import MockProcess
 from tests.daq_cli.board import ask
 from tests.daq_cli.invoke import CommandLine
 
 
-def test_with_nothing_running_and_nothing_configured(daq: CommandLine) -> None:
+def test_a_stop_with_nothing_running_and_nothing_configured_fails(daq: CommandLine) -> None:
     said = daq("stop")
     assert (said.code, said.err) == (3, "")
     assert said.out == "no robot is being moved from here, and none is configured: nothing to stop\n"
@@ -35,7 +39,7 @@ def test_a_robot_that_nobody_holds_is_stopped_over_its_port(daq: CommandLine, mo
 
 
 @pytest.mark.parametrize("words", [("reset",), ("reset", "--here")])
-def test_a_reset_ends_no_stop_that_comes_after_it_has_looked(
+def test_a_reset_does_not_end_a_later_stop(
     daq: CommandLine, mock: MockProcess, port: str, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
 ) -> None:
     assert daq("--port", port, "stop").code == 0
@@ -65,7 +69,7 @@ def test_the_configured_robot_is_stopped_beside_those_that_run(daq: CommandLine,
     daq("reset")
 
 
-def test_a_port_that_somebody_else_holds_is_told_as_not_delivered(daq: CommandLine) -> None:
+def test_a_stop_at_a_port_in_use_is_reported_as_not_delivered(daq: CommandLine) -> None:
     master, slave = pty.openpty()
     try:
         with serial.Serial(os.ttyname(slave), exclusive=True):
@@ -79,7 +83,7 @@ def test_a_port_that_somebody_else_holds_is_told_as_not_delivered(daq: CommandLi
     assert "emergency stop" in said.out
 
 
-def test_a_board_that_does_not_answer_is_told_as_not_confirmed(daq: CommandLine) -> None:
+def test_a_stop_at_a_silent_board_is_reported_as_not_confirmed(daq: CommandLine) -> None:
     master, slave = pty.openpty()
     try:
         said = daq("--port", f"serial://{os.ttyname(slave)}", "stop")
@@ -91,7 +95,7 @@ def test_a_board_that_does_not_answer_is_told_as_not_confirmed(daq: CommandLine)
     assert "emergency stop" in said.out
 
 
-def test_a_configuration_that_cannot_be_read_is_told_and_stops_nobody_from_stopping(daq: CommandLine) -> None:
+def test_a_broken_configuration_is_reported_and_prevents_no_stop(daq: CommandLine) -> None:
     Path("daq.toml").write_text("[robot\n")
     said = daq("stop")
     assert said.code == 3
@@ -99,9 +103,7 @@ def test_a_configuration_that_cannot_be_read_is_told_and_stops_nobody_from_stopp
     assert "not TOML" in said.out
 
 
-def test_with_a_service_by_default_what_is_moved_from_here_is_stopped_too(
-    daq: CommandLine, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_stop_at_a_default_service_stops_local_robots_too(daq: CommandLine, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DAQ_SERVER", "http://127.0.0.1:1")
     Path("mine.toml").touch()
     with stop_listener("another"):  # does not answer
@@ -111,7 +113,7 @@ def test_with_a_service_by_default_what_is_moved_from_here_is_stopped_too(
     assert [answer["robot"] for answer in named] == ["ma2000"]
 
 
-def test_a_port_that_is_named_goes_before_the_service_by_default(
+def test_a_named_port_goes_before_the_default_service(
     daq: CommandLine, mock: MockProcess, port: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DAQ_SERVER", "http://127.0.0.1:1")
@@ -122,15 +124,30 @@ def test_a_port_that_is_named_goes_before_the_service_by_default(
     assert daq("--port", port, "reset").code == 0
 
 
+@contextmanager
+def moving_process(answer: StopAnswer) -> Iterator[None]:
+    """A process that moves a robot, and answers one stop."""
+
+    def answer_stop(listener: socket.socket) -> None:
+        connection, _ = listener.accept()
+        with connection:
+            connection.sendall(answer.to_json())
+
+    with stop_listener(answer.robot) as listener:
+        listener.setblocking(True)
+        thread = threading.Thread(target=answer_stop, args=(listener,))
+        thread.start()
+        yield
+        thread.join()
+
+
 @pytest.mark.parametrize("written", ["serial://{device}?baud=9600", "serial://{link}", "serial://{link}?baud=115200"])
-def test_a_port_whose_process_has_been_asked_is_not_opened_however_it_is_written(
-    daq: CommandLine, monkeypatch: pytest.MonkeyPatch, written: str
-) -> None:
+def test_a_port_whose_process_was_asked_is_not_opened_again(daq: CommandLine, written: str) -> None:
     device, link = Path("device").absolute(), Path("link").absolute()
     device.touch()
     link.symlink_to(device)
     answer = StopAnswer(robot="arm", port=f"serial://{device}", delivered=True, confirmed=True, tick=7)
-    monkeypatch.setattr("daq_cli.app.early_stop._asked", [StopAttempt(Path("arm-1.sock"), answer, 0.0)])
-    said = daq("--port", written.format(device=device, link=link), "stop")
+    with moving_process(answer):
+        said = daq("--port", written.format(device=device, link=link), "stop")
     assert said.code == 0, said
     assert said.out == "arm: stopped, confirmed by the board: set points frozen at tick 7\n"

@@ -6,6 +6,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,16 +21,16 @@ from daq.contracts.service.robot import StopResult
 from daq.contracts.service.teaching import TaughtPath, TeachingStatus
 from daq.teaching import RecordedPath
 from daq.teaching.program import Program, Wait
-from daq_cli.app.context import Invocation
-from daq_cli.robot.remote import companion, run, teach
+from daq_cli.app.consent import Consent
+from daq_cli.robot.remote import companion
 from daq_cli.robot.remote.companion import Companion
-from daq_cli.robot.remote.teach import Stopped, StoppedAtServerError, lead_at_server, perform_at_server
+from daq_cli.robot.remote.run import acquire_remotely
+from daq_cli.robot.remote.teach import RemoteTeaching, Stopped, StoppedAtServerError
 from tests.daq.client.service_stand_in import problem
 from tests.daq_cli.invoke import CommandLine
 
 FROZEN = StopResult(delivered=True, confirmed=True, tick=7, seconds=0.1, text="stopped, confirmed by the board")
 PROGRAM = Program(name="wait", instructions=(Wait(duration=1.0),))
-CALL = Invocation(server="http://arm.lab:8300")
 
 
 def refused(status: int, kind: str = "no") -> ServiceError:
@@ -80,11 +81,9 @@ def state(name: str) -> Callable[[], object]:
 # ---- an experiment in the queue
 
 
-@pytest.fixture(autouse=True)
-def _patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """However busy this computer is."""
-    monkeypatch.setattr(companion, "ENDS_WITHIN", 60.0)
-    monkeypatch.setattr(companion, "LEAVES_WITHIN", 60.0)
+def patient_companion(robot: Any, *, ends_within: float = 60.0) -> Companion:
+    """Keys beside experiment 1234, with time enough however busy this computer is."""
+    return Companion(robot, "1234", attends=False, ends_within=ends_within, leaves_within=60.0)
 
 
 @pytest.mark.parametrize(
@@ -92,11 +91,11 @@ def _patient(monkeypatch: pytest.MonkeyPatch) -> None:
     [raising(refused(status)) for status in (401, 429, 500, 503)] + [raising(ServiceNotReachedError("no answer"))],
     ids=["401", "429", "500", "503", "no answer"],
 )
-def test_a_cancel_that_is_not_carried_out_becomes_a_stop_that_is_told(
+def test_a_cancel_that_fails_becomes_a_stop_that_is_reported(
     cancel: Callable[[], object], capsys: pytest.CaptureFixture[str]
 ) -> None:
     robot: Any = Robot(cancel)
-    with Companion(robot, "1234", attends=False) as keys:
+    with patient_companion(robot) as keys:
         keys.press()
     assert robot.stops == 1
     assert robot.patience == [companion.ANSWER_WITHIN]
@@ -105,28 +104,25 @@ def test_a_cancel_that_is_not_carried_out_becomes_a_stop_that_is_told(
 
 
 @pytest.mark.parametrize("cancel", [state("running"), raising(refused(409, "experiment-state"))])
-def test_an_experiment_that_still_runs_after_its_cancel_is_stopped(
-    cancel: Callable[[], object], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(companion, "ENDS_WITHIN", 0.0)
+def test_an_experiment_that_still_runs_after_its_cancel_is_stopped(cancel: Callable[[], object]) -> None:
     stopped = threading.Event()
     robot: Any = Robot(cancel)
     robot.stop = lambda: stopped.set() or FROZEN
-    with Companion(robot, "1234", attends=False) as keys:
+    with patient_companion(robot, ends_within=0.0) as keys:
         keys.press()
         assert stopped.wait(60)
 
 
-def test_what_waits_is_taken_back_and_nobody_else_is_stopped() -> None:
+def test_a_key_cancels_a_waiting_experiment_and_stops_no_other() -> None:
     robot: Any = Robot(state("cancelled"))
-    with Companion(robot, "1234", attends=False) as keys:
+    with patient_companion(robot) as keys:
         keys.press()
     assert (robot.stops, len(robot.patience)) == (0, 1)
 
 
-def test_the_end_of_the_experiment_needs_no_stop() -> None:
+def test_an_experiment_that_has_ended_is_not_stopped() -> None:
     robot: Any = Robot(raising(refused(404)))
-    with Companion(robot, "1234", attends=False) as keys:
+    with patient_companion(robot) as keys:
         keys.press()
     assert robot.stops == 0
 
@@ -135,7 +131,7 @@ def test_the_third_key_leaves_and_the_stop_is_sent_all_the_same() -> None:
     robot: Any = Robot(state("running"))
 
     def leave() -> None:
-        with Companion(robot, "1234", attends=False) as keys:
+        with patient_companion(robot) as keys:
             for _ in range(3):
                 keys.press()
             raise KeyboardInterrupt
@@ -145,15 +141,21 @@ def test_the_third_key_leaves_and_the_stop_is_sent_all_the_same() -> None:
     assert robot.stops >= 1
 
 
-def test_the_word_that_somebody_is_there_keeps_no_stop_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(companion, "ATTEND_EVERY", 0.0)
+def test_confirming_that_an_operator_is_present_delays_no_stop() -> None:
     robot: Any = Robot()
-    with Companion(robot, "1234", attends=True):
+    with Companion(robot, "1234", attends=True, attend_every=0.0):
         assert robot.attended.wait(60)
     assert robot.patience[0] == companion.ANSWER_WITHIN
 
 
-def test_a_queue_that_is_paused_while_the_operator_is_asked_stays_paused(monkeypatch: pytest.MonkeyPatch) -> None:
+class Agreeing(Consent):
+    """An operator who agrees when asked."""
+
+    def agreed(self, url: str) -> bool:
+        return bool(url)
+
+
+def test_a_queue_that_is_paused_while_the_operator_is_asked_stays_paused() -> None:
     def status(paused: bool) -> SimpleNamespace:
         queue = SimpleNamespace(paused=paused, reason="paused by bert: a guest is at the arm")
         identity = SimpleNamespace(simulated=False)
@@ -161,18 +163,12 @@ def test_a_queue_that_is_paused_while_the_operator_is_asked_stays_paused(monkeyp
 
     answers = [status(False), status(True)]
     resumed: list[dict[str, bool]] = []
-    robot = SimpleNamespace(
+    robot: Any = SimpleNamespace(
         status=lambda: answers.pop(0), queue=SimpleNamespace(resume=lambda **word: resumed.append(word))
     )
 
-    @contextmanager
-    def reached(_call: Invocation) -> Iterator[SimpleNamespace]:
-        yield robot
-
-    monkeypatch.setattr(run, "remote_robot", reached)
-    monkeypatch.setattr("daq_cli.app.consent.agreed", lambda *_: True)
     with pytest.raises(SafetyError, match="a guest is at the arm"):
-        run.acquire_remotely(CALL, ExperimentSpec(), Invocation().trace_folder, False)
+        acquire_remotely(robot, "http://arm.lab:8300", ExperimentSpec(), Path("traces"), Agreeing(given=False))
     assert resumed == []
 
 
@@ -202,31 +198,36 @@ def test_without_a_key_nothing_is_stopped() -> None:
     assert robot.stops == 0
 
 
-@pytest.fixture
-def control(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
-    """Of the robot `control.robot`."""
-    found = SimpleNamespace(robot=Robot(), lease=None, lead=lambda _: None)
+class Control:
+    """The control of `robot`, for as long as the block lasts. What a test does not set does nothing."""
+
+    def __init__(self) -> None:
+        self.robot: Any = Robot()
+        self.lease = None
+        self.perform: Callable[[object], None] = lambda _: None
+        self.lead: Callable[[object], None] = lambda _: None
+        self.finish: Callable[[], object] = lambda: None
 
     @contextmanager
-    def held(_call: Invocation, _consent: bool) -> Iterator[tuple[Robot, SimpleNamespace]]:
-        yield found.robot, found
-
-    monkeypatch.setattr(teach, "controlled", held)
-    return found
+    def held(self) -> Iterator[tuple[Any, Any]]:
+        yield self.robot, self
 
 
-def test_a_program_that_ends_while_the_stop_is_in_flight(
-    control: SimpleNamespace, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.fixture
+def control() -> Control:
+    return Control()
+
+
+def test_a_program_that_ends_while_the_stop_is_in_flight(control: Control, capsys: pytest.CaptureFixture[str]) -> None:
     control.perform = lambda _: signal.raise_signal(signal.SIGINT)
     with pytest.raises(StoppedAtServerError):
-        perform_at_server(CALL, PROGRAM, consent=True)
+        RemoteTeaching(control.held()).perform(PROGRAM)
     assert control.robot.stops == 1
     assert capsys.readouterr().out == ""
 
 
 @pytest.mark.parametrize("finish", [None, refused(503, "not-reached")])
-def test_a_lead_that_is_stopped_keeps_its_path(control: SimpleNamespace, finish: ServiceError | None) -> None:
+def test_a_lead_that_is_stopped_keeps_its_path(control: Control, finish: ServiceError | None) -> None:
     """The path is there only when the lead has ended, which is after the answer to the stop."""
     path = TaughtPath(joints=(1,), times=(0.0, 0.1), positions=((0.0,), (0.1,)))
     ended = TeachingStatus(activity="none", problem="the arm has been stopped", path=path)
@@ -243,7 +244,7 @@ def test_a_lead_that_is_stopped_keeps_its_path(control: SimpleNamespace, finish:
     control.lead = lambda _: signal.raise_signal(signal.SIGINT)
     control.finish = end
     with pytest.raises(StoppedAtServerError):
-        lead_at_server(CALL, (1,), 60.0, kept.append, consent=True)
+        RemoteTeaching(control.held()).lead((1,), 60.0, kept.append)
     assert [one.joints for one in kept] == [(1,)]
 
 
@@ -263,7 +264,7 @@ def asked_for_names(monkeypatch: pytest.MonkeyPatch) -> list[float | None]:
     return waited
 
 
-def test_a_service_that_does_not_answer_is_told_at_once(
+def test_a_service_that_does_not_answer_a_stop_is_reported_at_once(
     daq: CommandLine, asked_for_names: list[float | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def silent(url: str, **_: object) -> httpx.Response:
@@ -276,7 +277,7 @@ def test_a_service_that_does_not_answer_is_told_at_once(
     assert asked_for_names == []
 
 
-def test_a_robot_of_another_name_is_stopped_and_the_name_that_is_not_known_is_told_first(
+def test_a_stop_with_an_unknown_name_says_so_and_stops_the_robots_of_the_service(
     daq: CommandLine, asked_for_names: list[float | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def post(url: str, **_: object) -> httpx.Response:
@@ -294,7 +295,7 @@ def test_a_robot_of_another_name_is_stopped_and_the_name_that_is_not_known_is_to
     assert asked_for_names[0] <= 1.0
 
 
-def test_a_token_that_no_header_can_carry_is_told_and_not_shown(
+def test_a_token_that_is_not_ascii_is_refused_without_being_shown(
     daq: CommandLine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DAQ_TOKEN", "daq_schlüssel")

@@ -36,7 +36,7 @@ def kinds() -> list[str]:
     return [one.kind for one in load_program(FILE).instructions]
 
 
-def test_the_list_numbers_what_the_other_commands_take(daq: CommandLine) -> None:
+def test_the_list_shows_the_numbers_that_other_commands_take(daq: CommandLine) -> None:
     lines = daq(*EDIT, "list", FILE).out.splitlines()
     assert lines == [
         "pick, for ma2000: 4 instructions",
@@ -50,13 +50,13 @@ def test_the_list_numbers_what_the_other_commands_take(daq: CommandLine) -> None
     ) == load_program(FILE)
 
 
-def test_a_program_does_not_command_the_terminal(daq: CommandLine) -> None:
+def test_control_characters_in_a_program_are_not_printed(daq: CommandLine) -> None:
     FILE.write_text(FILE.read_text().replace('"name"', '"machine": "a\\u001b[2J", "name"', 1))
     said = daq(*EDIT, "list", FILE)
     assert "\x1b" not in said.out + said.err
 
 
-def test_deleting_moving_and_renaming(daq: CommandLine) -> None:
+def test_instructions_are_deleted_and_moved_and_programs_renamed(daq: CommandLine) -> None:
     assert daq(*EDIT, "delete", FILE, 2).out == "pick.json: 3 instructions\n"
     assert kinds() == ["absolute", "relative", "gripper"]
     assert daq(*EDIT, "move", FILE, 3, 1).code == 0
@@ -69,23 +69,25 @@ def test_deleting_moving_and_renaming(daq: CommandLine) -> None:
     ("options", "made"),
     [
         ("--wait 2", Wait(duration=2)),
-        ("--to 1=170,3=-20 --speed 5", Absolute(angles={1: math.radians(170), 3: math.radians(-20)},
-                                                speed=math.radians(5))),
+        (
+            "--to 1=170,3=-20 --speed 5",
+            Absolute(angles={1: math.radians(170), 3: math.radians(-20)}, speed=math.radians(5)),
+        ),
         ("--by 2=3", Relative(angles={2: math.radians(3)})),
         ("--output 3=on", SetOutput(line=3, on=True)),
         ("--input 0=off", AwaitInput(line=0, on=False)),
         ("--gripper open", Gripper(closed=False)),
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("place", [1, 5])
-def test_inserting(daq: CommandLine, options: str, made: object, place: int) -> None:
+def test_an_instruction_is_inserted_at_its_number(daq: CommandLine, options: str, made: object, place: int) -> None:
     said = daq(*EDIT, "insert", FILE, place, *options.split())
     assert said.code == 0, said.err
     assert load_program(FILE).instructions[place - 1] == made
     assert len(kinds()) == 5
 
 
-def test_changing_speed_pause_and_posture(daq: CommandLine) -> None:
+def test_speed_pause_and_posture_of_an_instruction_are_changed(daq: CommandLine) -> None:
     assert daq(*EDIT, "change", FILE, 1, "--speed", "20", "--angles", "2=50").code == 0
     assert daq(*EDIT, "change", FILE, 2, "--wait", "0.5").code == 0
     first, second, *_ = load_program(FILE).instructions
@@ -118,7 +120,7 @@ def test_changing_speed_pause_and_posture(daq: CommandLine) -> None:
         ("delete missing.json 1", 2, ("missing.json", "cannot be read")),
     ],
 )
-def test_what_is_not_possible_leaves_the_file_as_it_was(
+def test_a_refused_change_leaves_the_file_as_it_was(
     daq: CommandLine, words: str, code: int, expected: tuple[str, ...]
 ) -> None:
     before = FILE.read_bytes()
@@ -134,9 +136,11 @@ def test_the_only_instruction_stays(daq: CommandLine) -> None:
     assert kinds() == ["gripper"]
 
 
-def test_a_program_that_was_outside_the_limits_can_be_mended(daq: CommandLine) -> None:
-    FILE.write_text('{"name": "low", "instructions": [{"kind": "absolute", "angles": {"2": -1.5}}, '
-                    '{"kind": "absolute", "angles": {"2": -1.4}}]}')  # fmt: skip
+def test_a_program_outside_the_limits_can_be_corrected_step_by_step(daq: CommandLine) -> None:
+    FILE.write_text(
+        '{"name": "low", "instructions": [{"kind": "absolute", "angles": {"2": -1.5}}, '
+        '{"kind": "absolute", "angles": {"2": -1.4}}]}'
+    )
     assert daq(*EDIT, "change", FILE, 1, "--angles", "2=45").code == 0
     assert daq(*EDIT, "change", FILE, 2, "--angles", "2=50").code == 0
 

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import pytest
 
 from daq.driver import Controller
-from daq.driver.controller import Identity
 from daq.transport import MockPort, parse_port_url
 from daq.transport.mock_process import MockProcess, start_mock
 from tests.daq_cli.board import ask, held
 from tests.daq_cli.invoke import CommandLine
+from tests.daq_cli.operator import asked_operator, pretend_real_arm
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def test_a_joint_off_its_set_point_gets_no_drive_until_the_set_point_is_where_it
 def test_a_real_arm_gets_no_gains_without_consent(
     daq: CommandLine, mock: MockProcess, port: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Identity, "simulated", property(lambda _: False))
+    pretend_real_arm(monkeypatch)
     before = held(mock)
     daq("--port", port, "gains", "set", "3=4/0/0").complains(4, "is a real arm", "--yes")
     assert held(mock) == before
@@ -61,12 +61,16 @@ def test_a_real_arm_gets_no_gains_without_consent(
 def test_teaching_asks_at_the_terminal_before_a_real_arm_moves(
     daq: CommandLine, mock: MockProcess, port: str, monkeypatch: pytest.MonkeyPatch, says: bool
 ) -> None:
-    asked = []
-    monkeypatch.setattr(Identity, "simulated", property(lambda _: False))
-    monkeypatch.setattr("daq_cli.commands.teach.agreed", lambda url: asked.append(url) or says)
+    asked: list[str] = []
+
+    def answer(question: str) -> bool:
+        asked.append(question)
+        return says
+
+    asked_operator(monkeypatch, answer)
     before = held(mock)
     said = daq("--port", port, "teach", "step", "--by", "1=1")
-    assert asked == [port]
+    assert asked == [f"{port} is a real arm, and it will move. Is its workspace clear?"]
     assert said.code == (0 if says else 4), said.err
     assert (held(mock) == before) is not says
 

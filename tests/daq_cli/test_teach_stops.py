@@ -49,7 +49,9 @@ def wait_for(mock: MockProcess, name: str, value: object, periods: int = 0) -> N
 
 
 @STOPS
-def test_a_jog_that_is_stopped(daq: CommandLine, mock: MockProcess, port: str, stop: Stop) -> None:
+def test_ctrl_c_ends_a_jog_with_the_exit_code_of_a_stop(
+    daq: CommandLine, mock: MockProcess, port: str, stop: Stop
+) -> None:
     with at_a_terminal(["--port", port, "teach", "jog"]) as person:
         person.until(b"joint 1 ")
         person.type(RIGHT)
@@ -62,7 +64,7 @@ def test_a_jog_that_is_stopped(daq: CommandLine, mock: MockProcess, port: str, s
     assert frozen
 
 
-def test_a_jog_shows_what_the_keys_drive_and_ends_with_q(mock: MockProcess, port: str) -> None:
+def test_a_jog_shows_joint_and_speed_and_ends_with_q(mock: MockProcess, port: str) -> None:
     with at_a_terminal(["--port", port, "teach", "jog", "--speed", "8"]) as person:
         person.until("joint 1   8.0°/s".encode())
         person.type(b"3+")
@@ -110,7 +112,9 @@ def test_a_lead_that_enter_ends_gives_the_gains_back(mock: MockProcess, port: st
 
 
 @STOPS
-def test_a_program_that_is_stopped(daq: CommandLine, mock: MockProcess, port: str, stop: Stop) -> None:
+def test_ctrl_c_ends_a_program_with_the_exit_code_of_a_stop(
+    daq: CommandLine, mock: MockProcess, port: str, stop: Stop
+) -> None:
     Path("wait.json").write_text(json.dumps({"name": "wait", "instructions": [{"kind": "wait", "duration": 3600}]}))
     with at_a_terminal(["--port", port, "teach", "program", "wait.json"]) as person:
         person.until(b"instruction 1 of 1")

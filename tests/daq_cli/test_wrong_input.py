@@ -40,11 +40,11 @@ from tests.daq_cli.invoke import CommandLine
         ("--config missing.toml run ramp", ("missing.toml", "no such file")),
     ],
 )
-def test_a_command_that_cannot_be_meant(daq: CommandLine, words: str, expected: tuple[str, ...]) -> None:
+def test_wrong_options_are_refused_in_one_line(daq: CommandLine, words: str, expected: tuple[str, ...]) -> None:
     daq(*words.split()).complains(2, *expected)
 
 
-def test_a_port_that_is_no_url(daq: CommandLine) -> None:
+def test_a_port_that_is_no_url_is_refused(daq: CommandLine) -> None:
     daq("--port", "/dev/ttyUSB0", "run", "ramp").complains(2, "must begin with serial://", "serial:///dev/ttyUSB0")
 
 
@@ -57,7 +57,7 @@ def test_a_port_that_is_no_url(daq: CommandLine) -> None:
     ],
     ids=["range", "speed", "below"],
 )
-def test_a_dry_run_says_what_speaks_against_a_motion(daq: CommandLine, words: str, expected: tuple[str, ...]) -> None:
+def test_a_dry_run_names_the_violated_limits(daq: CommandLine, words: str, expected: tuple[str, ...]) -> None:
     said = daq("run", "ramp", "--dry-run", *words.split())
     assert said.code == 4
     assert said.err.count("\n") == 1
@@ -80,18 +80,18 @@ def test_a_folder_that_cannot_be_written_to_moves_nothing(daq: CommandLine, mock
     assert held(mock) == before
 
 
-def test_a_port_that_does_not_exist(daq: CommandLine) -> None:
+def test_a_port_that_does_not_exist_is_reported(daq: CommandLine) -> None:
     daq("--port", "serial:///dev/nowhere", "run", "ramp").complains(3, "/dev/nowhere does not exist", "daq ports")
 
 
-def test_nobody_at_a_tcp_port(daq: CommandLine) -> None:
+def test_a_tcp_port_without_a_listener_is_reported(daq: CommandLine) -> None:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         number = free.getsockname()[1]
         daq("--port", f"tcp://127.0.0.1:{number}", "run", "ramp").complains(3, f"nothing listens at 127.0.0.1:{number}")
 
 
-def test_a_port_that_is_taken(daq: CommandLine) -> None:
+def test_a_port_in_use_is_reported(daq: CommandLine) -> None:
     import os
     import pty
 
@@ -107,7 +107,7 @@ def test_a_port_that_is_taken(daq: CommandLine) -> None:
         os.close(slave)
 
 
-def test_a_memory_map_with_overlapping_registers(daq: CommandLine) -> None:
+def test_a_memory_map_with_overlapping_registers_is_refused(daq: CommandLine) -> None:
     from importlib import resources
 
     text = resources.files("firmware_protocol").joinpath("memory_map.toml").read_text("utf-8")
@@ -125,7 +125,7 @@ def test_a_memory_map_with_overlapping_registers(daq: CommandLine) -> None:
 
 
 @pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"no MCAP at all, but long enough to be looked at"])
-def test_a_file_that_is_no_trace(daq: CommandLine, content: bytes) -> None:
+def test_a_file_that_is_no_trace_is_refused(daq: CommandLine, content: bytes) -> None:
     Path("foreign.mcap").write_bytes(content)
     for command in ("show", "plot", "export"):
         daq("traces", command, "foreign.mcap").complains(2, "foreign.mcap")

@@ -132,19 +132,25 @@ def _damaged() -> list[dict[str, str]]:
         {"why": "a byte lost", "line": (good[:4] + good[5:]).hex()},
         {"why": "a zero inserted", "line": (good[:5] + b"\0" + good[5:]).hex()},
         {"why": "no closing delimiter", "line": good[:-1].hex()},
-        {"why": "length byte wrong, CRC right",
-         "line": (b"\0" + stuff(wrong_length + crc16(wrong_length).to_bytes(2, "big")) + b"\0").hex()},
+        {
+            "why": "length byte wrong, CRC right",
+            "line": (b"\0" + stuff(wrong_length + crc16(wrong_length).to_bytes(2, "big")) + b"\0").hex(),
+        },
         {"why": "zeros after the CRC leave it right", "line": (b"\0" + stuff(with_crc + b"\0\0") + b"\0").hex()},
         {"why": "shorter than header and CRC", "line": (b"\0" + stuff(b"\xff\xff") + b"\0").hex()},
         {"why": "CRC cut off", "line": (b"\0" + stuff(body) + b"\0").hex()},
         {"why": "stuffing points past the end", "line": (b"\0\xff" + good[2:]).hex()},
-        {"why": "49 bytes of payload, everything else right",
-         "line": "00" + _stuff_anything(too_long_body).hex() + "00"},
-        {"why": "the longest frame with a byte too many",
-         "line": (b"\0" + stuff(longest + crc16(longest).to_bytes(2, "big")) + b"\x01\0").hex()},
+        {
+            "why": "49 bytes of payload, everything else right",
+            "line": "00" + _stuff_anything(too_long_body).hex() + "00",
+        },
+        {
+            "why": "the longest frame with a byte too many",
+            "line": (b"\0" + stuff(longest + crc16(longest).to_bytes(2, "big")) + b"\x01\0").hex(),
+        },
         {"why": "noise without a zero", "line": (bytes(range(1, 256)) * 3).hex()},
         {"why": "delimiters only", "line": bytes(9).hex()},
-    ]  # fmt: skip
+    ]
 
 
 def _stuff_anything(body: bytes) -> bytes:
@@ -153,9 +159,18 @@ def _stuff_anything(body: bytes) -> bytes:
 
 def _cobs() -> list[dict[str, str]]:
     bodies = (
-        b"\0", b"\0\0", b"\x01", b"\x01\0", b"\0\x01", b"\x11\x22\0\x33", b"\x01\x02\x03\x04", bytes(MAX_BODY),
-        bytes(range(1, MAX_BODY + 1)), b"\xff" * MAX_BODY, b"\x01" * (MAX_BODY - 1) + b"\0",
-    )  # fmt: skip
+        b"\0",
+        b"\0\0",
+        b"\x01",
+        b"\x01\0",
+        b"\0\x01",
+        b"\x11\x22\0\x33",
+        b"\x01\x02\x03\x04",
+        bytes(MAX_BODY),
+        bytes(range(1, MAX_BODY + 1)),
+        b"\xff" * MAX_BODY,
+        b"\x01" * (MAX_BODY - 1) + b"\0",
+    )
     return [{"body": body.hex(), "stuffed": stuff(body).hex()} for body in bodies]
 
 

@@ -42,7 +42,7 @@ def table(title: str) -> list[list[str]]:
 # ---- frames
 
 
-def test_constants_of_the_frame() -> None:
+def test_the_frames_constants_are_those_of_the_document() -> None:
     constants = {name: int(value, 0) for name, value in table("Frames")}
     assert constants == {
         "largest payload, bytes": framing.MAX_PAYLOAD,
@@ -55,14 +55,14 @@ def test_constants_of_the_frame() -> None:
     }
 
 
-def test_figures_in_the_text_of_frames() -> None:
+def test_the_documents_figures_about_frames_are_right() -> None:
     largest = framing.MAX_PAYLOAD + framing.FRAME_OVERHEAD
     assert f"takes {largest * BITS_PER_BYTE / 115200 * 1000:.2f} ms at 115200 baud" in section("Frames")
     assert f"up to a zero, {framing.MAX_ENCODED} at most. When a {framing.MAX_ENCODED + 1}th" in section("Receiving")
     assert f"Version of the protocol: {c.PROTOCOL_VERSION}." in TEXT
 
 
-def test_a_frame_step_by_step() -> None:
+def test_the_documents_example_frame_is_what_the_code_makes() -> None:
     steps = {step: bytes.fromhex(data) for step, data in table("A frame step by step")}
     request = c.WriteSetPoints(((1, 500), (2, 508), (3, 515)))
     frame = c.to_frame(1, request, c.Stamp(0x10001, 1))
@@ -160,7 +160,7 @@ WHOLE = [m for m in MESSAGES if not isinstance(m, c.HelloReply) or m.session != 
 
 
 @pytest.mark.parametrize("message", WHOLE, ids=lambda message: type(message).__name__)
-def test_layouts_and_lengths(message: Message) -> None:
+def test_layouts_and_lengths_of_messages_are_those_of_the_document(message: Message) -> None:
     _, _, layout, length, *_ = documented_messages()[type(message).__name__]
     payload = c.to_frame(0, message, STAMP).payload
     values = read_payload(layout, payload)
@@ -175,7 +175,7 @@ def test_layouts_and_lengths(message: Message) -> None:
         assert len(payload) == int(fixed) + a_joint * values.get("mask", [0])[0].bit_count()
 
 
-def test_ranges_of_values() -> None:
+def test_ranges_of_values_are_those_of_the_document() -> None:
     ranges = {row[0]: row[1] for row in table("Values")}
 
     def limits(name: str) -> tuple[int, int]:
@@ -198,7 +198,7 @@ def test_ranges_of_values() -> None:
 @pytest.mark.parametrize(
     ("title", "kind"), [("Capabilities", c.Capability), ("Status flags", c.StatusFlag), ("Refusals", c.Refusal)]
 )
-def test_codes(title: str, kind: Iterable[Any]) -> None:
+def test_codes_are_those_of_the_document(title: str, kind: Iterable[Any]) -> None:
     assert {(int(row[0]), row[1]) for row in table(title)} == {(code.value, code.name) for code in kind}
 
 
@@ -232,7 +232,7 @@ def test_the_conversation_is_true_to_its_own_rules() -> None:
 # ---- units, memory, line
 
 
-def test_rounding_tables() -> None:
+def test_the_documents_rounding_tables_are_right() -> None:
     for posture, counts, _, reading, nearest in table("Units and rounding"):
         assert posture_to_counts(int(posture)) == int(counts)
         assert counts_to_posture(int(reading)) == int(nearest)
@@ -277,7 +277,7 @@ def most_joints(capacity: float, bytes_of: Any) -> str:
     return str(fitting[-1]) if fitting else "none"
 
 
-def test_line_rates() -> None:
+def test_the_documents_line_rates_are_right() -> None:
     memory_map = default_memory_map()
     wanted = [
         a for name in ("position", "error", "power") for i in range(3) for a in bytes_of_joint(memory_map, name, i)
@@ -309,7 +309,7 @@ def bytes_of_joint(memory_map: Any, name: str, index: int) -> list[int]:
     return [register.low[index], *([register.high[index]] if register.high else [])]
 
 
-def test_figures_in_the_text_of_line_rates() -> None:
+def test_the_documents_figures_about_line_rates_are_right() -> None:
     text = section("Line rate against what can be sampled")
     for joints in range(1, 7):
         assert sampled(joints) == 29 + 7 * joints

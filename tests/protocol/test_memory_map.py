@@ -53,7 +53,7 @@ MISTAKES = {
     "text for an address": ("[0xFC72]", '["FC72"]', r"gripper.low.0: Input should be a valid integer \(found 'FC72'\)"),
     "no list": ("low = [0xFC72]", "low = 0xFC72", "registers.gripper.low: "),
     "no such provenance": ('"documented", ', '"rumoured", ', r"'documented' or 'assumed' \(found 'rumoured'\)"),
-    "joint too few": (', 0xFC45]\nprov', ']\nprov', "registers.power: provenance has 6 entries, low has 5"),
+    "joint too few": (", 0xFC45]\nprov", "]\nprov", "registers.power: provenance has 6 entries, low has 5"),
     "unit": ('unit = "adc_count"', 'unit = "posture_unit"', "register position in posture_unit: allowed is adc_count"),
     "sign": ("bits = 16\nsigned = true", "bits = 16\nsigned = false", "register error must be signed"),
     "too many bits": ("bits = 12", "bits = 13", "register position has 13 bits: allowed are 12 to 12"),
@@ -61,7 +61,7 @@ MISTAKES = {
     "size beyond the end": ("size = 0x80", "size = 0x8000", "32768 bytes from FC00: the address space ends at FFFF"),
     "version": ("version = 1", "version = 2", r"version: Input should be 1 \(found 2\)"),
     "no TOML": ("version = 1", "version = ", "not TOML"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(("right", "wrong", "says"), MISTAKES.values(), ids=MISTAKES.keys())

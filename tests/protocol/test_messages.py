@@ -1,5 +1,7 @@
 """Every message packs into its payload and back; nothing else gets in, and only ProtocolError comes out."""
 
+import dataclasses
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -58,6 +60,24 @@ def test_a_command_travels_behind_its_stamp(
     assert c.stamp_of(frame) == c.Stamp(session, number)
     assert frame.payload[8:] == request.pack()
     assert c.parse_request(frame) == request
+
+
+@pytest.mark.parametrize(
+    ("kind", "field", "highest"),
+    [
+        (c.Advanced, "time_us", 2**64 - 1),
+        (c.Advanced, "tick", 2**32 - 1),
+        (c.Refused, "opcode", 2**8 - 1),
+        (c.Advance, "microseconds", 2**32 - 1),
+    ],
+)
+def test_a_number_fills_its_bytes_and_not_one_more(kind: type[c.Message], field: str, highest: int) -> None:
+    others = {each.name: 0 for each in dataclasses.fields(kind)}
+    message = kind(**others | {field: highest})
+    assert kind.parse(message.pack()) == message
+    for value in (-1, highest + 1):
+        with pytest.raises(ProtocolError, match=f"{field} of {value}: allowed are 0 to {highest}"):
+            kind(**others | {field: value})
 
 
 def test_a_stop_has_no_stamp_and_the_layout_of_version_1() -> None:
@@ -149,7 +169,7 @@ READING = c.JointReading(0, 0, 0, 0)
         (lambda: c.Stopped(1, (1, 2, 3)), "Stopped: 3 postures, expected 6"),
         (lambda: c.Stopped(1, (1, 2, 3, 4, 5, 1000)), "posture of joint 6 of 1000: allowed are 0 to 999"),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_sent_cannot_be_made(make: object, says: str) -> None:
     with pytest.raises(ProtocolError, match=says):
         make()  # type: ignore[operator]

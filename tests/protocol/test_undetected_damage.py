@@ -53,7 +53,7 @@ def test_syndromes_add_up(syndromes: list[int]) -> None:
     assert crc16(body) ^ crc16(bytes(MAX_BODY)) == reduce(xor, (syndromes[bit] for bit in wrong))
 
 
-def test_of_frames_damaged_worse_few_pass() -> None:
+def test_few_of_the_frames_with_worse_damage_pass() -> None:
     """A tenth of the campaign below: no way of damage is above the bound, and all of them are not far from it."""
     rates = _rates(25_000)
     assert sum(rates, Rate(0, 0)).damaged >= 200_000

@@ -30,26 +30,26 @@ def test_there_is_a_vector_for_every_message() -> None:
 
 
 @pytest.mark.parametrize("vector", VECTORS["crc"], ids=lambda v: v["data"][:20])
-def test_crc(vector: dict[str, str]) -> None:
+def test_every_crc_is_that_of_the_vectors(vector: dict[str, str]) -> None:
     data = bytes.fromhex(vector["data"])
     assert f"{crc16(data):04x}" == f"{second.crc_bit_by_bit(data):04x}" == vector["crc"]
 
 
 @pytest.mark.parametrize("vector", VECTORS["cobs"], ids=lambda v: v["body"][:20])
-def test_stuffing(vector: dict[str, str]) -> None:
+def test_stuffing_agrees_with_the_vectors(vector: dict[str, str]) -> None:
     body, stuffed = bytes.fromhex(vector["body"]), bytes.fromhex(vector["stuffed"])
     assert stuff(body) == second.stuff_byte_by_byte(body) == stuffed
     assert unstuff(stuffed) == second.unstuff_byte_by_byte(stuffed) == body
 
 
 @pytest.mark.parametrize("encoded", VECTORS["cobs_broken"])
-def test_broken_stuffing(encoded: str) -> None:
+def test_broken_stuffing_is_refused(encoded: str) -> None:
     with pytest.raises(ProtocolError):
         unstuff(bytes.fromhex(encoded))
 
 
 @pytest.mark.parametrize("vector", VECTORS["frames"], ids=lambda v: f"{v['message']} {v['sequence']}")
-def test_frames(vector: dict[str, Any]) -> None:
+def test_frames_agree_with_the_vectors(vector: dict[str, Any]) -> None:
     line = bytes.fromhex(vector["frame"])
     (frame,) = FrameDecoder().feed(line)
     message = c.parse_request(frame) if frame.opcode < 0x80 else c.parse_reply(frame)
@@ -69,7 +69,7 @@ def test_damaged_lines_hold_no_frame(vector: dict[str, str]) -> None:
 
 
 @pytest.mark.parametrize("vector", VECTORS["refused"], ids=lambda v: f"{v['opcode']:02x} {v['why']}")
-def test_refused_payloads(vector: dict[str, Any]) -> None:
+def test_payloads_that_must_be_refused_are_refused(vector: dict[str, Any]) -> None:
     parse = c.parse_request if vector["direction"] == "request" else c.parse_reply
     with pytest.raises(ProtocolError) as caught:
         parse(Frame(0, vector["opcode"], bytes.fromhex(vector["payload"])))
@@ -77,7 +77,7 @@ def test_refused_payloads(vector: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("dialogue", VECTORS["dialogues"], ids=lambda d: d["rule"])
-def test_dialogues_with_the_second_implementation(dialogue: dict[str, Any]) -> None:
+def test_the_second_implementation_passes_the_dialogues(dialogue: dict[str, Any]) -> None:
     """To the byte: the file says what its bridge said."""
     bridge, steps = second_bridge(), dialogue["steps"]
     for number, step in enumerate(steps):
@@ -91,7 +91,7 @@ def test_dialogues_with_the_second_implementation(dialogue: dict[str, Any]) -> N
 
 
 @pytest.mark.parametrize("dialogue", VECTORS["dialogues"], ids=lambda d: d["rule"])
-def test_dialogues_with_the_mock(dialogue: dict[str, Any]) -> None:
+def test_the_mock_passes_the_dialogues(dialogue: dict[str, Any]) -> None:
     chance = Random(dialogue["rule"])
     play(dialogue["steps"], mock(), lambda: chance.getrandbits(32))
 
@@ -124,7 +124,7 @@ def mock(**options: Any) -> PurePartner:
     return PurePartner(receive, {"period": lambda: after(20_000), "reset": reset, "bridge": start_again})
 
 
-def test_rounding() -> None:
+def test_rounding_agrees_with_the_vectors() -> None:
     for posture, counts in VECTORS["posture_to_counts"]:
         assert posture_to_counts(posture) == counts == (2 * posture * 4096 + 1000) // 2000
     for counts, posture in VECTORS["counts_to_posture"]:

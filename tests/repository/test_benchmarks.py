@@ -16,14 +16,11 @@ from benchmarks.undetected_damage import BOUND, WITHIN, Rate, verdict
 
 @pytest.mark.parametrize("name", ["startup", "main-job"])
 @pytest.mark.parametrize(("ended", "code"), [(0, 0), (1, 1), (-9, 1)])
-def test_a_benchmark_that_a_signal_ended_has_met_no_target(
-    monkeypatch: pytest.MonkeyPatch, name: str, ended: int, code: int
-) -> None:
+def test_a_benchmark_that_a_signal_ended_has_met_no_target(name: str, ended: int, code: int) -> None:
     def run(command: list[str], **_: object) -> Any:
         return subprocess.CompletedProcess(command, ended if "benchmarks.startup" in command else 0)
 
-    monkeypatch.setattr(subprocess, "run", run)
-    assert listing.main([name]) == code
+    assert listing.main([name], run) == code
 
 
 def test_the_stop_that_is_measured_knows_no_robot_of_the_caller(
@@ -36,10 +33,9 @@ def test_the_stop_that_is_measured_knows_no_robot_of_the_caller(
         told.update(options)
         return subprocess.CompletedProcess(command, 0)
 
-    monkeypatch.setattr(subprocess, "run", run)
     for name in ("DAQ_ROBOT__PORT", "DAQ_SERVER", "DAQ_CONFIG", "daq_robot__port", "XDG_CONFIG_HOME"):
         monkeypatch.setenv(name, "the caller's")
-    assert stop_command(tmp_path) == 0
+    assert stop_command(tmp_path, run) == 0
     assert told["cwd"] == tmp_path
     assert {name for name in told["env"] if name.upper().startswith("DAQ_")} == {"DAQ_RUNTIME_FOLDER"}
     assert "the caller's" not in told["env"].values()

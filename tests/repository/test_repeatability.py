@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import runpy
-import sys
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -21,8 +20,7 @@ def study(monkeypatch: pytest.MonkeyPatch, runs: str) -> None:
     robot = type("Robot", (), {"robot": lambda _: None})
     monkeypatch.setitem(main.__globals__, "run_once", lambda *_: next(overshoots))
     monkeypatch.setitem(main.__globals__, "Client", lambda *_: nullcontext(robot()))
-    monkeypatch.setattr(sys, "argv", ["repeatability.py", "http://nowhere", "--runs", runs])
-    main()
+    main(["http://nowhere", "--runs", runs])
 
 
 def test_the_spread_is_that_of_all_runs_estimated_from_these(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.server.queue_bench import Bench
+from tests.server.queue.bench import Bench
 from tests.server.service import Service, running_service
 
 
@@ -28,10 +28,12 @@ def service_of_jobs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Servic
 
 
 @pytest.fixture(scope="module")
-def sound_service(service_of_jobs: Service) -> Service:
-    """The same, its queue open, whatever the tests of another file left."""
+def sound_service(service_of_jobs: Service) -> Iterator[Service]:
+    """The same, connected while one file's tests need it, its queue open, whatever the tests of another file left."""
+    service_of_jobs.until_connected()
     service_of_jobs.robot.post("/queue/resume", json={})
-    return service_of_jobs
+    yield service_of_jobs
+    service_of_jobs.robot.post("/disconnect")
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ import pytest
 from websockets.sync.client import ClientConnection
 
 from daq.traces.reader import read_trace
+from tests.server.live.watching import frames, watching
 from tests.server.service import Service, running_service
-from tests.server.watching import frames, watching
 
 RAMP = {"trajectory": {"kind": "ramp", "amplitude": 0.2, "duration": 0.6}, "settle": 0.1, "hold": 0.3}
 LONG = {"trajectory": {"kind": "pause", "duration": 3000}, "joints": [1], "settle": 0, "hold": 0}
@@ -19,6 +19,7 @@ FIT = {"kind": "fit", "parameters": ["joint2.motor.*"]}
 DIAGNOSIS = {"kind": "diagnose", "joints": [2], "most_steps": 1, "effects": ["coulomb_friction"]}
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_a_day(tmp_path: Path) -> None:
     with running_service(tmp_path) as service:

@@ -151,7 +151,7 @@ def test_a_look_into_the_folder_while_a_trace_is_uploaded_takes_nothing_away(
 
     monkeypatch.setattr(Catalogue, "path_of", known)
     api.get("traces/none/data.mcap")
-    monkeypatch.setattr("server.catalogue.upload._read", then_looked)
+    monkeypatch.setattr("server.api.upload._read", then_looked)
     table = "time,position_1\n" + "\n".join(f"{0.02 * n:.2f},{0.001 * n}" for n in range(50))
     answer = api.post("traces", content=table, headers={"Content-Type": "text/csv"})
     assert answer.status_code == 201, answer.text

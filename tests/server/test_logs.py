@@ -13,7 +13,7 @@ from server.logs import PlainLines
 PROGRAM = """
 import logging, sys, threading, warnings
 from server import logs
-from server.jobs.desk import worker_processes
+from server.jobs.service import worker_processes
 
 if __name__ == "__main__":
     logs.begin()
@@ -41,9 +41,15 @@ def test_every_line_is_json_whoever_writes_it() -> None:
     told = _told(PROGRAM)
     texts = [line["text"] for line in told]
     expected = (
-        "a warning", "two lines", "of a library", "thread worker-of-a-test ended: division by zero",
-        "Compiling the simulation", "a warning of a worker", "as uvicorn says it", "what ends the process",
-    )  # fmt: skip
+        "a warning",
+        "two lines",
+        "of a library",
+        "thread worker-of-a-test ended: division by zero",
+        "Compiling the simulation",
+        "a warning of a worker",
+        "as uvicorn says it",
+        "what ends the process",
+    )
     for text in expected:
         assert sum(text in one for one in texts) >= 1, (text, texts)
     assert texts.count("two lines") == 1

@@ -1,4 +1,4 @@
-"""What the models of the service have in common."""
+"""Base of the service's models."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field
 
 
 class Wire(BaseModel):
-    """A message of the service. A field that nobody knows is refused, never ignored."""
+    """A message of the service. Unknown fields are refused, never ignored."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

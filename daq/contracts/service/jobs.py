@@ -11,10 +11,13 @@ from daq.contracts.service.base import Wire
 
 JobKind = Literal["fit", "validate", "compare", "diagnose"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
-"""As those of experiments; a job that is interrupted does not run again by itself either."""
+"""The same states as those of experiments; an interrupted job is not run again by itself either."""
+
+JobFailure = Literal["refused", "program-fault", "lost"]
+"""Why a job has no result: something spoke against it; a fault of the program; the process or the service ended."""
 
 MACHINE = "machine"
-"""Instead of a model's number: the model that the robot's machine file describes."""
+"""In place of a model's number: the model that the robot's machine file describes."""
 TraceNumber = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 TraceNumbers = Annotated[tuple[TraceNumber, ...], Field(min_length=1, max_length=200)]
 ModelNumber = Annotated[str, Field(pattern=r"^(machine|[0-9a-f]{12})$")]
@@ -32,18 +35,18 @@ class EffectChoice(Wire):
 
 
 class FitRequest(Wire):
-    """Finds the parameters with which a model best repeats traces. Fields as those of `daq fit`."""
+    """Estimates the parameters with which a model best reproduces traces. The fields are the options of `daq fit`."""
 
     kind: Literal["fit"] = "fit"
     traces: TraceNumbers
     held_out: tuple[TraceNumber, ...] = ()
-    """Traces to judge by, not fitted to."""
+    """Traces that are held out: the model is checked on them and not fitted to them."""
     model: ModelNumber = MACHINE
-    """What to begin from."""
+    """The model to start from."""
     effects: tuple[EffectChoice, ...] = ()
-    """Effects to add before."""
+    """Effects to add to the model before fitting."""
     parameters: tuple[Pattern, ...] | None = None
-    """What to find; None for all uncertain."""
+    """Parameters to estimate; None for all that are uncertain."""
     held: tuple[Pattern, ...] = ()
     bounds: dict[Pattern, tuple[Bound, Bound]] = Field(default_factory=dict)
     use_priors: StrictBool = True
@@ -52,11 +55,12 @@ class FitRequest(Wire):
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
     loop: Literal["closed", "open"] | None = None
     name: ModelName | None = None
-    """Of the model that is made."""
+    """Name of the resulting model."""
 
 
 class ValidateRequest(Wire):
-    """What would have to move, when, and against what, for a model to explain traces. Fields as of `daq validate`."""
+    """Validates a model against traces: which parameters would have to change, and when. The fields are the options of
+    `daq validate`."""
 
     kind: Literal["validate"] = "validate"
     traces: TraceNumbers
@@ -82,15 +86,13 @@ class DiagnoseRequest(Wire):
     held_out: tuple[TraceNumber, ...] = ()
     model: ModelNumber = MACHINE
     effects: tuple[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")], ...] | None = None
-    """Candidates; None for every effect known."""
+    """Candidate effects; None for all known ones."""
     joints: tuple[JointNumber, ...] | None = None
     most_steps: Annotated[int, Field(ge=1, le=10)] = 3
     name: ModelName | None = None
 
 
-JobRequest = Annotated[
-    FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest, Field(discriminator="kind")
-]  # fmt: skip
+JobRequest = Annotated[FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest, Field(discriminator="kind")]
 
 
 class KnownEffect(Wire):
@@ -114,9 +116,9 @@ class WaitsBehind(Wire):
     job: str
     request: JobRequest
     started: AwareDatetime | None
-    """None while that job waits, too."""
+    """When that job began; None while it waits too."""
     others: int
-    """Further jobs that come before."""
+    """Number of further jobs that come before."""
 
 
 class Job(Wire):
@@ -134,8 +136,10 @@ class Job(Wire):
     progress_text: str = ""
     reason: str = ""
     """Why it is not done, in one line."""
+    failure: JobFailure | None = None
+    """The same for programs; None where it was cancelled, or nothing failed."""
     headline: str = ""
-    """What it found, in one line."""
+    """The result in one line."""
     model: str | None = None
     """The model that it made."""
     has_report: bool = False
@@ -162,7 +166,8 @@ class ModelEntry(Wire):
 
 
 class ModelParameter(Wire):
-    """A parameter of a model, in its unit. `deviation`: of what is expected; None where nothing is claimed."""
+    """A parameter of a model, in its unit. `deviation` is the standard deviation of the expected value; None where
+    nothing is claimed."""
 
     name: str
     unit: str
@@ -198,6 +203,6 @@ class ModelLineage(Wire):
     machine: str
     """Identity of the model that the machine file describes, as a parent."""
     models: tuple[ModelEntry, ...]
-    """The oldest first."""
+    """The robot's models, oldest first."""
     jobs: tuple[Job, ...]
-    """The first submitted first."""
+    """Jobs in the order in which they were submitted."""

@@ -29,7 +29,7 @@ class SampleMessage(ControlPeriod):
     topic: Literal["sample"] = "sample"
     frozen: bool
     lateness: float
-    """s by which it came later than the quickest samples after their ticks: the link's jitter."""
+    """Delay (s) beyond that of the quickest samples after their ticks: the link's jitter."""
 
 
 class HistoryMessage(Wire):
@@ -56,13 +56,13 @@ class RecordEventMessage(Wire):
     joint: int | None
     host_time: float
     time: float
-    """s from the start of the record."""
+    """Time (s) from the start of the record."""
     experiment: str | None
     """The experiment whose record it is in."""
 
 
 class RobotMessage(Wire):
-    """How the robot is, and who may move it; sent when it changes."""
+    """State of the robot, and who may move it; sent when it changes."""
 
     topic: Literal["robot"] = "robot"
     connection: ConnectionState
@@ -93,7 +93,7 @@ class QueueMessage(Wire):
 
 
 class ProgressMessage(Wire):
-    """How far the experiment is that runs."""
+    """Progress of the running experiment."""
 
     topic: Literal["progress"] = "progress"
     experiment: str
@@ -102,7 +102,7 @@ class ProgressMessage(Wire):
 
 
 class JobMessage(Wire):
-    """A job that has changed, or gone on."""
+    """A job whose state or progress has changed."""
 
     topic: Literal["job"] = "job"
     job: Job
@@ -116,7 +116,7 @@ class EventMessage(Wire):
 
 
 class TeachingMessage(Wire):
-    """A line for whoever teaches."""
+    """A line for the operator who teaches."""
 
     topic: Literal["teaching"] = "teaching"
     text: str
@@ -138,10 +138,20 @@ class RefusedMessage(Wire):
 
 
 LiveMessage = Annotated[
-    SampleMessage | HistoryMessage | RecordEventMessage | RobotMessage | LinkMessage | QueueMessage | ProgressMessage
-    | JobMessage | EventMessage | TeachingMessage | ThinnedMessage | RefusedMessage,
+    SampleMessage
+    | HistoryMessage
+    | RecordEventMessage
+    | RobotMessage
+    | LinkMessage
+    | QueueMessage
+    | ProgressMessage
+    | JobMessage
+    | EventMessage
+    | TeachingMessage
+    | ThinnedMessage
+    | RefusedMessage,
     Field(discriminator="topic"),
-]  # fmt: skip
+]
 
 
 class LiveFrame(Wire):
@@ -153,7 +163,7 @@ class LiveFrame(Wire):
 
 
 class JogCommand(Wire):
-    """Drives joints for 0.3 s at most (rad/s); whoever holds the key repeats it."""
+    """Drives joints (rad/s) for at most 0.3 s; the client repeats it while the key is held."""
 
     lease: Annotated[str, Field(max_length=200)]
     velocities: dict[JointNumber, Velocity]

@@ -9,7 +9,7 @@ class FieldProblem(BaseModel):
     """One field of a request that cannot be accepted."""
 
     field: str
-    """Where it is, such as `spec.trajectory.amplitude`."""
+    """Path of the field, such as `spec.trajectory.amplitude`."""
     message: str
     """What is wrong with it, and what is allowed."""
 
@@ -20,11 +20,11 @@ class ProblemDetails(BaseModel):
     model_config = ConfigDict(extra="allow")
 
     type: str
-    """Which kind of problem: the end of an address in docs/service.md."""
+    """Kind of problem: the last part of an address in docs/service.md."""
     title: str
     status: int
     detail: str
-    """One line about this very case."""
+    """One line about this case."""
     advice: str = ""
     """What to do."""
     fields: tuple[FieldProblem, ...] = ()

@@ -27,11 +27,11 @@ class QueueStatus(Wire):
     """The experiment that runs."""
     waiting_for: str = ""
     attended_until: AwareDatetime | None = None
-    """On a real arm that may not run unattended: until when an operator has said to be there."""
+    """On a real arm that may not run unattended: until when an operator has confirmed being present."""
 
 
 class QueueResume(Wire):
-    """The operator's word that the queue may move the arm. A real arm needs `moves_real_arm`."""
+    """The operator's consent that the queue may move the arm. A real arm needs `moves_real_arm`."""
 
     moves_real_arm: StrictBool = False
 
@@ -41,7 +41,7 @@ class Control(Wire):
 
     holder: Literal["nobody", "client", "queue"]
     name: str | None = None
-    """Of the client."""
+    """Name of the client."""
     expires: AwareDatetime | None = None
     remaining: float | None = None
     """s until it lapses without a heartbeat."""

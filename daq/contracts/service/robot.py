@@ -43,7 +43,7 @@ class LinkStatus(Wire):
     state: Literal["connected", "degraded", "lost", "none"]
     counters: dict[str, float] = Field(default_factory=dict)
     age: float | None = None
-    """s since they were read."""
+    """Time (s) since they were read."""
 
 
 class RobotIdentity(Wire):
@@ -52,7 +52,7 @@ class RobotIdentity(Wire):
     simulated: bool
     protocol: int
     period: float
-    """s of control."""
+    """Control period (s)."""
     boots: int
 
 
@@ -90,19 +90,19 @@ class RobotSummary(Wire):
 
 
 class StopResult(Wire):
-    """What became of a stop. Anything but `confirmed`: use the emergency stop."""
+    """Result of a stop. Unless it is `confirmed`, use the emergency stop."""
 
     delivered: bool
-    """It is on the line to the controller."""
+    """Whether the stop has been written to the line to the controller."""
     confirmed: bool
-    """The board has said that its set points are frozen."""
+    """Whether the board has confirmed that its set points are frozen."""
     tick: int | None = None
     seconds: float
-    """From the request to this answer."""
+    """Time (s) from the request to this answer."""
     note: str = ""
     """What else is known: joints without drive, or why it was not confirmed."""
     text: str
-    """All of it in one line."""
+    """The whole result in one line."""
 
 
 class ResetRequest(Wire):

@@ -1,4 +1,4 @@
-"""How the service itself is, and who calls it."""
+"""State of the service itself, and the identity of the caller."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from daq.contracts.service.queue import Role
 
 
 def stop_port_after(port: int) -> int:
-    """Where the stop listener is that belongs to a service at `port`, unless the configuration says otherwise."""
+    """Port of the stop listener that belongs to a service at `port`, unless the configuration names another."""
     return port + 1 if port < 65535 else port - 1
 
 
@@ -22,7 +22,7 @@ class Health(Wire):
 
 
 class Me(Wire):
-    """Who the service takes the caller for."""
+    """The caller as the service identified it."""
 
     name: str
     role: Role
@@ -46,13 +46,13 @@ class SystemStatus(Wire):
 
     version: str
     uptime: float
-    """s."""
+    """Time (s) since the service started."""
     storage: StorageStatus
     live_clients: int
     live_dropped: int
     jobs_at_once: int
     short_jobs_at_once: int
-    """Further workers, for short jobs alone."""
+    """Number of further workers, for short jobs only."""
     unattended: bool
     stop_port: int
-    """Where a stop is answered even while the service is too busy to."""
+    """Port of the stop listener, which answers even while the service is too busy."""

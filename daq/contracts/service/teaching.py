@@ -15,7 +15,8 @@ Angle = Annotated[float, Field(ge=-7, le=7)]
 
 
 class JogRequest(Wire):
-    """Velocities (rad/s) of joints, kept up for 0.3 s at most: whoever holds the key repeats it. Empty: hold."""
+    """Velocities (rad/s) of joints, applied for at most 0.3 s: the client repeats the request while the key is held.
+    Empty: hold."""
 
     velocities: dict[JointNumber, Velocity]
 
@@ -45,7 +46,7 @@ class TaughtPath(Wire):
 
 
 class TeachingLine(Wire):
-    """A line for whoever teaches: a joint that is refused, an instruction that begins."""
+    """A line for the operator who teaches: a joint that is refused, an instruction that begins."""
 
     number: int
     at: AwareDatetime

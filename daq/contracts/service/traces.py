@@ -29,9 +29,9 @@ class CatalogueEntry(Wire):
     outcome: Outcome | None
     samples: int | None
     duration: float | None
-    """s between the first and the last sample."""
+    """Time (s) between the first and the last sample."""
     size: int
-    """Bytes."""
+    """Size of the file (bytes)."""
     operator: str | None
     experiment: str | None
     """The experiment of the queue that made it."""
@@ -68,7 +68,7 @@ class TraceSignals(Wire):
     id: str
     joints: tuple[int, ...]
     samples: int
-    """Before thinning."""
+    """Number of samples before thinning."""
     time: tuple[float, ...]
     position: tuple[tuple[float, ...], ...]
     set_point: tuple[tuple[float, ...], ...] | None = None

@@ -1,46 +1,51 @@
-"""Beside an experiment that a person waits for: keys that stop, and the word that somebody is there."""
+"""Beside an experiment that a person waits for: keys that stop, and confirmations that the person is present."""
 
 from __future__ import annotations
 
 import threading
 from contextlib import suppress
 from types import TracebackType
-from typing import Self
 
 from daq.client import Robot, ServiceError, ServiceNotReachedError
 from daq.contracts.service.experiments import ENDS
 from daq_cli.app.context import console
+from daq_cli.app.stop_keys import StopThread
 
 ATTEND_EVERY = 20.0
-"""s between two words that the operator is there; the service waits a minute for them."""
+"""s between two confirmations that an operator is present; the service waits a minute for one."""
 ANSWER_WITHIN = 1.0
-"""s for the service to answer these: what is late must not keep a stop waiting."""
+"""s for the service to answer a cancel or a confirmation: a late answer must not delay a stop."""
 ENDS_WITHIN = 1.0
-"""s for the end of an experiment to be told after its cancel; then the arm is stopped, which changes nothing where it
-has been."""
+"""s for an experiment to end after its cancel; then the arm is stopped, which changes nothing where it has stopped."""
 LEAVES_WITHIN = 5.0
-"""s in which a cancel and a stop have been answered, or never will be."""
+"""s within which a cancel and a stop are answered, if ever."""
 GONE = (404, 409)
-"""What the service says of an experiment that has ended by itself in this moment."""
+"""HTTP status of an experiment that has ended by itself at this moment."""
 
 
-class Companion:
-    """While entered, on a thread of its own: `press` takes the experiment back, or stops the arm; and on a real arm the
-    service is told again and again that somebody is there."""
+class Companion(StopThread):
+    """Within the block, on a thread of its own: `press` cancels the experiment, or stops the arm; and where `attends`,
+    for a real arm, the service is told at intervals that an operator is present."""
 
-    def __init__(self, robot: Robot, experiment: str, *, attends: bool) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        experiment: str,
+        *,
+        attends: bool,
+        attend_every: float = ATTEND_EVERY,
+        ends_within: float = ENDS_WITHIN,
+        leaves_within: float = LEAVES_WITHIN,
+    ) -> None:
+        super().__init__()
         self._robot = robot
         self._experiment = experiment
         self._attends = attends
-        self._wake = threading.Event()
-        self._pressed = False
+        self._attend_every = attend_every
+        self._ends_within = ends_within
+        self._leaves_within = leaves_within
         self._left = threading.Event()
         self._ended = False
-        self._thread = threading.Thread(target=self._wait, name="stop-keys", daemon=True)
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -48,27 +53,21 @@ class Companion:
         self._ended = kind is None
         self._left.set()
         self._wake.set()
-        self._thread.join(LEAVES_WITHIN)
-
-    def press(self) -> None:
-        """A key that stops. As quick as a signal wants it; again and again."""
-        if not self._pressed:  # a signal that interrupts this one finds its lock taken, and need not wake again
-            self._pressed = True
-            self._wake.set()
+        self._thread.join(self._leaves_within)
 
     def _wait(self) -> None:
-        while self._pressed or not self._left.is_set():  # a key that came before the end is never lost
-            woken = self._wake.wait(ATTEND_EVERY)
+        while self.pressed or not self._left.is_set():  # a key that came before the end is never lost
+            woken = self._wake.wait(self._attend_every)
             self._wake.clear()
-            if self._pressed:
-                self._pressed = False
+            if self.pressed:
+                self.pressed = False
                 self._stop()
             elif self._attends and not woken:
                 with suppress(ServiceError, ServiceNotReachedError):  # said again in time, or the service ends the run
                     self._robot.queue.attend(within=ANSWER_WITHIN)
 
     def _stop(self) -> None:
-        """Takes the experiment back; where its end is not known soon, the arm is stopped at every door there is."""
+        """Cancels the experiment; where its end is not known soon, stops the arm in every way there is."""
         try:
             if self._robot.experiments.cancel(self._experiment, within=ANSWER_WITHIN).state in ENDS:
                 return
@@ -79,7 +78,7 @@ class Companion:
         except ServiceNotReachedError as error:
             self._stop_arm(str(error))
             return
-        self._left.wait(ENDS_WITHIN)
+        self._left.wait(self._ends_within)
         if not self._ended:
             self._stop_arm("")
 

@@ -1,41 +1,173 @@
-"""The robot of the server that the command line names."""
+"""The robot of the service that the command line names."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq_cli.app.consent import require_consent
+from daq.contracts.errors import SpecError
+from daq_cli.app.consent import Consent
 from daq_cli.app.context import Invocation
+from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotView
+from daq_cli.robot.remote.connection import connected_status, controlled, remote_robot
 
 if TYPE_CHECKING:
+    from daq.acquisition.messages import Finished
+    from daq.acquisition.stop_socket import StopAnswer
     from daq.client import Robot
-    from daq.contracts.service.robot import RobotStatus
-
-TOKEN_VARIABLE = "DAQ_TOKEN"
-
-
-@contextmanager
-def remote_robot(call: Invocation) -> Iterator[Robot]:
-    """The robot of `call.server`; a service has one. Raises SpecError, ServiceError, ServiceNotReachedError."""
-    from daq.client import Client
-
-    assert call.server is not None
-    with Client(call.server, os.environ.get(TOKEN_VARIABLE) or None) as client:
-        yield client.robot()
+    from daq.contracts.experiment import ExperimentSpec, Gain
+    from daq.contracts.machine import Machine
+    from daq.contracts.service.robot import ProcessState, RobotStatus
+    from daq.teaching.program import Program
+    from daq.traces.catalogue import TraceSummary
+    from daq_cli.robot.pendant import Teaching
 
 
-def connected_status(robot: Robot) -> RobotStatus:
-    """The robot's status, after the service has connected to it. Raises ServiceError when it cannot."""
-    status = robot.status()
-    return status if status.identity is not None else robot.connect()
+@dataclass
+class RemoteRobot:
+    """`RobotAccess` through a service."""
+
+    call: Invocation
+    server: str
+
+    @cached_property
+    def machine(self) -> Machine:
+        """The service's machine file. Raises ServiceError, ServiceNotReachedError."""
+        with remote_robot(self.call) as robot:
+            return robot.machine()
+
+    def require_reached(self) -> None:
+        """Has the service connect to its robot."""
+        with remote_robot(self.call) as robot:
+            connected_status(robot)
+
+    def view(self) -> RobotView:
+        """The state that the service knows; an old sample has its age with it."""
+        from daq.contracts.status import report_of
+
+        with remote_robot(self.call) as robot:
+            found = robot.status()
+            gains = robot.gains().gains if found.limp else {}
+        return RobotView(report_of(found, self.server), _headline(found), gains)
+
+    def gains(self) -> Mapping[int, Gain]:
+        """The gains that the service has read."""
+        with remote_robot(self.call) as robot:
+            return robot.gains().gains
+
+    def set_gains(self, wanted: Mapping[int, Gain], consent: Consent, written: Callable[[int, Gain], None]) -> str:
+        """The service refuses it for a joint off its set point."""
+        from daq.contracts.limp import limp_line
+
+        with controlled(self.call, consent) as (_, control):
+            found = control.set_gains(wanted).gains
+        for joint in wanted:
+            written(joint, found[joint])
+        return limp_line(found)
+
+    def process(self) -> ProcessState:
+        """The signals that the service reads now."""
+        with remote_robot(self.call) as robot:
+            return robot.process()
+
+    def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+        """Takes the control of the robot for a moment."""
+        with controlled(self.call, consent) as (_, control):
+            return control.set_output(output, on=on, while_stopped=while_stopped)
+
+    def set_gripper(self, *, closed: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+        """Takes the control of the robot for a moment."""
+        with controlled(self.call, consent) as (_, control):
+            return control.set_gripper(closed=closed, while_stopped=while_stopped)
+
+    def stop(self, reached: set[str]) -> list[StopAnswer]:
+        """Stops the robots of the service."""
+        del reached  # those are processes of this computer
+        from daq_cli.robot.remote.stop import stop_at_server
+
+        return stop_at_server(self.call)
+
+    def reset(self, *, here: bool) -> ResetDone:
+        """Has the service end the stop."""
+        with remote_robot(self.call) as robot:
+            return ResetDone(robot.reset(here=here).text)
+
+    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent) -> Finished:
+        """Queues the experiment at the service."""
+        del machine  # the service has its own
+        from daq_cli.robot.remote.run import acquire_remotely
+
+        with remote_robot(self.call) as robot:
+            return acquire_remotely(robot, self.server, spec, folder, consent)
+
+    def list_traces(self, folder: Path | None) -> tuple[Sequence[TraceSummary], str]:
+        """The traces of the service's catalogue."""
+        del folder
+        from daq_cli.robot.remote.traces import summary
+
+        with remote_robot(self.call) as robot:
+            return [summary(entry) for entry in robot.traces.list()][::-1], self.server
+
+    def find_trace(self, folder: Path, wanted: str) -> Path:
+        """A file of this computer, else a trace of the service, which is fetched. Raises TraceError."""
+        if Path(wanted).is_file():
+            from daq.traces.catalogue import find_trace
+
+            return find_trace(folder, wanted, self.call.trace_limits)
+        from daq_cli.robot.remote.traces import fetched_trace
+
+        return fetched_trace(self.call, folder, wanted)
+
+    def import_trace(self, file: Path, folder: Path | None) -> ImportedTrace:
+        """Sends the file to the service, which has a folder of its own."""
+        del folder
+        with remote_robot(self.call) as robot:
+            entry = robot.traces.upload(file)
+        return ImportedTrace(entry.id, entry.file, f"{entry.id}: {entry.file} at {self.server}")
+
+    def program(self, name: Path) -> Program:
+        """A program in a file of this computer, else one that the service keeps. Raises SpecError."""
+        from daq.teaching.program import load_program
+
+        if name.exists():
+            return load_program(name)
+        with remote_robot(self.call) as robot:
+            return kept_program(robot, str(name))
+
+    def teaching(self, consent: Consent) -> Teaching:
+        """Teaching with the control of the service's robot."""
+        from daq_cli.robot.remote.teach import RemoteTeaching
+
+        return RemoteTeaching(controlled(self.call, consent))
+
+    def service(self, what: str) -> AbstractContextManager[Robot]:
+        """The client of the service's robot."""
+        del what
+        return remote_robot(self.call)
+
+    def require_local(self, why: str) -> None:
+        """Raises SpecError."""
+        raise SpecError(why)
 
 
-def require_word(status: RobotStatus, consent: bool, what: str = "it will move", refused: str = "it moves") -> bool:
-    """Whether the robot is a real arm; the operator is asked about one. Raises SafetyError without their word."""
-    real = status.identity is not None and not status.identity.simulated
-    where = f"{status.robot} at the server ({status.port})"
-    require_consent(where, simulated=not real, consent=consent, what=what, refused=refused)
-    return real
+def kept_program(robot: Robot, name: str) -> Program:
+    """A program that the service keeps. Raises SpecError, and what the service refuses."""
+    from daq.teaching.program import Program, is_program_name
+
+    if not is_program_name(name):
+        raise SpecError(f"program {name!r}: there is no such file, and no program of a service is called so")
+    return robot.programs.get(Program, name)[0]
+
+
+def _headline(found: RobotStatus) -> str:
+    if found.identity is None:
+        problem = f": {found.connection_problem}" if found.connection_problem else ""
+        return f"{found.robot}: {found.connection}{problem}"
+    kind = "mock" if found.identity.simulated else "REAL ARM"
+    tick = "" if found.sample is None else f", tick {found.sample.tick}, {found.sample.age * 1e3:.0f} ms old"
+    cause = f" ({found.cause})" if found.cause else ""
+    return f"{kind}{tick}, {found.arm}{cause}; {found.activity}; link {found.link.state}"

@@ -6,14 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.client import Robot, ServiceNotReachedError
+from daq.contracts import exit_codes
 from daq.contracts.errors import SafetyError, TraceError
 from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.live import EventMessage, LiveMessage, ProgressMessage, QueueMessage, RecordEventMessage
-from daq_cli.app.context import Invocation
+from daq_cli.app.consent import Consent
 from daq_cli.app.stop_keys import StopKeys
+from daq_cli.robot.answers import AcquisitionFailedError
 from daq_cli.robot.remote.companion import Companion
-from daq_cli.robot.remote.robot import connected_status, remote_robot, require_word
-from daq_cli.robot.run_result import AcquisitionFailedError, ShownRun, shown_run
+from daq_cli.robot.remote.connection import connected_status, require_consent
+from daq_cli.robot.run_display import RunDisplay, run_display
 
 if TYPE_CHECKING:
     from daq.acquisition.messages import Finished
@@ -22,67 +24,70 @@ if TYPE_CHECKING:
     from daq.contracts.service.experiments import Experiment
     from daq.contracts.service.robot import RobotStatus
 
-EXIT_CODES = {"failed": 4, "cancelled": 6, "interrupted": 3}
-"""Of an experiment that has left no trace."""
-LOOK_EVERY = 2.0
-"""s without news after which the experiment is looked at."""
-LOOKS_IN_VAIN = 5
-"""After so many the service counts as lost."""
+EXIT_CODES = {
+    "failed": exit_codes.REFUSED,
+    "cancelled": exit_codes.STOPPED,
+    "interrupted": exit_codes.NOT_REACHED,
+}
+"""Exit code by the state of an experiment that has left no trace."""
+POLL_EVERY = 2.0
+"""s without a message after which the experiment is polled."""
+FAILED_POLLS = 5
+"""Failed polls after which the service counts as lost."""
 
 
-def acquire_remotely(call: Invocation, spec: ExperimentSpec, folder: Path, consent: bool) -> Finished:
+def acquire_remotely(robot: Robot, server: str, spec: ExperimentSpec, folder: Path, consent: Consent) -> Finished:
     """Queues `spec`, follows it to its end, and fetches its trace into `folder`.
 
     Ctrl-C takes it back, or stops the arm where it runs. Raises AcquisitionFailedError, and what the service refuses.
     """
-    with remote_robot(call) as robot:
-        status = connected_status(robot)
-        _require_open_queue(call, status)
-        real = require_word(status, consent)
-        if real:
-            _require_open_queue(call, robot.status())  # the question may have stood there for minutes
-            robot.queue.resume(moves_real_arm=True)
-        with StopKeys() as keys, robot.live("events", "queue") as stream:
-            experiment = robot.experiments.submit(spec)
-            with Companion(robot, experiment.id, attends=real) as companion, shown_run(spec) as shown:
-                keys.stops(companion.press)
-                try:
-                    ended = _Follower(robot, experiment.id, shown).follow(stream)
-                finally:
-                    keys.stops(lambda: None)
-        return _finished(robot, ended, folder)
+    status = connected_status(robot)
+    _require_open_queue(server, status)
+    real = require_consent(status, consent)
+    if real:
+        _require_open_queue(server, robot.status())  # the question may have stood there for minutes
+        robot.queue.resume(moves_real_arm=True)
+    with StopKeys() as keys, robot.live("events", "queue") as stream:
+        experiment = robot.experiments.submit(spec)
+        with Companion(robot, experiment.id, attends=real) as companion, run_display(spec) as display:
+            keys.stops(companion.press)
+            try:
+                ended = _Follower(robot, experiment.id, display).follow(stream)
+            finally:
+                keys.stops(lambda: None)
+    return _finished(robot, ended, folder)
 
 
-def _require_open_queue(call: Invocation, status: RobotStatus) -> None:
-    """What lies in a queue that is paused would begin when somebody else resumes it."""
+def _require_open_queue(server: str, status: RobotStatus) -> None:
+    """Raises SafetyError: an experiment in a paused queue would begin whenever somebody else resumes it."""
     if status.queue.paused:
         raise SafetyError(
             f"the queue of {status.robot} is paused ({status.queue.reason}): nothing was queued; when it is safe, "
-            f"`daq --server {call.server} queue resume`"
+            f"`daq --server {server} queue resume`"
         )
 
 
 class _Follower:
-    """Follows one experiment through the stream; through questions alone when the stream is lost."""
+    """Follows one experiment through the live stream, or by polling when the stream is lost."""
 
-    def __init__(self, robot: Robot, experiment: str, shown: ShownRun) -> None:
+    def __init__(self, robot: Robot, experiment: str, display: RunDisplay) -> None:
         self._robot = robot
         self._experiment = experiment
-        self._shown = shown
+        self._display = display
         self._record_ended = False
 
     def follow(self, stream: LiveStream) -> Experiment:
-        """To its end. Raises AcquisitionFailedError when the service is lost meanwhile."""
+        """Waits for the end of the experiment. Raises AcquisitionFailedError when the service is lost meanwhile."""
         ended: Experiment | None = None
         try:
             while ended is None:
-                frame = stream.next_frame(LOOK_EVERY)
+                frame = stream.next_frame(POLL_EVERY)
                 news = [self._is_news(message) for message in frame.messages] if frame is not None else [True]
                 if any(news):
                     ended = self._look(0)
             while ended.outcome is not None and not self._record_ended:
                 # The end was asked for, and was quicker than what is still on its way.
-                if (frame := stream.next_frame(LOOK_EVERY)) is None:
+                if (frame := stream.next_frame(POLL_EVERY)) is None:
                     break
                 for message in frame.messages:
                     self._is_news(message)
@@ -91,36 +96,36 @@ class _Follower:
         return ended
 
     def _ask_until_ended(self) -> Experiment:
-        for attempt in range(LOOKS_IN_VAIN):
+        for attempt in range(FAILED_POLLS):
             try:
                 while True:
-                    if (ended := self._look(LOOK_EVERY)) is not None:
+                    if (ended := self._look(POLL_EVERY)) is not None:
                         return ended
             except ServiceNotReachedError as error:
-                if attempt == LOOKS_IN_VAIN - 1:
+                if attempt == FAILED_POLLS - 1:
                     line = f"{error}; experiment {self._experiment} is the service's now, and so is its trace"
                     raise AcquisitionFailedError(line, error.exit_code) from error
         raise AssertionError("the last attempt returns or raises")
 
     def _look(self, wait: float) -> Experiment | None:
-        """The experiment when it has ended."""
+        """The experiment if it has ended, else None."""
         found = self._robot.experiments.get(self._experiment, wait)
         if found.progress is not None:
-            self._shown.progress(found.progress, found.progress_text)
+            self._display.progress(found.progress, found.progress_text)
         return found if found.state in ENDS else None
 
     def _is_news(self, message: LiveMessage) -> bool:
-        """Shows what is to be shown; whether the experiment's state has changed."""
+        """Shows progress and events; returns whether the experiment's state has changed."""
         match message:
             case EventMessage():
                 return message.event.experiment == self._experiment
             case ProgressMessage() if message.experiment == self._experiment:
-                self._shown.progress(message.fraction, message.text)
+                self._display.progress(message.fraction, message.text)
             case RecordEventMessage() if message.experiment == self._experiment:
-                self._shown.event(message.kind, message.time, message.message)
+                self._display.event(message.kind, message.time, message.message)
                 self._record_ended = message.kind == "end"
             case QueueMessage() if message.status.running != self._experiment:
-                self._shown.progress(0.0, _waiting(message))
+                self._display.progress(0.0, _waiting(message))
             case _:
                 pass
         return False
@@ -140,7 +145,7 @@ def _finished(robot: Robot, ended: Experiment, folder: Path) -> Finished:
 
     if ended.outcome is None or ended.trace is None:
         line = f"experiment {ended.id} {ended.state}: {ended.reason or 'no reason is known'}"
-        raise AcquisitionFailedError(line, EXIT_CODES.get(ended.state, 1))
+        raise AcquisitionFailedError(line, EXIT_CODES.get(ended.state, exit_codes.PROGRAM_FAULT))
     details = robot.traces.get(ended.trace)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -11,7 +11,7 @@ from daq.client.stopping import NoSuchRobot
 from daq.contracts.errors import DaqError
 from daq.contracts.service.robot import StopResult
 from daq_cli.app.context import Invocation
-from daq_cli.robot.remote.robot import TOKEN_VARIABLE
+from daq_cli.robot.remote.connection import TOKEN_VARIABLE
 
 DEFAULT_ROBOT = "ma2000"
 NAMES_WITHIN = 1.0
@@ -37,7 +37,8 @@ def stop_at_server(call: Invocation) -> list[StopAnswer]:
 
 
 def _likely_name(call: Invocation) -> str:
-    """A configuration that cannot be read is no reason not to stop."""
+    """The configured name; the default one where the configuration cannot be read, so that the stop is sent all the
+    same."""
     try:
         return call.settings.robot.name
     except DaqError:
@@ -45,7 +46,7 @@ def _likely_name(call: Invocation) -> str:
 
 
 def _others(client: Client, name: str, first: StopResult) -> list[str]:
-    """Names of the robots of a service that has none of this name, which is said first."""
+    """Names of the service's robots where it has none of this name; says so first."""
     print(f"{first.note}: {client.url} is asked to stop the robots that it has", file=sys.stderr, flush=True)
     try:
         names = [one.robot for one in client.robots(within=NAMES_WITHIN)]

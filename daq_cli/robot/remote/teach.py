@@ -4,42 +4,46 @@ from __future__ import annotations
 
 import select
 import sys
-import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SafetyError
-from daq_cli.app.context import Invocation, console
-from daq_cli.app.stop_keys import StopKeys
-from daq_cli.robot.remote.control import controlled
+from daq_cli.app.context import console
+from daq_cli.app.keyboard import open_keyboard
+from daq_cli.app.stop_keys import StopKeys, StopThread
+from daq_cli.robot.pendant import HELP, Pendant, StatusLine, announce_lead
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel
-
     from daq.client import HeldControl, Robot
     from daq.contracts.service.robot import StopResult
     from daq.contracts.service.teaching import TeachingStatus
     from daq.teaching import RecordedPath
+    from daq.teaching.program import Program
+
+    Controlled = AbstractContextManager[tuple[Robot, HeldControl]]
 
 LOOK_EVERY = 0.1
-"""s between two looks at how it goes on."""
-EXIT_STOPPED = 6
+"""s between two looks at what has become of a program or a lead."""
+KEYS_EVERY = 0.05
+"""s between two looks at the keyboard."""
 
 
 class StoppedAtServerError(DaqError):
-    """A person has stopped the arm."""
+    """A person at this terminal has stopped the arm."""
 
-    exit_code = EXIT_STOPPED
+    exit_code = exit_codes.STOPPED
 
 
 @contextmanager
-def taught(call: Invocation, consent: bool) -> Iterator[tuple[Robot, HeldControl, Stopped]]:
-    """The robot, its control, and whether a key has stopped it: Ctrl-C and its like do so within, on a thread that does
-    nothing else."""
-    with StopKeys() as keys, controlled(call, consent) as (robot, control), Stopped(robot) as stopped:
+def taught(held: Controlled) -> Iterator[tuple[Robot, HeldControl, Stopped]]:
+    """The robot, its control, and whether a key has stopped it: within the block Ctrl-C and its like do so, on a thread
+    that does nothing else."""
+    with StopKeys() as keys, held as (robot, control), Stopped(robot) as stopped:
         keys.stops(stopped.press)
         try:
             yield robot, control, stopped
@@ -47,22 +51,16 @@ def taught(call: Invocation, consent: bool) -> Iterator[tuple[Robot, HeldControl
             keys.stops(lambda: None)
 
 
-class Stopped:
-    """Stops the robot when `press` is called; `result` says then what became of it.
+class Stopped(StopThread):
+    """Stops the robot when `press` is called; `result` then says what became of the stop.
 
     Leaving raises StoppedAtServerError after a press, whatever the work has ended with: a stop counts.
     """
 
     def __init__(self, robot: Robot) -> None:
-        self.pressed = False
+        super().__init__()
         self.result: StopResult | None = None
         self._robot = robot
-        self._wake = threading.Event()
-        self._thread = threading.Thread(target=self._wait, name="stop-keys", daemon=True)
-
-    def __enter__(self) -> Stopped:
-        self._thread.start()
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -72,19 +70,13 @@ class Stopped:
         if kind is None or issubclass(kind, DaqError):
             self.raise_if_answered()
 
-    def press(self) -> None:
-        """A key that stops. As quick as a signal wants it; again and again."""
-        if not self.pressed:  # a signal that interrupts this one finds its lock taken, and need not wake again
-            self.pressed = True
-            self._wake.set()
-
     def _wait(self) -> None:
         self._wake.wait()
         if self.pressed:
             self.result = self._robot.stop()
 
     def wait_for_answer(self) -> None:
-        """Where a key has been pressed: until it is known what became of the stop."""
+        """After a key has been pressed, waits until it is known what became of the stop."""
         if self.pressed:
             self._thread.join()
 
@@ -94,41 +86,65 @@ class Stopped:
             raise StoppedAtServerError(self.result.text)
 
 
-def perform_at_server(call: Invocation, program: BaseModel, consent: bool) -> None:
-    """As `daq teach program`. Raises SafetyError, StoppedAtServerError, and what the service refuses."""
-    with taught(call, consent) as (robot, control, stopped):
-        before = _newest(robot.teaching())
-        control.perform(program)
-        ended = _end_of(robot, control, stopped, before)
-    print(ended.result)
+@dataclass(frozen=True)
+class RemoteTeaching:
+    """`Teaching` with the control of a service's robot. Raises StoppedAtServerError after Ctrl-C."""
 
+    held: Controlled
 
-def lead_at_server(
-    call: Invocation, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None], consent: bool
-) -> None:
-    """As `daq teach lead`: the path is kept also of a lead that was stopped."""
-    from daq.teaching import RecordedPath
+    def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
+        """Each press drives for 0.3 s at most, so that the arm holds when the connection is lost."""
+        with open_keyboard() as keyboard, taught(self.held) as (robot, control, stopped):
+            line.tell(HELP)
+            while not pendant.ended:
+                stopped.raise_if_answered()
+                typed = keyboard.pressed()
+                now = time.monotonic()
+                command = pendant.command(typed, now)
+                if command is not None and command.time == now:  # said just now: an older one is not repeated
+                    control.jog(command.velocities)
+                if pendant.gripper is not None:
+                    control.set_gripper(closed=pendant.gripper)
+                    pendant.gripper = None
+                if pendant.keep and (sample := robot.status().sample) is not None:
+                    pendant.keep = False
+                    keep(dict(zip(sample.joints, sample.set_point, strict=True)))
+                line.show(pendant)
+                time.sleep(KEYS_EVERY)
+            control.finish()
 
-    with taught(call, consent) as (robot, control, stopped):
-        before = robot.teaching().path
-        control.lead(joints)
-        console().print("recording: lead the arm" + ("; Enter ends it" if seconds is None else f" for {seconds:g} s"))
-        until = None if seconds is None else time.monotonic() + seconds
-        while not stopped.pressed and robot.teaching().activity == "lead":
-            if until is not None and time.monotonic() >= until:
-                break
-            if select.select([] if until is not None else [sys.stdin], [], [], LOOK_EVERY)[0]:
-                break
-        found = _end_of_lead(robot, control, stopped)
-        if found.path is not None and found.path != before:
-            keep(RecordedPath.model_validate(found.path.model_dump()))
-        stopped.raise_if_answered()
-        if found.problem:
-            raise SafetyError(found.problem)
+    def perform(self, program: Program) -> str:
+        """Has the service plan, check and carry out the program."""
+        with taught(self.held) as (robot, control, stopped):
+            before = _newest(robot.teaching())
+            control.perform(program)
+            ended = _end_of(robot, control, stopped, before)
+        return ended.result
+
+    def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
+        """Records until `seconds` are over, or Enter is pressed."""
+        from daq.teaching import RecordedPath
+
+        with taught(self.held) as (robot, control, stopped):
+            before = robot.teaching().path
+            control.lead(joints)
+            announce_lead(seconds)
+            until = None if seconds is None else time.monotonic() + seconds
+            while not stopped.pressed and robot.teaching().activity == "lead":
+                if until is not None and time.monotonic() >= until:
+                    break
+                if select.select([] if until is not None else [sys.stdin], [], [], LOOK_EVERY)[0]:
+                    break
+            found = _end_of_lead(robot, control, stopped)
+            if found.path is not None and found.path != before:
+                keep(RecordedPath.model_validate(found.path.model_dump()))
+            stopped.raise_if_answered()
+            if found.problem:
+                raise SafetyError(found.problem)
 
 
 def _end_of_lead(robot: Robot, control: HeldControl, stopped: Stopped) -> TeachingStatus:
-    """Ends it, and waits for the end and its path: that of one that is stopped comes after the stop's own answer."""
+    """Ends the lead, and waits for its path: that of a stopped lead comes after the answer to the stop."""
     stopped.wait_for_answer()
     try:
         return control.finish()
@@ -140,7 +156,7 @@ def _end_of_lead(robot: Robot, control: HeldControl, stopped: Stopped) -> Teachi
 
 
 def _end_of(robot: Robot, control: HeldControl, stopped: Stopped, shown: int) -> TeachingStatus:
-    """Waits for it, showing what the service tells whoever teaches, from line `shown` on."""
+    """Waits for the end of a program, showing the service's lines about it from number `shown` on."""
     while True:
         status = robot.teaching()
         for line in status.lines:
@@ -157,5 +173,5 @@ def _end_of(robot: Robot, control: HeldControl, stopped: Stopped, shown: int) ->
 
 
 def _newest(status: TeachingStatus) -> int:
-    """Number of the newest line."""
+    """Number of the newest line that the service has shown about the teaching."""
     return max((line.number for line in status.lines), default=0)

@@ -1,4 +1,4 @@
-"""Traces of a server: listed, fetched, sent."""
+"""Traces of a service."""
 
 from __future__ import annotations
 
@@ -7,18 +7,12 @@ from pathlib import Path
 from daq.contracts.errors import TraceError
 from daq.contracts.service.traces import CatalogueEntry
 from daq.traces.catalogue import TraceSummary
-from daq_cli.app.context import Invocation, console, print_json
-from daq_cli.robot.remote.robot import remote_robot
-
-
-def summaries_at_server(call: Invocation) -> list[TraceSummary]:
-    """Every trace of the service's catalogue, the oldest first."""
-    with remote_robot(call) as robot:
-        return [_summary(entry) for entry in robot.traces.list()][::-1]
+from daq_cli.app.context import Invocation, console
+from daq_cli.robot.remote.connection import remote_robot
 
 
 def fetched_trace(call: Invocation, folder: Path, wanted: str) -> Path:
-    """A trace of the service in `folder`, fetched unless it is there. Raises TraceError."""
+    """The file of a service's trace in `folder`, fetched unless it is there. Raises TraceError."""
     with remote_robot(call) as robot:
         entry = robot.traces.find(wanted)
         target = folder / Path(entry.file).name
@@ -33,18 +27,8 @@ def fetched_trace(call: Invocation, folder: Path, wanted: str) -> Path:
     return path
 
 
-def upload(call: Invocation, file: Path, *, as_json: bool) -> None:
-    """Sends a trace of another rig or tool."""
-    with remote_robot(call) as robot:
-        entry = robot.traces.upload(file)
-    if as_json:
-        print_json({"trace": entry.id, "made_from": file, "file": entry.file, "server": call.server})
-    else:
-        print(f"{entry.id}: {entry.file} at {call.server}")
-
-
-def _summary(entry: CatalogueEntry) -> TraceSummary:
-    """As `daq traces ls` shows those of a folder."""
+def summary(entry: CatalogueEntry) -> TraceSummary:
+    """An entry of the service's catalogue as `daq traces ls` shows the traces of a folder."""
     return TraceSummary(
         path=Path(entry.file),
         state="unreadable" if entry.missing else "finished",

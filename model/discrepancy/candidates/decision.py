@@ -1,4 +1,4 @@
-"""What one turn's ranking allows to be said."""
+"""The answer that a ranking allows: nothing, one name, or a group."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from model.discrepancy.candidates.ranking import Ranking
-from model.discrepancy.output_error.refitting import Refitted, same_answer
+from model.discrepancy.output_error.candidate_fit import CandidateFit, same_answer
 from model.discrepancy.thresholds import Thresholds
 
 Kind = Literal["nothing", "named", "group"]
@@ -15,18 +15,18 @@ Kind = Literal["nothing", "named", "group"]
 
 @dataclass(frozen=True)
 class Decision:
-    """The answer of one turn: `group` holds candidates that the data cannot tell apart, the best first; `margin` is
-    the evidence of the best over the best that would be another answer."""
+    """best: the candidate with the answer. margin: its lead in evidence over the best that would be another answer.
+    group: candidates that the data cannot tell apart, the best first."""
 
     kind: Kind
-    best: Refitted | None
+    best: CandidateFit | None
     margin: float
-    group: tuple[Refitted, ...]
+    group: tuple[CandidateFit, ...]
 
 
 @dataclass(frozen=True)
 class Added:
-    """An effect that has been added, where, and the evidence it had."""
+    """An effect that has been added to the model, and the evidence it had."""
 
     effect: str | None
     joints: tuple[int, ...]
@@ -34,8 +34,10 @@ class Added:
 
 
 def decide(ranking: Ranking, thresholds: Thresholds, added: Sequence[Added] = ()) -> Decision:
-    """Nothing significant, one name, or a group: of the first that brings what it has to bring, and what comes after.
-    What is ranked above it is the echo of an effect that has been added, and says nothing of another joint's."""
+    """The answer, from the first candidate of the ranking that has the evidence it needs, and those after it.
+
+    Candidates below their threshold are skipped: those ranked higher are artefacts of an effect already in the model.
+    """
     fits = ranking.fitted
     place = next((k for k, f in enumerate(fits) if f.evidence >= _needed(f, thresholds, added)), None)
     if place is None:
@@ -47,9 +49,9 @@ def decide(ranking: Ranking, thresholds: Thresholds, added: Sequence[Added] = ()
     return Decision("group" if len(group) > 1 else "named", best, margin, group if len(group) > 1 else ())
 
 
-def _needed(found: Refitted, thresholds: Thresholds, added: Sequence[Added]) -> float:
-    joints = set(found.candidate.joints)
+def _needed(found: CandidateFit, thresholds: Thresholds, added: Sequence[Added]) -> float:
+    joints = set(found.hypothesis.joints)
     near = [not joints or not a.joints or bool(joints & set(a.joints)) for a in added]
     here = sum(a.evidence for a, on in zip(added, near, strict=True) if on)
     elsewhere = sum(a.evidence for a, on in zip(added, near, strict=True) if not on)
-    return thresholds.needed(here, elsewhere, kin=any(a.effect == found.candidate.name for a in added))
+    return thresholds.needed(here, elsewhere, kin=any(a.effect == found.hypothesis.name for a in added))

@@ -10,29 +10,31 @@ from numpy.typing import NDArray
 from daq.contracts.errors import SpecError
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import Candidate, FoundValue
+from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, price_of, says_no_more
 from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.refitting import Judged, Refitted, price_of, says_no_more
-from model.discrepancy.output_error.search import Point, point_at, searched
+from model.discrepancy.output_error.search import Point, descend
 from model.fitting.fit import INTERVAL
 from model.fitting.whitening import Whitener
 from model.machine_model.parameter import Parameter
 
 Floats = NDArray[np.float64]
 
-FOLLOWING_FOR_INTERVALS = 0.9
-"""Share of the way to the recorded readings, where it is asked how much of an estimate is the noise's: half of what
-fits leave outside."""
+FEEDBACK_SHARE_FOR_INTERVALS = 0.9
+"""Feedback share for the question how far noise has shifted an estimate: half as far from the record as the fits."""
 MOST_STEPS = 8
+"""Steps of the search that answers it."""
 
 
-def found_values(
-    observation: Observation, found: Judged, parameters: Sequence[Parameter], moved: Floats | float = 0.0
-) -> dict[str, FoundValue]:
-    """Estimates and 95 % intervals of parameters that a fit has found: from the curvature at the solution, and the size
-    and colour of the residual that is left. `moved` (p,) is added to the deviations, in squares."""
+def found_values(found: Fit, parameters: Sequence[Parameter], shift: Floats | float = 0.0) -> dict[str, FoundValue]:
+    """Estimates and 95 % intervals of parameters that a fit has found.
+
+    Intervals follow from the curvature at the solution, and from the size and colour of the residual. The squares of
+    `shift` (p,) are added to those of the deviations.
+    """
     point = found.point
-    statistical = standard_deviations(point.precision, found.noise.whiteners, observation.by_joint(point.tangents))
-    deviations = np.hypot(statistical, moved)
+    tangents = point.observation.by_joint(point.tangents)
+    statistical = standard_deviations(point.precision, found.noise.whiteners, tangents)
+    deviations = np.hypot(statistical, shift)
     values = {}
     for p in parameters:
         k = [u.name for u in point.unknowns].index(p.name)
@@ -45,20 +47,20 @@ def found_values(
     return values
 
 
-def moved_by_noise(observation: Observation, point: Point, parameters: Sequence[Parameter]) -> Floats:
-    """How far estimates move, (p,), when simulations follow the record more closely: a measure of what the share of a
-    reading's noise that they do not see has done to them.
+def shift_by_noise(point: Point, parameters: Sequence[Parameter]) -> Floats:
+    """How far estimates move, (p,), when the simulated controller is given more of the record: a measure of the bias
+    from the noise that it does not see.
 
     Noise that passes a law with a corner or a limit does not average out: a dead zone looks narrower, friction near
-    zero speed softer. As in the extrapolation of simulated noise (Cook and Stefanski 1994), what that does is seen
-    where there is less of it. What is left of the way is about as long again, and two deviations reach so far. All zero
-    where that fit does not stay finite.
+    zero speed softer. As in the extrapolation of simulated noise (Cook and Stefanski 1994), the bias shows where there
+    is less noise. The remaining way to no noise is about as long again, and two deviations reach so far. All zero where
+    that fit does not stay finite.
     """
-    nearer, names = observation.following(FOLLOWING_FOR_INTERVALS), {p.name for p in parameters}
+    nearer = point.observation.with_feedback_share(FEEDBACK_SHARE_FOR_INTERVALS)
+    names = {p.name for p in parameters}
     own = [k for k, u in enumerate(point.unknowns) if u.name in names]
     try:
-        begun = point_at(nearer, point.model, point.unknowns, point.values)
-        return searched(nearer, begun, MOST_STEPS, own).values - point.values
+        return descend(point.on(nearer), MOST_STEPS, own).values - point.values
     except SpecError:
         return np.zeros_like(point.values)
 
@@ -85,31 +87,36 @@ def standard_deviations(
     return np.asarray(np.sqrt(np.maximum(np.diag(inverse), np.diag(inverse @ meat @ inverse))))
 
 
-def listed(found: Refitted) -> Candidate:
-    """A candidate in the list: its estimates without intervals, for its derivatives are not those of where it ended."""
+def listed(found: CandidateFit) -> Candidate:
+    """A candidate for the answer's list: estimates without intervals, because its derivatives are not those at its
+    end."""
     values = {}
-    for p in found.candidate.free:
-        values[p.name] = FoundValue(value=found.judged.point.value(p.name), low=None, high=None, unit=p.unit)
+    for p in found.hypothesis.free:
+        values[p.name] = FoundValue(value=found.fit.point.value(p.name), low=None, high=None, unit=p.unit)
     return Candidate(
-        effect=found.candidate.name, joints=found.candidate.joints, evidence=found.evidence, misfit=found.misfit,
-        refitted=True, parameters=values,
-    )  # fmt: skip
+        effect=found.hypothesis.name,
+        joints=found.hypothesis.joints,
+        evidence=found.evidence,
+        misfit=found.misfit,
+        refitted=True,
+        parameters=values,
+    )
 
 
 def only_probed(ranking: Ranking, observation: Observation) -> tuple[Candidate, ...]:
-    """Candidates that were not worth a fit, by what their probe promised less the price of their parameters."""
-    fitted = {(r.candidate.name, r.candidate.joints) for r in ranking.fitted}
+    """Candidates that were not worth a fit; their evidence is the gain of the probe less the cost of the parameters."""
+    fitted = {(r.hypothesis.name, r.hypothesis.joints) for r in ranking.fitted}
     left = []
     for probe in ranking.probed:
-        key = probe.candidate.name, probe.candidate.joints
+        key = probe.hypothesis.name, probe.hypothesis.joints
         if key not in fitted:
             fitted.add(key)
-            evidence = probe.gain - price_of(observation, probe.candidate)
+            evidence = probe.gain - price_of(observation, probe.hypothesis)
             left.append(Candidate(effect=key[0], joints=key[1], evidence=evidence))
     return tuple(left)
 
 
 def runner_up(best: Candidate, candidates: Sequence[Candidate]) -> Candidate | None:
-    """The best fitted candidate after one of a ranking that would be another answer."""
+    """The best fitted candidate after `best` in a ranking that would be another answer."""
     after = (c for c in candidates[candidates.index(best) + 1 :] if c.refitted)
     return next((c for c in after if not says_no_more(c.effect, c.joints, best.effect, best.joints)), None)

@@ -1,19 +1,19 @@
-"""What may be missing: every effect of the library on every joint, as a model with free parameters and trial sizes."""
+"""Hypotheses: every effect of the library on every joint, as a model with free parameters and trial sizes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from model import layout as at
 from model.effects.library import effect, library
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
 TONES = ("torque_ripple", "periodic_disturbance")
-"""Effects with a frequency, which trial sizes cannot find: a spectrum proposes it."""
+"""Effects with a frequency, which no trial size can find: a spectrum proposes it."""
 FLEXIBLE = ("backlash", "joint_compliance")
-"""Effects that cost five times the simulation: tried only on joints where something is wrong."""
+"""Effects that take five times as long to simulate: they are tried only on joints where something is wrong."""
 TRIALS: Mapping[str, tuple[float, ...]] = {
     "backlash": (0.15, 0.5, 1.5),
     "joint_compliance": (0.15, 0.5, 1.5),
@@ -26,30 +26,31 @@ TRIALS: Mapping[str, tuple[float, ...]] = {
     "lost_set_points": (0.1, 0.5, 1.5),
     "direction_dependent_friction": (0.3, 2.0),
 }
-"""Trial sizes in expected deviations of effects that do not grow in proportion to their parameter."""
+"""Trial sizes, in expected deviations, of effects whose response is not proportional to their parameter."""
 FREED_BENDS = ("bend_1", "bend_2", "bend_3", "bend_4")
-"""Terms of a bent potentiometer that a candidate frees from their priors; shorter waves stay what a sound one has."""
+"""Terms of a bent potentiometer that a hypothesis frees from their priors; the shorter waves keep those of a sound
+one."""
 SMALL = 0.002
-"""Expected deviations: the one trial of all others, which tells the size by itself. It is small: an effect that does
-what a tolerance parameter does can only be told by the price of that parameter's prior, and a curved response would
-hide it."""
+"""The one trial size, in expected deviations, of all other effects: a proportional response gives the size by itself.
+It is small because an effect that acts like a tolerance parameter differs from it only by the cost of that parameter's
+prior, which a curved response would hide."""
 STICTION_SPEED = 0.045
-"""rad/s: friction that has fallen below this speed belongs to breaking away, above it to the Stribeck curve. At 20 ms
-and 12 bits the joint moves by less than a count a sample there: no reading shows the fall."""
+"""Speed that separates stiction from Stribeck friction, rad/s: friction that falls below it counts as stiction. At 20
+ms and 12 bits the joint moves there by less than a count per sample, so that no reading shows the fall."""
 STICTION_SHAPE, STRIBECK_SHAPES = 0.025, (0.09, 0.25)
-"""rad/s over which friction falls, in trials."""
+"""Trial values of the speed over which friction falls, rad/s."""
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """One effect at one place.
+class Hypothesis:
+    """One effect at one place: what a `Candidate` of the answer was tested as.
 
     Args:
         name: of the effect, as answered. joints: where; none for the whole machine.
-        model: with the effect in it, where it does nothing. free: parameters that it lets move without a prior.
-        trials: values by full name, one set a trial.
-        proportional: whether its response grows with its size, so that one trial tells the size.
-        bounds: narrower than the parameter's own, by full name.
+        model: with the effect in it, at a value where it does nothing. free: its parameters, which have no prior.
+        trials: values by full name, one set per trial.
+        proportional: whether its response is proportional to its size, so that one trial gives the size.
+        bounds: by full name; narrower than the parameter's own.
     """
 
     name: str
@@ -66,17 +67,18 @@ class Candidate:
         return tuple(p for p in self.free if p.null is not None)
 
 
-def candidates(
+def hypotheses(
     model: Model, effects: Sequence[str] | None = None, joints: Sequence[int] | None = None
-) -> tuple[Candidate, ...]:
-    """Every effect that the model could get, except those found by a spectrum. Raises SpecError for unknown names, and
-    for joints that are not modelled.
+) -> tuple[Hypothesis, ...]:
+    """Every effect that the model could get, except those that a spectrum finds.
+
+    Raises SpecError for unknown names, and for joints that are not modelled.
 
     Args:
         effects: names; None for the whole library. joints: only on these; None for all.
     """
     names = tuple(library()) if effects is None else tuple(effect(name).name for name in effects)
-    found: list[Candidate] = []
+    found: list[Hypothesis] = []
     for name in names:
         if name in TONES:
             continue
@@ -86,24 +88,24 @@ def candidates(
     return tuple(found)
 
 
-def tone(model: Model, name: str, joint: int, values: Mapping[str, float]) -> Candidate | None:
-    """A candidate whose frequency a spectrum has proposed; `values` by the last part of the name."""
-    return _candidate(model, name, name, (joint,), (dict(values),), proportional=False)
+def tone(model: Model, name: str, joint: int, values: Mapping[str, float]) -> Hypothesis | None:
+    """A hypothesis with a frequency that a spectrum has proposed. values: by the part of the effect."""
+    return _hypothesis(model, name, name, (joint,), (dict(values),), proportional=False)
 
 
-def on_joints(model: Model, alike: Sequence[Candidate], values: Mapping[str, float]) -> Candidate | None:
-    """One law on all the joints of candidates for single ones, with one trial: `values` by full name. None where the
-    model has the effect on some of the joints already."""
+def on_joints(model: Model, alike: Sequence[Hypothesis], values: Mapping[str, float]) -> Hypothesis | None:
+    """One law on all joints of hypotheses about single ones, with one trial. values: by full name. None where the model
+    has the effect on some of the joints already."""
     first = alike[0]
     joints = tuple(sorted(j for c in alike for j in c.joints))
     bounds = {name: own for c in alike for name, own in c.bounds.items()}
     law = first.free[0].effect or first.name
-    found = _candidate(model, first.name, law, joints, (dict(values),), proportional=False, bounds=bounds)
+    found = _hypothesis(model, first.name, law, joints, (dict(values),), proportional=False, bounds=bounds)
     return found if found is not None and {j for p in found.free for j in p.joints} >= set(joints) else None
 
 
-def _variants(model: Model, name: str, joints: tuple[int, ...]) -> list[Candidate]:
-    found: list[Candidate | None] = []
+def _variants(model: Model, name: str, joints: tuple[int, ...]) -> list[Hypothesis]:
+    found: list[Hypothesis | None] = []
     if name == "stribeck_friction":
         shapes = tuple({"speed": s} for s in STRIBECK_SHAPES)
         found.append(_sized(model, name, name, joints, shapes, {"speed": (STICTION_SPEED, 10.0)}))
@@ -122,11 +124,15 @@ def _variants(model: Model, name: str, joints: tuple[int, ...]) -> list[Candidat
 
 
 def _sized(
-    model: Model, name: str, law: str, joints: tuple[int, ...], shapes: Sequence[dict[str, float]],
+    model: Model,
+    name: str,
+    law: str,
+    joints: tuple[int, ...],
+    shapes: Sequence[dict[str, float]],
     bounds: dict[str, tuple[float, float]],
-) -> Candidate | None:  # fmt: skip
-    """A candidate with trials of every main parameter, in either direction that its bounds allow, for every shape."""
-    plain = _candidate(model, name, law, joints, ({},), proportional=law not in TRIALS, bounds=bounds)
+) -> Hypothesis | None:
+    """A hypothesis with trials of every main parameter, in every direction that its bounds allow, for every shape."""
+    plain = _hypothesis(model, name, law, joints, ({},), proportional=law not in TRIALS, bounds=bounds)
     if plain is None:
         return None
     trials = []
@@ -142,11 +148,16 @@ def _sized(
     return replace(plain, trials=tuple(trials))
 
 
-def _candidate(
-    model: Model, name: str, law: str, joints: tuple[int, ...], trials: tuple[dict[str, float], ...],
-    proportional: bool, bounds: Mapping[str, tuple[float, float]] | None = None,
-) -> Candidate | None:  # fmt: skip
-    """The model with the effect, or, where it has it already with a prior, with that prior lifted."""
+def _hypothesis(
+    model: Model,
+    name: str,
+    law: str,
+    joints: tuple[int, ...],
+    trials: tuple[dict[str, float], ...],
+    proportional: bool,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+) -> Hypothesis | None:
+    """The model with the effect; where it has the effect already, with a prior, the prior is lifted."""
     present = [u for u in model.effects if u.name == law and (not joints or set(joints) & set(u.joints))]
     if present:
         if law in TONES or law == "stribeck_friction":
@@ -160,14 +171,14 @@ def _candidate(
         wider = model.with_effect(law, joints)
         free = tuple(p for p in wider.parameters if p.name not in model.by_name)
     if law == "potentiometer_nonlinearity":
-        free = tuple(p for p in free if p.name.endswith(FREED_BENDS))
+        free = tuple(p for p in free if p.part in FREED_BENDS)
     full = tuple(_full(free, trial) for trial in trials)
-    return Candidate(name, joints, wider, free, full, proportional, _full_bounds(free, bounds or {}))
+    return Hypothesis(name, joints, wider, free, full, proportional, _full_bounds(free, bounds or {}))
 
 
 def _has_place(model: Model, law: str, joints: tuple[int, ...]) -> bool:
-    """Whether the model can have the effect there: one of the user's own acts on the joints of its file alone, and a
-    model has only so much room for those."""
+    """Whether the model can have the effect there: a user's own effect acts only on the joints of its file, and a model
+    has limited room for such effects."""
     kind = effect(law)
     own = {use.name for use in model.effects if use.file is not None} | ({law} if kind.file is not None else set())
     taken = sum(len(effect(name).parameters) for name in own)
@@ -175,11 +186,11 @@ def _has_place(model: Model, law: str, joints: tuple[int, ...]) -> bool:
 
 
 def _full(free: Sequence[Parameter], values: Mapping[str, float]) -> dict[str, float]:
-    """Values by full name, from full names or last parts of them."""
-    return {p.name: values[key] for p in free for key in values if key in (p.name, p.name.rpartition(".")[2])}
+    """Values by full name, from full names or parts."""
+    return {p.name: values[key] for p in free for key in values if key in (p.name, p.part)}
 
 
 def _full_bounds(
     free: Sequence[Parameter], bounds: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
-    return {p.name: bounds[key] for p in free for key in bounds if key in (p.name, p.name.rpartition(".")[2])}
+    return {p.name: bounds[key] for p in free for key in bounds if key in (p.name, p.part)}

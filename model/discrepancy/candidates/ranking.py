@@ -1,4 +1,4 @@
-"""One turn: every candidate probed, the promising ones fitted, all ranked by evidence."""
+"""Every hypothesis probed, the promising ones fitted, all ranked by evidence."""
 
 from __future__ import annotations
 
@@ -8,203 +8,191 @@ from dataclasses import dataclass
 from functools import partial
 
 from daq.contracts.progress import Cancel, Progress, stop_if
-from model.discrepancy.candidates.library import FLEXIBLE, TONES, candidates
-from model.discrepancy.candidates.probing import Probed, probed, still_promising
-from model.discrepancy.candidates.tones import proposed_tones
-from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.output_error.multi_joint_fit import fitted_together
-from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.refitting import (
+from model.discrepancy.candidates.library import FLEXIBLE, TONES, hypotheses
+from model.discrepancy.candidates.probing import Probe, keep_promising, probe
+from model.discrepancy.candidates.tones import propose_tones
+from model.discrepancy.output_error.candidate_fit import (
     STRANGE,
-    Judged,
-    Refitted,
-    astray,
-    begun_again,
-    finished,
-    polished,
+    CandidateFit,
+    Fit,
+    diverged_from_prior,
+    finish,
+    polish,
     price_of,
-    refitted,
+    refit,
+    restart,
     same_answer,
 )
-from model.discrepancy.output_error.side_by_side import AT_ONCE, side_by_side
+from model.discrepancy.output_error.case import Case
+from model.discrepancy.output_error.multi_joint_fit import fit_several_joints
+from model.discrepancy.output_error.observation import AT_ONCE, side_by_side
 from model.discrepancy.thresholds import Thresholds
+from model.effects.names import effect_on
 
 FLAGGED_SHARE = 0.1
-"""A joint is flagged where the best probe promises this share of the best of all."""
-
+"""A joint is flagged where its best probe promises this share of the best of all."""
 ALWAYS_FITTED, HOPELESS = 4, 0.2
-"""After so many, no candidate is fitted whose probe promises less than this share of the best evidence so far."""
+"""After so many fits, no candidate is fitted whose probe promises less than this share of the best evidence so far."""
 PROMISING = 0.6
-"""Of the fall that would make an effect significant: a probe that promises less is not fitted."""
+"""Least gain of a probe that is fitted, as a share of the fall of the cost that would make its effect significant."""
 WORTH_POLISHING = 0.5
-"""Of the best evidence: a fit with less stays behind, polished or not."""
+"""Least evidence of a fit that is polished, as a share of the best: one with less stays behind either way."""
 REMEMBERED = 0.3
-"""A candidate is probed again where its old response promises this share of what is interesting."""
+"""A hypothesis is probed again where its earlier response promises this share of an interesting gain."""
 
 
 @dataclass(frozen=True)
 class Ranking:
-    """Candidates of one turn: fitted ones by evidence, the best first; the others by what their probe promised."""
+    """fitted: candidates by evidence, the best first. probed: all probes, by what they promise."""
 
-    fitted: tuple[Refitted, ...]
-    probed: tuple[Probed, ...]
+    fitted: tuple[CandidateFit, ...]
+    probed: tuple[Probe, ...]
 
 
-def ranked(
-    observation: Observation, current: Judged, options: DiagnosisOptions, excluded: Sequence[str],
-    thresholds: Thresholds, progress: Progress, cancel: Cancel, earlier: Sequence[Probed] = (),
-) -> Ranking:  # fmt: skip
-    """All candidates against the current point.
+def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: Sequence[Probe] = ()) -> Ranking:
+    """All candidates, compared with the current fit.
 
     Args:
-        excluded: effects that need not be tried. earlier: probes of the turn before: what they rule out is not
-            simulated again.
+        earlier: probes of the steps before; what they rule out is not simulated again.
     """
-    point = current.point
+    progress(0.0, "probing the known effects")
+    probes = _probe_all(case, current, cancel, earlier)
+    chosen = [p for p in probes if _is_hopeful(current, p, case.thresholds)][: case.options.fitted]
+    fits = _fit_all(current, chosen, case.thresholds.close, progress, cancel)
+    progress(0.9, "fitting effects of several joints")
+    fits += fit_several_joints(current, fits, probes, case.thresholds, cancel)
+    fits.sort(key=lambda r: -r.evidence)
+    answers = _different(fits)[: case.options.polished]
+    if diverged_from_prior(current.point):
+        answers += _most_promising(fits, answers)[: case.options.polished]
+    stop_if(cancel)
+    head = _polish_best(current, answers)
+    head = _restart_unexplained(current, head, case.thresholds.close)
+    head = _finish_close(current, head, case.thresholds)
+    rest = [r for r in fits if not any(r is a for a in answers)]
+    return Ranking(_one_law_per_name(sorted([*head, *rest], key=lambda r: -r.evidence)), tuple(probes))
+
+
+def _probe_all(case: Case, current: Fit, cancel: Cancel, earlier: Sequence[Probe]) -> list[Probe]:
+    """Probes of every hypothesis, the most promising first; flexible gears only on joints where something is wrong."""
+    point, options, thresholds = current.point, case.options, case.thresholds
     free = {u.name for u in point.unknowns if u.deviation is None}
     every = [
-        c
-        for c in candidates(point.model, options.effects, options.joints)
-        if c.name not in excluded and not {p.name for p in c.main} <= free  # what has been added is free already
+        h
+        for h in hypotheses(point.model, options.effects, options.joints)
+        if h.name not in case.excluded and not {p.name for p in h.main} <= free  # what has been added is free already
     ]
-    every = still_promising(point, every, earlier, REMEMBERED * thresholds.interesting)
-    progress(0.0, "probing the known effects")
-    probes = probed(observation, point, [c for c in every if c.name not in FLEXIBLE])
+    every = keep_promising(point, every, earlier, REMEMBERED * thresholds.interesting)
+    probes = probe(point, [h for h in every if h.name not in FLEXIBLE])
     stop_if(cancel)
     joints = options.joints or point.model.machine.modelled_joints
     if options.effects is None or set(TONES) & set(options.effects):
-        tones = proposed_tones(observation, point, joints)
-        probes += [t for t in tones if options.effects is None or t.candidate.name in options.effects]
-    flagged = _flagged(probes, joints, thresholds)
-    probes += probed(observation, point, [c for c in every if c.name in FLEXIBLE and c.joints[0] in flagged])
+        tones = propose_tones(point, joints)
+        probes += [t for t in tones if options.effects is None or t.hypothesis.name in options.effects]
+    flagged = _flagged_joints(probes, joints, thresholds.interesting)
+    probes += probe(point, [h for h in every if h.name in FLEXIBLE and h.joints[0] in flagged])
     probes.sort(key=lambda p: -p.gain)
-    chosen = [p for p in probes if _hopeful(observation, p, thresholds)][: options.fitted]
-    fits = _fitted(observation, current, chosen, thresholds, progress, cancel)
-    progress(0.9, "fitting effects of several joints")
-    fits += fitted_together(observation, current, fits, probes, thresholds, cancel)
-    fits.sort(key=lambda r: -r.evidence)
-    answers = _different(fits)[: options.polished]
-    if astray(current.point):
-        answers += _most_promised(fits, answers)[: options.polished]
-    stop_if(cancel)
-    head = _polished(observation, current, answers)
-    head = _begun_again(observation, current, head, thresholds)
-    head = _told_apart(observation, current, head, thresholds)
-    rest = [r for r in fits if not any(r is a for a in answers)]
-    return Ranking(_one_a_name(sorted([*head, *rest], key=lambda r: -r.evidence)), tuple(probes))
+    return probes
 
 
-def _hopeful(observation: Observation, probed: Probed, thresholds: Thresholds) -> bool:
+def _flagged_joints(probes: Sequence[Probe], joints: Sequence[int], interesting: float) -> set[int]:
+    """Joints where probes promise something."""
+    best = {j: max((p.gain for p in probes if j in p.hypothesis.joints), default=0.0) for j in joints}
+    most = max(best.values(), default=0.0)
+    return {j for j, gain in best.items() if gain >= interesting and gain >= FLAGGED_SHARE * most}
+
+
+def _is_hopeful(current: Fit, probed: Probe, thresholds: Thresholds) -> bool:
     """Whether a probe promises enough of what its effect would need."""
-    needed = thresholds.significant + price_of(observation, probed.candidate)
+    needed = thresholds.significant + price_of(current.point.observation, probed.hypothesis)
     return probed.gain >= max(thresholds.interesting, PROMISING * needed)
 
 
-def _fitted(
-    observation: Observation, current: Judged, chosen: Sequence[Probed], thresholds: Thresholds, progress: Progress,
-    cancel: Cancel,
-) -> list[Refitted]:  # fmt: skip
+def _fit_all(
+    current: Fit, chosen: Sequence[Probe], close: float, progress: Progress, cancel: Cancel
+) -> list[CandidateFit]:
     """Fits of the probed candidates, the most promising first, until there is no hope left."""
-    fits: list[Refitted] = []
+    observation = current.point.observation
+    fits: list[CandidateFit] = []
     for begin in range(0, len(chosen), AT_ONCE):
         stop_if(cancel)
         least = HOPELESS * max((f.evidence for f in fits), default=0.0) if begin >= ALWAYS_FITTED else -math.inf
         now = [one for one in chosen[begin : begin + AT_ONCE] if one.gain >= least]
         if not now:
             break
-        names = " and ".join(describe(one.candidate.name, one.candidate.joints) for one in now)
+        names = " and ".join(effect_on(one.hypothesis.name, one.hypothesis.joints) for one in now)
         progress(0.4 + 0.5 * begin / len(chosen), f"fitting {names}")
-        reach = min((_priced(observation, f) for f in fits if f.misfit < STRANGE), default=None)
+        explaining = (f for f in fits if f.misfit < STRANGE)
+        reach = min((f.fit.point.cost + price_of(observation, f.hypothesis) for f in explaining), default=None)
 
-        def fit(probed: Probed, reach: float | None = reach) -> Refitted | None:
-            goal = None if reach is None else reach + thresholds.close - price_of(observation, probed.candidate)
-            return refitted(observation, current, probed, goal)
+        def fit(probed: Probe, reach: float | None = reach) -> CandidateFit | None:
+            goal = None if reach is None else reach + close - price_of(observation, probed.hypothesis)
+            return refit(current, probed, goal)
 
         fits += [f for f in side_by_side(fit, now) if f is not None]
     return fits
 
 
-def _priced(observation: Observation, fit: Refitted) -> float:
-    return fit.judged.point.cost + price_of(observation, fit.candidate)
-
-
-def _different(fits: Sequence[Refitted]) -> list[Refitted]:
-    """The best fit of every answer that has something for it; `fits` are sorted."""
-    found: list[Refitted] = []
+def _different(fits: Sequence[CandidateFit]) -> list[CandidateFit]:
+    """The best fit of every answer with positive evidence. fits: sorted."""
+    found: list[CandidateFit] = []
     for fit in fits:
         if fit.evidence > 0 and not any(same_answer(fit, better) for better in found):
             found.append(fit)
     return found
 
 
-def _most_promised(fits: Sequence[Refitted], besides: Sequence[Refitted]) -> list[Refitted]:
-    """Fits of other answers whose probes promise most, whatever their evidence: compared with a point that has gone
-    astray, it says nothing before they have been begun again."""
-    found: list[Refitted] = []
-    for fit in sorted(fits, key=lambda f: -f.probed.gain):
+def _most_promising(fits: Sequence[CandidateFit], besides: Sequence[CandidateFit]) -> list[CandidateFit]:
+    """Fits of other answers whose probes promise most, whatever their evidence: compared with a point that has diverged
+    from the prior, evidence means nothing before they are restarted."""
+    found: list[CandidateFit] = []
+    for fit in sorted(fits, key=lambda f: -f.probe.gain):
         if not any(same_answer(fit, other) for other in (*besides, *found)):
             found.append(fit)
     return found
 
 
-def _polished(observation: Observation, current: Judged, answers: Sequence[Refitted]) -> list[Refitted]:
+def _polish_best(current: Fit, answers: Sequence[CandidateFit]) -> list[CandidateFit]:
     """The answers, polished where that could make them the best."""
     least = WORTH_POLISHING * max((r.evidence for r in answers), default=0.0)
 
-    def work(found: Refitted) -> Refitted:
-        return polished(observation, current, found) if found.evidence >= least else found
+    def work(found: CandidateFit) -> CandidateFit:
+        return polish(current, found) if found.evidence >= least else found
 
     return side_by_side(work, answers)
 
 
-def _told_apart(
-    observation: Observation, current: Judged, head: Sequence[Refitted], thresholds: Thresholds
-) -> list[Refitted]:
+def _restart_unexplained(current: Fit, head: Sequence[CandidateFit], close: float) -> list[CandidateFit]:
+    """The best fits, those restarted that have not explained the record with likely numbers: all of them where none has
+    explained it, else those close to the best. Fits of several joints have been restarted already."""
+    best = max(head, key=lambda r: r.evidence, default=None)
+    least = -math.inf if best is None or best.misfit >= STRANGE else best.evidence - close
+    goal = math.inf if best is None else best.fit.point.cost + close
+
+    def again(found: CandidateFit) -> CandidateFit:
+        hopeless = found.evidence < least or len(found.hypothesis.joints) > 1
+        return found if hopeless else restart(current, found, goal)
+
+    return side_by_side(again, head)
+
+
+def _finish_close(current: Fit, head: Sequence[CandidateFit], thresholds: Thresholds) -> list[CandidateFit]:
     """The best fits, those of them that are close taken to their ends; a clear lead needs none of that."""
     best = max((r.evidence for r in head), default=0.0)
     close = [r for r in head if r.evidence > best - thresholds.close]
     if best < thresholds.significant or len(close) < 2:
         return list(head)
-    ends = side_by_side(partial(finished, observation, current), close)
+    ends = side_by_side(partial(finish, current), close)
     return [next((end for c, end in zip(close, ends, strict=True) if c is r), r) for r in head]
 
 
-def _begun_again(
-    observation: Observation, current: Judged, head: Sequence[Refitted], thresholds: Thresholds
-) -> list[Refitted]:
-    """The best fits, those begun again that have not explained the record with numbers that can be: all of them where
-    none has explained it, else those that are close to the best. Of several joints it has been done."""
-    best = max(head, key=lambda r: r.evidence, default=None)
-    least = -math.inf if best is None or best.misfit >= STRANGE else best.evidence - thresholds.close
-    goal = math.inf if best is None else best.judged.point.cost + thresholds.close
-
-    def again(found: Refitted) -> Refitted:
-        hopeless = found.evidence < least or len(found.candidate.joints) > 1
-        return found if hopeless else begun_again(observation, current, found, goal)
-
-    return side_by_side(again, head)
-
-
-def describe(name: str, joints: Sequence[int]) -> str:
-    """An effect and its place in words."""
-    where = "" if not joints else f" on joint{'s' if len(joints) > 1 else ''} {', '.join(str(j) for j in joints)}"
-    return name.replace("_", " ") + where
-
-
-def _one_a_name(fits: Sequence[Refitted]) -> tuple[Refitted, ...]:
-    """Of an effect that was tried with two laws at one place, the better."""
+def _one_law_per_name(fits: Sequence[CandidateFit]) -> tuple[CandidateFit, ...]:
+    """The better fit of an effect that was tried with two laws at one place."""
     seen: set[tuple[str, tuple[int, ...]]] = set()
     kept = []
     for fit in fits:
-        key = fit.candidate.name, fit.candidate.joints
+        key = fit.hypothesis.name, fit.hypothesis.joints
         if key not in seen:
             seen.add(key)
             kept.append(fit)
     return tuple(kept)
-
-
-def _flagged(probes: Sequence[Probed], joints: Sequence[int], thresholds: Thresholds) -> set[int]:
-    """Joints where probes promise something."""
-    best = {j: max((p.gain for p in probes if j in p.candidate.joints), default=0.0) for j in joints}
-    most = max(best.values(), default=0.0)
-    return {j for j, gain in best.items() if gain >= thresholds.interesting and gain >= FLAGGED_SHARE * most}

@@ -1,8 +1,8 @@
-"""Spectra of the residual as a torque: which angle or time frequency a ripple or a disturbance would have.
+"""Spectra of the residual as a torque: they propose the rate of a ripple (waves a turn) or of a disturbance (Hz).
 
-The response of a joint's reading to a torque on it is taken as a finite impulse response, fitted to what a
-few small simulated tones change. It is only right on average, friction being what it is, but a proposal is all that is
-needed: the fit that follows uses the model itself.
+The response of a joint's reading to a torque on it is described by a finite impulse response, fitted to what a few
+small simulated tones change. Because of friction it is right only on average, but a proposal is all that is needed: the
+fit that follows uses the model itself.
 """
 
 from __future__ import annotations
@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import fft, ifft, next_fast_len
 
-from daq.contracts.machine import Machine
-from model.discrepancy.candidates.library import TONES, Candidate, tone
-from model.discrepancy.candidates.probing import Probed, Projection, projection
+from model.discrepancy.candidates.library import TONES, Hypothesis, tone
+from model.discrepancy.candidates.probing import Probe, Projection, projection
 from model.discrepancy.output_error.observation import DIFFERENCE, Observation
 from model.discrepancy.output_error.search import Point
 from model.fitting.records import Record, resolution
@@ -26,57 +25,57 @@ from model.machine_model.model import Model
 Floats = NDArray[np.float64]
 
 RESPONSE = 1.5
-"""s; length of the impulse response, for a simulation that follows the record comes back slowly."""
+"""Length of the impulse response, s: a simulation that is given most of the record returns slowly."""
 SHAPES = {"torque_ripple": "cycles", "periodic_disturbance": "frequency"}
-"""The parameter of each that a spectrum finds."""
+"""The parameter of each effect that a spectrum finds."""
 TRIAL_RATES = {"torque_ripple": (23.0, 47.0), "periodic_disturbance": (0.7, 2.1, 4.3)}
-"""At which the response is taken: rad of the tone per unit of the joint's travel; Hz."""
+"""Rates of the tones that the response is fitted to: rad of phase per unit of the joint's travel; Hz."""
 MOST_TONES = 500
-"""Tones tried of one effect on one joint, unless the record is so long that they would miss some between them."""
+"""Tones tried of one effect on one joint, unless the record is so long that tones between them would be missed."""
 HIGHEST = 8.0
-"""Hz; the arm follows no faster."""
+"""Highest frequency that is tried, Hz: the arm follows no faster."""
 SHORTEST_WAVE = 4096 / 75
-"""Counts of the sensor that a wave must be long: an assumption. On 12 bits over 270° that is a hundredth of a joint
-turn, which the fastest ramp of the presets, 20 counts a period, still reads more than twice."""
+"""Shortest wave that is tried, in counts of the sensor: an assumption. On 12 bits over 270° it is a hundredth of a
+joint turn, which the fastest ramp of the presets, 20 counts a period, still samples more than twice."""
 BLOCK = 4_000_000
-"""Samples of tones that are held at a time: 64 MB."""
+"""Samples of tones in memory at a time: 64 MB."""
 
 
-def proposed_tones(observation: Observation, point: Point, joints: Sequence[int]) -> list[Probed]:
-    """The best ripple and the best disturbance of every joint, the most promising first; of a joint that has one of
-    them already, the other."""
+def propose_tones(point: Point, joints: Sequence[int]) -> list[Probe]:
+    """The best ripple and the best disturbance of every joint, the most promising first; only the other one for a joint
+    that has one of them already."""
     clear, found = projection(point), []
     for joint in joints:
         absent = _absent(point.model, joint)
         if not absent:
             continue
-        shown_by = _most_moving(observation, joint, point.model)
+        shown_by = _most_moving(point.observation, joint)
         if shown_by is None:
             continue
-        response = torque_response(observation, point, joint, shown_by)
+        response = torque_response(point, joint, shown_by)
         for name in absent:
-            best = _best_tone(observation, point, clear, name, joint, response)
+            best = _best_tone(point, clear, name, joint, response)
             if best is not None:
                 found.append(best)
     return sorted(found, key=lambda p: -p.gain)
 
 
-def tones_tried(observation: Observation, candidate: Candidate) -> int:
-    """How many tones the one of a candidate was chosen from, at least MOST_TONES: what it costs in evidence."""
-    rates = rates_tried(observation, candidate.model.machine, candidate.name, candidate.joints[0])
+def tones_tried(observation: Observation, hypothesis: Hypothesis) -> int:
+    """Number of tones that a hypothesis' tone was chosen from, at least MOST_TONES: it decides the cost in evidence."""
+    rates = rates_tried(observation, hypothesis.name, hypothesis.joints[0])
     return max(MOST_TONES, len(rates))
 
 
-def rates_tried(observation: Observation, machine: Machine, name: str, joint: int) -> Floats:
-    """(k,) Hz of a disturbance, or rad of a ripple per unit of the joint's travel (waves a turn), in equal steps. None
-    where a joint does not move by a wave.
+def rates_tried(observation: Observation, name: str, joint: int) -> Floats:
+    """Rates (k,) in equal steps: Hz of a disturbance, or rad of a ripple per unit of the joint's travel (waves a turn).
+    None where a joint moves by less than a wave.
 
-    Two tones closer than one over the record's length (its travel) look alike to it. Steps are a half (an eighth) of
-    that, wider where they would be more than MOST_TONES, and never wider than that.
+    Tones that differ by less than one over the record's duration (its travel) cannot be distinguished. Steps are half
+    (an eighth) of that; wider, up to that itself, where they would be more than MOST_TONES.
     """
+    machine = observation.machine
     column = machine.modelled_joints.index(joint)
-    named = f".{SHAPES[name]}"
-    high = next(p.high for p in effect_parameters(machine, name, (joint,), shared=False) if p.name.endswith(named))
+    high = next(p.high for p in effect_parameters(machine, name, (joint,), shared=False) if p.part == SHAPES[name])
     if name == "torque_ripple":
         travel = max(float(np.ptp(r.measured[:, column])) for r in observation.records)
         sensor = machine.joint(joint).sensor
@@ -94,9 +93,9 @@ def rates_tried(observation: Observation, machine: Machine, name: str, joint: in
     return np.linspace(low, high, int(max(2.0, min(span / step, max(MOST_TONES, math.ceil(span / alike) + 1)))))
 
 
-def _most_moving(observation: Observation, joint: int, model: Model) -> int | None:
-    """The record in which a joint travels furthest, of those that are twice as long as a response; None without any."""
-    column = model.machine.modelled_joints.index(joint)
+def _most_moving(observation: Observation, joint: int) -> int | None:
+    """The record in which a joint travels furthest, of those at least twice as long as a response; None without any."""
+    column = observation.machine.modelled_joints.index(joint)
     travels = [
         float(np.ptp(r.measured[:, column])) if len(r.measured) >= 2 * _samples(r) else -1.0
         for r in observation.records
@@ -106,16 +105,17 @@ def _most_moving(observation: Observation, joint: int, model: Model) -> int | No
 
 
 def _samples(record: Record) -> int:
-    """Of an impulse response, at a record's rate."""
+    """Samples of an impulse response at a record's rate."""
     return max(2, round(RESPONSE / record.inputs.period))
 
 
-def torque_response(observation: Observation, point: Point, joint: int, record: int = 0) -> Floats:
+def torque_response(point: Point, joint: int, record: int = 0) -> Floats:
     """Impulse response (s,) of a joint's reading to a torque on it, rad/(N·m), as one record shows it.
 
-    It is taken with tones that the joint has not yet: to move those it has would show what their own size does. Raises
-    ValueError where it has both.
+    It is found with kinds of tones that the joint does not have yet, because changing those it has would show what
+    their own amplitude does. Raises ValueError where it has both.
     """
+    observation = point.observation
     column, model = point.model.machine.modelled_joints.index(joint), point.model
     absent = _absent(model, joint)
     if not absent:
@@ -133,7 +133,7 @@ def torque_response(observation: Observation, point: Point, joint: int, record: 
             row[list(sine.slots)] += size
             vectors.append(row)
             sizes.append(size)
-            waves.append(np.sin(_phase(observation, point, name, column, np.array([value]), record)[0]))
+            waves.append(np.sin(_phase(point, name, column, np.array([value]), record)[0]))
     starts = [np.tile(i, (len(vectors), 1, 1)) for i in initials]
     shown = observation.readings(model, np.array(vectors), starts)[record][..., column]
     shown = (shown[1:] - shown[:1]) / np.array(sizes)[:, None]
@@ -147,7 +147,7 @@ def torque_response(observation: Observation, point: Point, joint: int, record: 
 
 
 def _absent(model: Model, joint: int) -> list[str]:
-    """The kinds of tones that a joint has not."""
+    """The kinds of tones that a joint does not have."""
     return [name for name in TONES if not any(u.name == name and joint in u.joints for u in model.effects)]
 
 
@@ -156,9 +156,9 @@ def _lagged(wave: Floats, count: int) -> Floats:
     return np.ascontiguousarray(np.lib.stride_tricks.sliding_window_view(padded, count)[:, ::-1])
 
 
-def _phase(observation: Observation, point: Point, name: str, column: int, values: Floats, record: int = 0) -> Floats:
+def _phase(point: Point, name: str, column: int, values: Floats, record: int = 0) -> Floats:
     """Phase (k, m) of tones of the given cycles or frequencies along a record."""
-    source = observation.records[record]
+    source = point.observation.records[record]
     if name == "torque_ripple":
         angle = source.measured[:, column] - point.residuals[record][:, column]
         return values[:, None] * angle[None]
@@ -167,11 +167,11 @@ def _phase(observation: Observation, point: Point, name: str, column: int, value
 
 
 def _passed(
-    observation: Observation, point: Point, name: str, column: int, values: Floats, response: Floats, record: int
+    point: Point, name: str, column: int, values: Floats, response: Floats, record: int
 ) -> NDArray[np.complex128]:
-    """Readings (k, m) that tones of unit torque make, the cosine as real part and the sine as imaginary part."""
-    source = observation.records[record]
-    waves = np.exp(1j * _phase(observation, point, name, column, values, record))
+    """Readings (k, m) that tones of unit torque cause, the cosine as real part and the sine as imaginary part."""
+    source = point.observation.records[record]
+    waves = np.exp(1j * _phase(point, name, column, values, record))
     if name == "torque_ripple":
         samples = waves.shape[1]
         room = next_fast_len(samples + len(response) - 1)
@@ -182,16 +182,15 @@ def _passed(
     return np.concatenate([waves[:, run] for run in source.runs], axis=1)
 
 
-def _best_tone(
-    observation: Observation, point: Point, clear: Projection, name: str, joint: int, response: Floats
-) -> Probed | None:
-    """The tone that explains most of what is left, the tolerance parameters having moved too."""
+def _best_tone(point: Point, clear: Projection, name: str, joint: int, response: Floats) -> Probe | None:
+    """The tone that explains most of what is left, once the tolerance parameters have moved too."""
+    observation = point.observation
     column = point.model.machine.modelled_joints.index(joint)
-    rates = rates_tried(observation, point.model.machine, name, joint)
+    rates = rates_tried(observation, name, joint)
     columns = np.arange(column, len(point.weighted), len(observation.deviations))
     best, shown = None, np.zeros_like(point.weighted)
     for own in np.array_split(rates, math.ceil(len(rates) * len(columns) / BLOCK)) if len(rates) else ():
-        waves = [_passed(observation, point, name, column, own, response, t) for t in range(len(observation.records))]
+        waves = [_passed(point, name, column, own, response, t) for t in range(len(observation.records))]
         both = np.concatenate(waves, axis=1) / observation.deviations[column]
         sine, cosine = np.ascontiguousarray(both.imag), np.ascontiguousarray(both.real)
         gains, first, second = _explained(clear, sine, cosine, columns)
@@ -202,14 +201,14 @@ def _best_tone(
     if best is None:
         return None
     gain, in_sine, in_cosine, rate = best
-    candidate = tone(point.model, name, joint, {"sine": in_sine, "cosine": in_cosine, SHAPES[name]: rate})
-    return None if candidate is None else Probed(candidate, gain, candidate.trials[0], clear.moves(shown), shown)
+    found = tone(point.model, name, joint, {"sine": in_sine, "cosine": in_cosine, SHAPES[name]: rate})
+    return None if found is None else Probe(found, gain, found.trials[0], clear.moves(shown), shown)
 
 
 def _explained(
     clear: Projection, sine: Floats, cosine: Floats, columns: NDArray[np.int64]
 ) -> tuple[Floats, Floats, Floats]:
-    """How much pairs of signals (k, m) take off, and how much of either does, (k,) each."""
+    """How much pairs of signals (k, m) take off the cost, and the amplitude of either signal, (k,) each."""
     by_sine, sines = clear.gains(sine, columns)
     by_cosine, cosines = clear.gains(cosine, columns)
     mixed = clear.cross(sine, cosine, columns)

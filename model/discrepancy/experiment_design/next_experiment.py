@@ -1,6 +1,6 @@
 """Which experiment to make next: the one on which the remaining candidates would differ most, for its robot time.
 
-Two candidates are as far apart as the one that is wrong would misfit a record of the other, after its parameters have
+The distance of two candidates is how badly the wrong one would fit a record of the other, after its parameters have
 moved as far as the traces made so far and their priors allow: d′² = min over Δ of |δ − TΔ|² + Δᵀ S Δ, with δ the
 difference of their readings in deviations of one reading, T the derivatives on the new experiment and S the information
 there is already. Either may be the wrong one; the smaller of the two d′ counts.
@@ -20,83 +20,74 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, OfferedExperiment
 from daq.contracts.trace import Trace
 from model.discrepancy.candidates.decision import Decision
-from model.discrepancy.candidates.ranking import Ranking, describe
-from model.discrepancy.diagnosis import NextExperiment, Verdict
-from model.discrepancy.experiment_design.reason import most_informative, separating
-from model.discrepancy.experiment_design.signals import (
-    Imagined,
-    Planner,
-    bounded,
-    imagined,
-    known_so_far,
-    names_of,
-    recorded,
-    shown,
-    tangents,
-    values_of,
-)
-from model.discrepancy.output_error import search
+from model.discrepancy.candidates.ranking import Ranking
+from model.discrepancy.diagnosis import UNWRITTEN, DifferencePlace, NextExperiment, Verdict
+from model.discrepancy.experiment_design.signals import Imagined, Planner, Prediction, imagine
+from model.discrepancy.grounds import Note
+from model.discrepancy.localisation.phases import PHASES, phases_of
+from model.discrepancy.output_error.candidate_fit import CandidateFit, judge, same_answer
 from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.refitting import Refitted, judge, same_answer
-from model.discrepancy.output_error.search import Point, with_new_tangents
+from model.discrepancy.output_error.search import Point, converge
+from model.effects.names import effect_on
 
 Floats = NDArray[np.float64]
 Pair = tuple[int, int]
 
 LEAST = 3.0
-"""Deviations below which a pair counts as not told apart: the evidence moves by 9, more than the margin of a name."""
+"""Separation of a pair, in deviations, that tells it apart: the evidence then moves by 9, more than the margin of a
+name."""
 SURE = 20.0
-"""Margin of evidence below which a name is asked about as well."""
+"""Margin of evidence below which an experiment is asked for although one effect was named."""
 MOST_RIVALS = 4
-"""The best of a group; every further one costs its simulations on every experiment."""
+"""Rivals that an experiment is chosen for: each one costs its simulations on every experiment."""
 SETTLING = 5
-"""Steps of a rival's fit at most, twice."""
+"""Steps of each search that takes a rival's fit to its end."""
 ENOUGH = 10.0
-"""Deviations beyond which more is of no use: a shorter experiment is better."""
+"""Separation beyond which more is of no use, in deviations: a shorter experiment is better."""
 
 
 @dataclass(frozen=True)
 class Asked:
-    """The experiment to make next, or None; `note` says why there is none, or what it will not tell apart."""
+    """The experiment to make next, or None. note: why there is none, or which candidates it will not tell apart."""
 
     experiment: NextExperiment | None
-    note: str | None = None
+    note: Note | None = None
 
 
 @dataclass(frozen=True)
 class Asker:
-    """What may be asked for. budget: s of robot time that are left; None for no limit."""
+    """The experiments that may be asked for. budget: s of robot time that are left; None for no limit."""
 
     experiments: tuple[OfferedExperiment, ...]
     plan: Planner
     budget: float | None = None
 
-    def after(
-        self, verdict: Verdict, observation: Observation, current: Point, rivals: Sequence[Refitted],
-        traces: Sequence[Trace],
-    ) -> Asked:  # fmt: skip
+    def after(self, verdict: Verdict, current: Point, rivals: Sequence[CandidateFit], traces: Sequence[Trace]) -> Asked:
         """What to make next: what separates the rivals of a name or a group; else what tells most of the arm."""
         if verdict in ("named", "ambiguous"):
-            if not rivals:
-                return Asked(None)
-            ended = settled(observation, rivals)
-            return best_experiment(ended, self.experiments, self.plan, self.budget) if len(ended) > 1 else Asked(None)
+            ended = converge_rivals(rivals)
+            return best_experiment(ended, self) if len(ended) > 1 else Asked(None)
         done = [t.record.spec for t in traces if t.record.spec is not None]
-        return most_information(current, self.experiments, self.plan, done, self.budget)
+        return most_information(current, self, done)
+
+    def imagine(self, experiment: OfferedExperiment, point: Point) -> Imagined | None:
+        """An experiment as a diagnosis would see it; None where it cannot be run or takes too long."""
+        there = imagine(point.model, experiment.spec, self.plan)
+        return None if there is None or (self.budget is not None and there.duration > self.budget) else there
 
 
 @dataclass(frozen=True)
-class _Judged:
-    """An experiment with its pairs' separations, and what of each difference could not be hidden, (N,)."""
+class _Separations:
+    """An experiment with its pairs' separations, and the part of each difference that could not be hidden, (N,)."""
 
     experiment: OfferedExperiment
     there: Imagined
-    separations: dict[Pair, float]
+    sizes: dict[Pair, float]
     left: dict[Pair, Floats]
 
 
-def rivals_of(ranking: Ranking, decision: Decision) -> tuple[Refitted, ...]:
-    """Candidates of a turn that another experiment should tell apart: a group, and what comes close to a name."""
+def rivals_of(ranking: Ranking, decision: Decision) -> tuple[CandidateFit, ...]:
+    """Candidates that another experiment should tell apart: a group, and what comes close to a name."""
     best = decision.best
     if best is None or decision.kind == "nothing":
         return ()
@@ -108,104 +99,95 @@ def rivals_of(ranking: Ranking, decision: Decision) -> tuple[Refitted, ...]:
     return (best, *close) if close else ()
 
 
-def settled(observation: Observation, rivals: Sequence[Refitted]) -> list[Refitted]:
+def converge_rivals(rivals: Sequence[CandidateFit]) -> list[CandidateFit]:
     """Rivals with their fits taken to the end, from derivatives computed there: a difference that a fit would still
-    take away separates nothing. A rival at the brink of instability, which has none, is left out."""
+    take away separates nothing. A rival on the verge of instability has no derivatives and is left out."""
     found = []
     for rival in rivals[:MOST_RIVALS]:
-        point = search.settled(observation, rival.judged.point, SETTLING)
+        point = converge(rival.fit.point, SETTLING)
         with suppress(SpecError):
-            found.append(replace(rival, judged=judge(observation, with_new_tangents(observation, point))))
+            found.append(replace(rival, fit=judge(point.with_new_tangents())))
     return found
 
 
-def best_experiment(
-    rivals: Sequence[Refitted], experiments: Sequence[OfferedExperiment], plan: Planner, budget: float | None = None
-) -> Asked:
+def best_experiment(rivals: Sequence[CandidateFit], asker: Asker) -> Asked:
     """The experiment on which the rivals that are hardest to tell apart differ most for its robot time; pairs that no
     experiment tells apart are named in the note."""
-    names = [describe(r.candidate.name, r.candidate.joints) for r in rivals]
-    points = [r.judged.point for r in rivals]
-    judged = [j for e in experiments if (j := _judged(rivals, e, plan, budget)) is not None]
+    names = [effect_on(r.hypothesis.name, r.hypothesis.joints) for r in rivals]
+    judged = [j for e in asker.experiments if (j := _separations(rivals, e, asker)) is not None]
     if not judged:
-        return Asked(None, f"no experiment within the limits{_within(budget)} is left that could tell {_or(names)}")
+        return Asked(None, Note(kind="no-experiment-left", values={"candidates": names, "budget": asker.budget}))
     pairs = list(combinations(range(len(rivals)), 2))
-    best = {pair: max(j.separations[pair] for j in judged) for pair in pairs}
+    best = {pair: max(j.sizes[pair] for j in judged) for pair in pairs}
     hopeless = [pair for pair in pairs if best[pair] < LEAST]
     told = [pair for pair in pairs if pair not in hopeless]
-    note = _hopeless(hopeless, best, names, budget)
+    note = _hopeless(hopeless, best, names, asker.budget)
     if not told:
         return Asked(None, note)
-    chosen = max(judged, key=lambda j: _worth(min(j.separations[p] for p in told), j.there.duration))
-    hardest = min(told, key=lambda p: chosen.separations[p])
-    separation = chosen.separations[hardest]
+    chosen = max(judged, key=lambda j: _worth(min(j.sizes[p] for p in told), j.there.duration))
+    hardest = min(told, key=lambda p: chosen.sizes[p])
+    separation = chosen.sizes[hardest]
     members = sorted({k for pair in told for k in pair})
-    reason = separating(
-        chosen.experiment.description, names[hardest[0]], names[hardest[1]], separation, points[hardest[0]].model,
-        chosen.there.observation, chosen.left[hardest], rivals[hardest[0]].candidate.joints,
-    )  # fmt: skip
-    return Asked(_next(chosen.experiment, chosen.there, tuple(names[k] for k in members), separation, reason), note)
+    place = _differs_at(rivals[hardest[0]], chosen.there.observation, chosen.left[hardest])
+    asked = _next(chosen.experiment, chosen.there, tuple(names[k] for k in members), separation)
+    hardest_names = (names[hardest[0]], names[hardest[1]])
+    return Asked(asked.model_copy(update={"hardest": hardest_names, "differs_at": place}), note)
 
 
-def most_information(
-    point: Point, experiments: Sequence[OfferedExperiment], plan: Planner, done: Sequence[ExperimentSpec],
-    budget: float | None = None,
-) -> Asked:  # fmt: skip
-    """Of the experiments for effects of every kind that were not made yet, the one that tells most of the arm; of the
-    others, if those take too long. None when one of them was made."""
-    if any(_same_motion(e.spec, s) for e in experiments if e.general for s in done):
+def most_information(point: Point, asker: Asker, done: Sequence[ExperimentSpec]) -> Asked:
+    """Of the general experiments that were not made yet, the one that tells most of the arm; of the others, if those
+    take too long. None when a general one was made."""
+    if any(_same_motion(e.spec, s) for e in asker.experiments if e.general for s in done):
         return Asked(None)
-    new = [e for e in experiments if not any(_same_motion(e.spec, s) for s in done)]
+    new = [e for e in asker.experiments if not any(_same_motion(e.spec, s) for s in done)]
     for general in (True, False):
-        found = [j for e in new if e.general is general and (j := _information(point, e, plan, budget)) is not None]
+        found = [j for e in new if e.general is general and (j := _information(point, e, asker)) is not None]
         if found:
             experiment, there, nats = max(found, key=lambda f: f[2])
-            return Asked(_next(experiment, there, (), 0.0, most_informative(experiment.description, nats)))
+            return Asked(_next(experiment, there, (), 0.0).model_copy(update={"information": nats}))
     return Asked(None)
 
 
-def _judged(
-    rivals: Sequence[Refitted], experiment: OfferedExperiment, plan: Planner, budget: float | None
-) -> _Judged | None:
-    points = [r.judged.point for r in rivals]
-    there = _possible(points[0], experiment, plan, budget)
+def _separations(rivals: Sequence[CandidateFit], experiment: OfferedExperiment, asker: Asker) -> _Separations | None:
+    points = [r.fit.point for r in rivals]
+    there = asker.imagine(experiment, points[0])
     if there is None:
         return None
-    records = [recorded(there, p) for p in points]
-    signals = [shown(own, p) for own, p in zip(records, points, strict=True)]
+    own = [Prediction(there, p).recorded() for p in points]
+    signals = [prediction.shown() for prediction in own]
     if not all(np.isfinite(s).all() for s in signals):
         return None
-    separations, left = {}, {}
+    sizes, left = {}, {}
     try:
-        first = _named(records[0], points[0], tangents(records[0], points[0], {}))
+        first = own[0].named(own[0].tangents({}))
         for a, b in combinations(range(len(rivals)), 2):
-            sides = [_unhidden(records[true], rivals[wrong], signals[true], first) for wrong, true in ((a, b), (b, a))]
-            separations[a, b], left[a, b] = min(sides, key=lambda side: side[0])
+            sides = [
+                _unhidden(Prediction(own[true].there, points[wrong]), rivals[wrong], signals[true], first)
+                for wrong, true in ((a, b), (b, a))
+            ]
+            sizes[a, b], left[a, b] = min(sides, key=lambda side: side[0])
     except SpecError:
         return None
-    return _Judged(experiment, there, separations, left)
+    return _Separations(experiment, there, sizes, left)
 
 
-def _named(there: Imagined, point: Point, derivatives: Floats) -> dict[str, Floats]:
-    return dict(zip(names_of(there, point), derivatives, strict=True))
-
-
-def _unhidden(there: Imagined, wrong: Refitted, target: Floats, known: dict[str, Floats]) -> tuple[float, Floats]:
+def _unhidden(
+    predicted: Prediction, wrong: CandidateFit, target: Floats, known: dict[str, Floats]
+) -> tuple[float, Floats]:
     """d′ of a rival that is wrong from what the record's own model would show, and what of the difference is left once
-    its parameters have moved. They move twice: what an effect does is not in proportion to its parameters.
+    its parameters have moved. They move twice: what an effect does is not proportional to its parameters.
 
     Raises SpecError when the simulation does not stay finite.
     """
-    point, information = wrong.judged.point, known_so_far(there, wrong.judged.point)
-    begun = values_of(there, point)
-    derivatives = tangents(there, point, known)
-    delta = target - shown(there, point)
+    information, begun = predicted.known_so_far(), predicted.values
+    derivatives = predicted.tangents(known)
+    delta = target - predicted.shown()
     moved = begun + np.linalg.solve(information + derivatives @ derivatives.T, derivatives @ delta)
-    moved = bounded(there, point, moved)
-    own = {p.name for p in wrong.candidate.free}
-    kept = {name: row for name, row in _named(there, point, derivatives).items() if name not in own}
-    derivatives = tangents(there, point, kept, moved)
-    delta, distance = target - shown(there, point, moved), moved - begun
+    moved = predicted.bounded(moved)
+    own = {p.name for p in wrong.hypothesis.free}
+    kept = {name: row for name, row in predicted.named(derivatives).items() if name not in own}
+    derivatives = predicted.tangents(kept, moved)
+    delta, distance = target - predicted.shown(moved), moved - begun
     if not np.isfinite(delta).all():
         raise SpecError("the simulation does not stay finite: the loop is unstable")
     gradient = derivatives @ delta - information @ distance
@@ -215,23 +197,19 @@ def _unhidden(there: Imagined, wrong: Refitted, target: Floats, known: dict[str,
 
 
 def _information(
-    point: Point, experiment: OfferedExperiment, plan: Planner, budget: float | None
+    point: Point, experiment: OfferedExperiment, asker: Asker
 ) -> tuple[OfferedExperiment, Imagined, float] | None:
-    there = _possible(point, experiment, plan, budget)
+    """The experiment with the information that it would add about the arm's parameters, nats."""
+    there = asker.imagine(experiment, point)
     if there is None:
         return None
     try:
-        new = tangents(recorded(there, point), point, {})
+        new = Prediction(there, point).recorded().tangents({})
     except SpecError:
         return None
-    known = known_so_far(there, point)
+    known = Prediction(there, point).known_so_far()
     nats = 0.5 * (np.linalg.slogdet(known + new @ new.T)[1] - np.linalg.slogdet(known)[1])
     return experiment, there, float(nats)
-
-
-def _possible(point: Point, experiment: OfferedExperiment, plan: Planner, budget: float | None) -> Imagined | None:
-    there = imagined(point.model, experiment.spec, plan)
-    return None if there is None or (budget is not None and there.duration > budget) else there
 
 
 def _worth(separation: float, duration: float) -> tuple[bool, float]:
@@ -244,24 +222,40 @@ def _same_motion(one: ExperimentSpec, other: ExperimentSpec) -> bool:
 
 
 def _next(
-    experiment: OfferedExperiment, there: Imagined, separates: tuple[str, ...], separation: float, reason: str
+    experiment: OfferedExperiment, there: Imagined, separates: tuple[str, ...], separation: float
 ) -> NextExperiment:
     return NextExperiment(
-        name=experiment.name, spec=experiment.spec, duration=there.duration, separates=separates,
-        predicted_separation=separation, reason=reason,
-    )  # fmt: skip
+        name=experiment.name,
+        spec=experiment.spec,
+        duration=there.duration,
+        separates=separates,
+        predicted_separation=separation,
+        reason=UNWRITTEN,
+        description=experiment.description,
+    )
 
 
-def _hopeless(pairs: Sequence[Pair], best: dict[Pair, float], names: Sequence[str], budget: float | None) -> str | None:
+def _hopeless(
+    pairs: Sequence[Pair], best: dict[Pair, float], names: Sequence[str], budget: float | None
+) -> Note | None:
+    """The note on pairs that no experiment tells apart."""
     if not pairs:
         return None
-    told = "; ".join(f"{names[a]} and {names[b]} ({best[a, b]:.1f} at most)" for a, b in pairs)
-    return f"no experiment within the limits{_within(budget)} separates by {LEAST:g} standard deviations: {told}"
+    told = [[names[a], names[b], best[a, b]] for a, b in pairs]
+    return Note(kind="not-separable", values={"pairs": told, "least": LEAST, "budget": budget})
 
 
-def _within(budget: float | None) -> str:
-    return "" if budget is None else f" and {budget:.0f} s"
-
-
-def _or(names: Sequence[str]) -> str:
-    return " from ".join(names)
+def _differs_at(rival: CandidateFit, observation: Observation, left: Floats) -> DifferencePlace:
+    """Joint and phase that hold most of the squared difference (N,) that a rival's parameters could not hide."""
+    model, joints = rival.fit.point.model, rival.hypothesis.joints
+    record = observation.records[0]
+    phases = np.concatenate([phases_of(model, record)[run] for run in record.runs])
+    energy = left.reshape(phases.shape) ** 2
+    total = max(float(energy.sum()), 1e-300)
+    sums = {
+        (joint, phase): float(energy[phases[:, column] == number, column].sum())
+        for column, joint in enumerate(model.machine.modelled_joints)
+        for number, phase in enumerate(PHASES)
+    }
+    (joint, phase), most = max(sums.items(), key=lambda item: item[1])
+    return DifferencePlace(joint=joint, phase=phase, share=most / total, other_joint=tuple(joints) != (joint,))

@@ -1,4 +1,4 @@
-"""What a reason is read from: the disagreement without an effect, and with it, beside what the joint did."""
+"""The samples in which patterns are looked for: residuals without and with an effect, and the joint's motion."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.machine import NoController
-from model.analysis.bodies import gravity_loads
 from model.discrepancy.localisation.phases import HOLD, asked_motion, asked_speed, directions, phases_of
 from model.fitting.records import Record, Signal
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, Simulation, at_rows, simulate
+from model.simulation.chain_of_model import gravity_loads
+from model.simulation.prepared import Options
+from model.simulation.simulate import Simulation, at_rows, simulate
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -60,13 +61,13 @@ class Motions:
 
 
 Left = Callable[[Model], Sequence[Floats]]
-"""Measured − simulated (m, n) a record, for a model: a simulation without noise unless the caller has a better one."""
+"""Measured − simulated of a model, (m, n) per record; a caller may have a better simulation than one without noise."""
 
 
 def motions(
     model: Model, without: Model, records: Sequence[Record], signal: Signal = "position", left: Left | None = None
 ) -> Motions:
-    """Records beside what a model with an effect and one without it make of them."""
+    """Records beside simulations with an effect (`model`) and without it."""
     parts = [_of_record(model, without, record, signal) for record in records]
     if left is not None:
         for part, plain, full in zip(parts, left(without), left(model), strict=True):
@@ -92,12 +93,18 @@ def _of_record(model: Model, without: Model, record: Record, signal: Signal) -> 
         "without": record.measured - _seen(plain, signal),
         "left": record.measured - _seen(full, signal),
         "time": np.repeat((inputs.rows * inputs.period)[:, None], asked.shape[1], axis=1),
-        "asked": asked, "speed": speed, "acceleration": np.gradient(speed, inputs.period, axis=0),
-        "direction": direction, "since_turn": _since_turn(direction, inputs.period),
-        "moving": phases_of(model, record) != HOLD, "gravity": gravity_loads(model, asked),
-        "drive": inputs.drive[rows], "error": inputs.set_points[rows] - record.measured,
-        "expected_drive": at_rows(plain.drive, inputs.rows), "expected_error": at_rows(plain.error, inputs.rows),
-    }  # fmt: skip
+        "asked": asked,
+        "speed": speed,
+        "acceleration": np.gradient(speed, inputs.period, axis=0),
+        "direction": direction,
+        "since_turn": _since_turn(direction, inputs.period),
+        "moving": phases_of(model, record) != HOLD,
+        "gravity": gravity_loads(model, asked),
+        "drive": inputs.drive[rows],
+        "error": inputs.set_points[rows] - record.measured,
+        "expected_drive": at_rows(plain.drive, inputs.rows),
+        "expected_error": at_rows(plain.error, inputs.rows),
+    }
 
 
 def _seen(run: Simulation, signal: Signal) -> Floats:

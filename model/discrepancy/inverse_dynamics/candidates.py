@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.machine import DcMotor, NoController
+from model import layout as at
 from model.discrepancy.inverse_dynamics.case import Case
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.effects.effect import Effect
 from model.effects.library import library
 from model.inverse_dynamics.recorded_motion import RESOLVED, RecordedMotion
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, levels_along
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 

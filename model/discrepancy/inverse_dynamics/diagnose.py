@@ -12,17 +12,18 @@ from numpy.typing import NDArray
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
-from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, SignalError, Step
-from model.discrepancy.explanation.notes import on_unfinished, on_what_is_stated
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, FoundValue, SignalError, Step
+from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
+from model.discrepancy.explanation.renderer import with_sentences
+from model.discrepancy.grounds import Note, Reason, Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.case import Case
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
 from model.discrepancy.inverse_dynamics.localisation import locate, remaining_shapes
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
-from model.discrepancy.inverse_dynamics.reasons import reason, with_sizes
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, evidence, search
-from model.discrepancy.inverse_dynamics.tolerances import tolerances
+from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.verdict import verdict
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
@@ -75,7 +76,7 @@ def diagnose_torques(
     work.notes += on_unfinished((*traces, *held_out))
     answer = work.answer([t.record.trace_id for t in traces], [t.record.trace_id for t in held_out], cutoff)
     robot = sum(float(t.time[-1] - t.time[0]) for t in traces)
-    return answer.model_copy(update={"seconds": time.perf_counter() - begun, "robot_seconds": robot})
+    return with_sentences(answer.model_copy(update={"seconds": time.perf_counter() - begun, "robot_seconds": robot}))
 
 
 def _refuse_unseen(options: TorqueOptions) -> None:
@@ -96,13 +97,14 @@ class _Workflow:
     added: frozenset[str] = frozenset()
     steps: list[Step] = field(default_factory=list)
     tried: tuple[Candidate, ...] = ()
-    notes: list[str] = field(default_factory=list)
+    notes: list[Note] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.begin = self.model
         self.now = self._fit(self.model)
         self.first = self.now.values
-        self.notes.append(tolerances(self.model)[1])
+        source = {"source": tolerances(self.model)[1], "share": FITTED_SHARE}
+        self.notes.append(Note(kind="tolerance-source", values=source))
 
     def run(self) -> None:
         """Take steps until nothing more is significant or holds."""
@@ -207,9 +209,10 @@ class _Workflow:
             rmse_holdout=signal_errors(self.model, before, after, case.noise) if case.held_out else (),
             excess_removed_holdout=self._excess_removed(squares[0], before, after) if case.held_out else None,
             where=locate(self.now, case),
-            reason=reason(chosen.effect, chosen.joints, values, removed, slides=self._slides(chosen.joints)),
+            reason=UNWRITTEN,
+            reason_data=Reason(removed=removed, slides=self._slides(chosen.joints)),
             adopted=holds,
-            rejected_because=None if holds else f"on records not fitted to the mean square falls by only {removed:.1%}",
+            refusal=None if holds else Refusal(kind="falls-too-little", numbers={"share": removed}),
         )
 
     def _excess_removed(self, fitted: Floats, before: Floats, after: Floats) -> float | None:
@@ -262,11 +265,9 @@ class _Workflow:
             if evidence(smaller, self.now, self.case.data, self.now.noise.memory, len(step.parameters), 1) < 0:
                 self.model, self.now = without.with_values(smaller.values), smaller
                 self.added -= set(step.parameters)
-                names = step.effect.replace("_", " ")
-                self.steps[index] = step.model_copy(
-                    update={"adopted": False, "rejected_because": "superfluous once a later effect was in"}
-                )
-                self.notes.append(f"{names}, step {index + 1}, was taken out again: a later effect explains it")
+                gone = {"adopted": False, "refusal": Refusal(kind="superfluous")}
+                self.steps[index] = step.model_copy(update=gone)
+                self.notes.append(Note(kind="taken-out-again", values={"effect": step.effect, "step": index + 1}))
 
     def _as_last_fitted(self) -> tuple[Step, ...]:
         """The steps with the parameters of the last fit: those of their own were biased by what was still missing."""
@@ -277,18 +278,16 @@ class _Workflow:
             if not own:
                 steps.append(step)
                 continue
-            slides = self._slides(step.joints)
-            told = with_sizes(step.reason, step.joints, step.parameters, last, slides=slides)
-            steps.append(step.model_copy(update={"parameters": last, "reason": told}))
+            steps.append(step.model_copy(update={"parameters": last}))
         return tuple(steps)
 
-    def _shares(self) -> str:
+    def _shares(self) -> Note:
         """Residual as a share of the recorded torque, before and after: a figure that is usual in the literature."""
         held = self.case.held_out
-        records, where = (held, "held-out traces") if held else (self.case.records, "the traces fitted to")
+        records = held or self.case.records
         before = holdout.relative_torque_error(self.begin.with_values(self.first), records)
         after = holdout.relative_torque_error(self.model.with_values(self.now.values), records)
-        return f"torque left unexplained on {where}: {before:.1%} of the recorded before, {after:.1%} after"
+        return Note(kind="torque-left", values={"held_out": bool(held), "before": before, "after": after})
 
     def _errors(self, records: tuple[RecordedMotion, ...]) -> tuple[SignalError, ...]:
         """Errors of every joint on these records, by the given model and by the one that comes out."""
@@ -303,16 +302,17 @@ class _Workflow:
         shapes = remaining_shapes(self.now, self.case)
         steps = self._as_last_fitted()
         adopted = [s for s in steps if s.adopted]
-        stated = on_what_is_stated((u for u in self.now.unknowns if u.name not in self.added), self.now.values)
+        stated = on_stated_numbers((u for u in self.now.unknowns if u.name not in self.added), self.now.values)
         lineage = Lineage(
             parent=self.begin.identity,
             traces=tuple(traces),
             fit={"fitted": [u.name for u in self.now.unknowns]},
-            note="; ".join(s.reason for s in adopted),
+            note="diagnosis",
         )
         return Diagnosis(
             verdict=verdict(steps, unexplained=bool(shapes) and not adopted),
-            summary=_summary(adopted, bool(shapes)),
+            summary=UNWRITTEN,
+            method="inverse-dynamics",
             steps=steps,
             rmse_fit=self._errors(self.case.records),
             rmse_holdout=self._errors(self.case.held_out),
@@ -326,7 +326,7 @@ class _Workflow:
             seconds=0.0,
             robot_seconds=0.0,
             significant=self.case.options.least_evidence,
-            notes=(*stated, self._shares(), *_assumptions(cutoff), *self.notes),
+            notes_data=(*stated, self._shares(), *_assumptions(cutoff), *self.notes),
         )
 
 
@@ -334,32 +334,15 @@ def _delays(found: Fitted) -> list[float]:
     return [found.fit.values[p.name] for p in found.parameters]
 
 
-def _timing_note(found: Fitted, records: Sequence[RecordedMotion]) -> str:
-    times = ", ".join(f"{1e3 * t:.2g} ms" for t in _delays(found))
-    least = 1e3 * min(record.sampled for record in records)
+def _timing_note(found: Fitted, records: Sequence[RecordedMotion]) -> Note:
+    period = min(record.sampled for record in records)
+    return Note(kind="drive-timing", values={"delays": _delays(found), "period": period})
+
+
+def _assumptions(cutoff: float) -> tuple[Note, ...]:
     return (
-        f"the drive acts {times} after its sample, less than the {least:.2g} ms between samples: taken for how it is "
-        "held between them, and for no effect"
-    )
-
-
-def _summary(adopted: Sequence[Step], more: bool) -> str:
-    rest = "something that none of the known effects explains is left" if more else ""
-    if not adopted:
-        return rest or "nothing significant: the torques are what the model expects, within its tolerances and noise"
-    named = []
-    for step in adopted:
-        where = f" on joint {', '.join(map(str, step.joints))}" if step.joints else ""
-        names = " or ".join(c.effect for c in step.group) if step.group else str(step.effect)
-        named.append(names.replace("_", " ") + where)
-    return "; ".join([*named, *([rest] if rest else [])])
-
-
-def _assumptions(cutoff: float) -> tuple[str, ...]:
-    unseen = "; ".join(f"{n.replace('_', ' ')} {why}" for n, why in NOT_IN_TORQUES.items())
-    return (
-        f"compared as torques below {cutoff:g} Hz; faster effects are not seen",
-        "samples at which a joint rests are left out: friction holds it with whatever torque it takes",
-        f"not looked for: {unseen}",
-        "positions are taken to be those of the links, behind the transmission",
+        Note(kind="cutoff", values={"cutoff": cutoff}),
+        Note(kind="resting-left-out"),
+        Note(kind="not-looked-for", values={"effects": NOT_IN_TORQUES}),
+        Note(kind="positions-of-links"),
     )

@@ -7,8 +7,16 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from model.discrepancy.diagnosis import AgainstWhat, Dependence, Phase, PhaseCell, RemainingShape, Where
-from model.discrepancy.explanation.numbers import plain
+from model.discrepancy.diagnosis import (
+    UNWRITTEN,
+    AgainstWhat,
+    Dependence,
+    Phase,
+    PhaseCell,
+    RemainingShape,
+    Where,
+    WorstPlace,
+)
 from model.discrepancy.inverse_dynamics.case import Case
 from model.discrepancy.inverse_dynamics.estimates import torque_unit
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
@@ -32,14 +40,6 @@ SHAPE_SHARE = 0.15
 """Least share of the remaining torque's variance that a shape must explain."""
 BEYOND_NOISE = 1.5
 """Least remaining torque that is given a shape, in noise floors."""
-SPOKEN = {
-    "ramp_start": "as it speeds up",
-    "steady_ramp": "in steady motion",
-    "reversal": "at reversals",
-    "creep": "in slow motion",
-    "hold": "at rest",
-}
-"""Phases of motion in words."""
 
 
 def phases(record: RecordedMotion, joint: int) -> list[Phase]:
@@ -98,12 +98,14 @@ def locate(now: BalanceFit, case: Case) -> Where:
         if worst is None or relative > worst[0]:
             worst = relative, joint, phase
     if worst is None:
-        return Where(joint=None, phase=None, summary="no joint moves", cells=(), dependences=())
+        return Where(joint=None, phase=None, summary=UNWRITTEN, cells=(), dependences=())
     ratio, joint, where = worst
     unit = torque_unit(model, joint)
     rms = ratio * floor[model.machine.modelled_joints.index(joint)]
-    summary = f"joint {joint}, mostly {SPOKEN[where]}: {plain(rms, 3)} {unit} rms, {plain(ratio)} times its noise"
-    return Where(joint=joint, phase=where, summary=summary, cells=tuple(cells), dependences=tuple(dependences))
+    place = WorstPlace(joint=joint, phase=where, ratio=ratio, rms=rms, unit=unit, whole_record=True)
+    return Where(
+        joint=joint, phase=where, summary=UNWRITTEN, cells=tuple(cells), dependences=tuple(dependences), worst=place
+    )
 
 
 def remaining_shapes(now: BalanceFit, case: Case) -> tuple[RemainingShape, ...]:

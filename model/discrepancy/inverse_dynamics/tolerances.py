@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
@@ -16,8 +17,12 @@ UNBOUNDED = 1e6
 """Bound of the search for a parameter without one, in its natural size."""
 
 
-def tolerances(model: Model, added: frozenset[str] = frozenset()) -> tuple[tuple[Unknown, ...], str]:
-    """Parameters that may be off, and a line for people on where their deviations come from.
+DeviationSource = Literal["stated", "fitted-before", "free"]
+"""Where deviations come from: the machine file; an assumption after an earlier fit; nowhere (nearly free)."""
+
+
+def tolerances(model: Model, added: frozenset[str] = frozenset()) -> tuple[tuple[Unknown, ...], DeviationSource]:
+    """Parameters that may be off, and where their deviations come from.
 
     Args:
         added: effects' parameters (full names) that the diagnosis itself put in; they have no prior.
@@ -26,18 +31,19 @@ def tolerances(model: Model, added: frozenset[str] = frozenset()) -> tuple[tuple
     stated = [p for p in own if p.deviation is not None and p.effect is None and not p.sets_torque_scale]
     bodies = [p for p in own if p.kind is Kind.INERTIA and p.value != 0.0]
     machine: list[tuple[Parameter, float | None]]
+    source: DeviationSource
     if stated:
         machine = [(p, p.deviation) for p in stated]
-        line = "parameters may be off by what the machine file states"
+        source = "stated"
     elif model.lineage.traces:
         machine = [(p, FITTED_SHARE * abs(p.value)) for p in bodies]
-        line = f"the machine file states no deviations; fitted bodies are taken to be known to {FITTED_SHARE:.0%}"
+        source = "fitted-before"
     else:
         machine = [(p, FREE_SHARE * abs(p.value)) for p in bodies]
-        line = "the machine file states no deviations; masses, centres and inertias are free"
+        source = "free"
     effects = [(p, p.deviation) for p in own if p.effect is not None]
     found = [free_unknown(p) for p in model.parameters if p.name in added]
-    return (*(_unknown(p, d) for p, d in (*machine, *effects)), *found), line
+    return (*(_unknown(p, d) for p, d in (*machine, *effects)), *found), source
 
 
 def free_unknown(p: Parameter) -> Unknown:

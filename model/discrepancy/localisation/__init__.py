@@ -1,1 +1,1 @@
-"""Where simulation and measurement disagree: by joint, time, phase of motion, and what the residual goes with."""
+"""Where simulation and measurement disagree: by joint, time, phase of motion, and what the residual depends on."""

@@ -1,4 +1,4 @@
-"""What a signal of a joint goes with: its mean against time, position, speed, direction and drive."""
+"""Dependence of a joint's signal: its mean against time, position, speed, direction and drive."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from model.machine_model.model import Model
 Floats = NDArray[np.float64]
 
 AGAINST: tuple[AgainstWhat, ...] = get_args(AgainstWhat)
-"""Quantities, in the order in which they are looked at."""
+"""The quantities, in the order in which they are examined."""
 BINS = 12
-"""Of a quantity, at most."""
+"""Most bins of a quantity."""
 BIN_SECONDS = 1.0
-"""s that a bin of time lasts at least."""
+"""Least duration of a bin of time, s."""
 DIRECTION_EDGES = np.array([-1.5, -0.5, 0.5, 1.5])
-"""Backwards, not yet moved, forwards."""
+"""Edges of the bins of direction: backwards, not yet moved, forwards."""
 
 
 @dataclass(frozen=True)
 class Quantities:
-    """All records of a machine one after the other: what a signal may go with.
+    """Quantities that a signal may depend on, all records of a machine in a row.
 
-    values: by name (m, n), NaN where it is not known. stretches: without gaps, over all records.
+    values: by name (m, n), NaN where it is not known. stretches: rows without gaps.
     """
 
     values: dict[AgainstWhat, Floats]
@@ -41,7 +41,7 @@ class Quantities:
 
 
 def quantities(model: Model, records: Sequence[Record]) -> Quantities:
-    """Quantities of records. Time is each record's own; the drive is what was recorded."""
+    """The quantities of records. Time is each record's own; the drive is the recorded one."""
     kinds = [model.machine.joint(j).kind for j in model.machine.modelled_joints]
     angle = tuple("rad" if k == "revolute" else "m" for k in kinds)
     per_record = [_of_record(model, record) for record in records]
@@ -52,11 +52,14 @@ def quantities(model: Model, records: Sequence[Record]) -> Quantities:
     return Quantities(
         {name: np.concatenate([q[name] for q in per_record]) for name in AGAINST},
         {
-            "time": ("s",) * len(kinds), "position": angle, "speed": tuple(f"{a}/s" for a in angle),
-            "direction": ("1",) * len(kinds), "drive": drive_units(model),
+            "time": ("s",) * len(kinds),
+            "position": angle,
+            "speed": tuple(f"{a}/s" for a in angle),
+            "direction": ("1",) * len(kinds),
+            "drive": drive_units(model),
         },
         tuple(stretches),
-    )  # fmt: skip
+    )
 
 
 def drive_units(model: Model) -> tuple[str, ...]:
@@ -81,17 +84,21 @@ def _of_record(model: Model, record: Record) -> dict[AgainstWhat, Floats]:
     rows = np.round(inputs.rows).astype(np.int64)
     asked = asked_motion(model, record)
     moved = directions(model, record).astype(np.float64)
-    # A controller's drive holds the noise of the reading that it answers: a period later nothing goes with that.
+    # A controller's drive contains the noise of the reading it responds to; one period later they are uncorrelated.
     late = 0 if isinstance(model.machine.controller, NoController) else 1
     drive = inputs.drive[np.maximum(rows - late, 0)] if np.any(inputs.drive) else np.full_like(asked, np.nan)
     return {
         "time": np.repeat((inputs.time[rows] - inputs.time[0])[:, None], asked.shape[1], axis=1),
-        "position": asked, "speed": asked_speed(asked, inputs.period), "direction": moved, "drive": drive,
-    }  # fmt: skip
+        "position": asked,
+        "speed": asked_speed(asked, inputs.period),
+        "direction": moved,
+        "drive": drive,
+    }
 
 
 def _edges(quantity: Floats, against: AgainstWhat, stretches: Sequence[slice]) -> Floats | None:
-    """Edges of the bins: even in time and position, of even content in speed and drive, where most is near zero."""
+    """Edges of the bins: equally spaced in time and position, equally filled in speed and drive, where most values are
+    near zero."""
     values = np.concatenate([quantity[s] for s in stretches])
     values = values[np.isfinite(values)]
     if len(values) == 0 or np.ptp(values) < 1e-9:

@@ -20,17 +20,17 @@ PHASES: tuple[Phase, ...] = get_args(Phase)
 RAMP_START, STEADY_RAMP, REVERSAL, CREEP, HOLD = range(5)
 
 START = 0.3
-"""s after motion begins that count as its start."""
+"""Duration of the start of a motion, s."""
 TURNING = 0.5
-"""s after a change of direction that count as the reversal: a slow joint needs them to cross its free play."""
+"""Duration of a reversal after a change of direction, s: a slow joint needs it to cross its free play."""
 REST = 0.3
-"""s of standstill after which motion starts anew, also backwards; a shorter stop belongs to a reversal or a ramp."""
+"""Standstill after which motion starts anew, also backwards, s; a shorter stop belongs to a reversal or a ramp."""
 CREEPING_SPEED = 0.1
-"""rad/s (m/s) below which a motion is slow: 6 °/s, where friction's fall with speed and free play show."""
+"""Speed below which a motion is slow, rad/s (m/s): at 6 °/s, the fall of friction with speed and free play show."""
 SPEED_WINDOW = 0.2
-"""s over which a speed is taken: a slow ramp moves one step of its resolution in several periods."""
+"""Time over which a speed is taken, s: a slow ramp moves one step of its resolution in several periods."""
 LEAST_COUNTS = 1.5
-"""Counts of the sensor within that window below which a joint counts as at rest."""
+"""Counts of the sensor within that time below which a joint is at rest."""
 
 
 def asked_motion(model: Model, record: Record) -> Floats:
@@ -47,7 +47,7 @@ def asked_motion(model: Model, record: Record) -> Floats:
 
 
 def asked_speed(asked: Floats, period: float) -> Floats:
-    """Its speed (m, n), over a centred window of `SPEED_WINDOW`."""
+    """Speed (m, n) of such a motion, over a centred window of `SPEED_WINDOW`."""
     half = max(1, round(0.5 * SPEED_WINDOW / period))
     last = len(asked) - 1
     after = np.minimum(np.arange(last + 1) + half, last)
@@ -76,7 +76,7 @@ def _speed_beyond_rest(model: Model, record: Record) -> Floats:
 
 
 def _least_speed(model: Model, record: Record) -> Floats:
-    """(n,) speed below which a joint counts as at rest."""
+    """(n,) speed below which a joint is at rest."""
     if _measures_velocity(model):
         return 0.02 * np.abs(record.measured).max(axis=0)
     counted = not isinstance(model.machine.controller, NoController)
@@ -98,7 +98,7 @@ def _measures_velocity(model: Model) -> bool:
 
 
 def _phases(speed: Floats, period: float) -> Integers:
-    """Phases (m,) of one joint: slow, fast or no motion first; then what follows starts and changes of direction."""
+    """Phases (m,) of one joint: first slow, fast or no motion, then the starts and changes of direction."""
     found = np.where(speed == 0.0, HOLD, np.where(np.abs(speed) < CREEPING_SPEED, CREEP, STEADY_RAMP))
     start, turning = round(START / period), round(TURNING / period)
     last_direction, rested = 0.0, np.inf

@@ -1,10 +1,10 @@
 """Statistics of correlated residuals: how many independent samples a stretch is worth, and means in bins.
 
-Neighbouring residuals of a closed loop are alike, so m samples are not m observations. An autoregression fitted to the
-residual itself (the one that whitening uses) gives its autocorrelation ρ. The mean square of m neighbours is a sum of
-squares weighted by the eigenvalues of their correlation; of many samples it has the spread of one over
-m / (1 + 2 Σ (1 − k/m) ρ_k²) independent ones. The covariance of the mean in one bin with that in another is
-σ² Σ_k ρ_k times the number of sample pairs k apart, one in each.
+Neighbouring residuals of a closed loop are correlated, so m samples are not m observations. An autoregression fitted to
+the residual itself (the one that whitening uses) gives its autocorrelation ρ. The mean square of m neighbours is a sum
+of squares weighted by the eigenvalues of their correlation; of many samples it has the spread of one over m / (1 + 2 Σ
+(1 − k/m) ρ_k²) independent ones. The covariance of the mean in one bin with that in another is σ² Σ_k ρ_k times the
+number of sample pairs k apart, one in each.
 """
 
 from __future__ import annotations
@@ -21,25 +21,26 @@ from model.fitting.whitening import fitted_whitener
 Floats = NDArray[np.float64]
 
 LONGEST_MEMORY = 12
-"""Samples that the autoregression looks back, at most."""
+"""Largest order of the autoregression, samples."""
 LAGS = 100
-"""Samples over which correlation is followed; what lies beyond does not count."""
+"""Largest lag of the autocorrelation, samples; correlation beyond is neglected."""
 LARGEST = 1000.0
-"""Standard deviations; larger significances mean nothing."""
+"""Cap of a significance in standard deviations; larger values mean nothing."""
 BISECTIONS = 100
+"""Steps of the bisection for the saddle point."""
 FEWEST = 3.0
-"""Independent samples that a bin needs to be shown."""
+"""Independent samples that a bin needs to be reported."""
 
 
 @dataclass(frozen=True)
 class Correlation:
-    """Of a residual: its variance, and its autocorrelation (LAGS + 1,) beginning with 1."""
+    """Variance of a residual, and its autocorrelation (LAGS + 1,), beginning with 1."""
 
     variance: float
     values: Floats
 
     def samples_of_square(self, count: int) -> float:
-        """Independent samples that the mean square of `count` neighbours is worth."""
+        """Number of independent samples with the same spread of the mean square as `count` neighbours."""
         lags = np.arange(1, min(count, len(self.values)))
         return float(count / (1 + 2 * np.sum((1 - lags / count) * self.values[lags] ** 2)))
 
@@ -60,7 +61,7 @@ def correlation_of(runs: Sequence[Floats], floor: float) -> Correlation:
 
 
 def significance_of_squares(mean_squares: Floats, count: int, correlation: Correlation) -> Floats:
-    """Standard deviations by which mean squares of `count` neighbours (expected: 1) are too large, any shape.
+    """Standard deviations by which mean squares (any shape) of `count` neighbours exceed their expectation of 1.
 
     A mean square of correlated samples is a weighted sum of squares, its weights the eigenvalues of their correlation.
     Its tail follows by the saddle point (Lugannani and Rice 1980; Barndorff-Nielsen's r*), which holds far out, where
@@ -84,14 +85,14 @@ def significance_of_squares(mean_squares: Floats, count: int, correlation: Corre
 
 
 def significance_of_chi_square(mean_square: float, freedom: float) -> float:
-    """The same of the mean of `freedom` independent squares, by the same approximation in closed form."""
+    """The same for the mean of `freedom` independent squares, by the same approximation in closed form."""
     x = max(mean_square, 1e-6)
     w = np.sign(x - 1) * np.sqrt(freedom * max(x - 1 - np.log(x), 0.0))
     return float(_saddle_point(np.array(w), np.sqrt(0.5 * freedom) * (x - 1)))
 
 
 def chance_significance(trials: int, chance: float = 0.01) -> float:
-    """Standard deviations that the most significant of so many independent trials reaches by chance this often."""
+    """Significance that the largest of `trials` independent trials exceeds with probability `chance`."""
     return -float(ndtri(chance / max(trials, 1)))
 
 
@@ -107,7 +108,7 @@ class Bins:
     """Mean of a signal in bins of a quantity, (b,) each; NaN where there are too few samples.
 
     significance: of the whole dependence, in standard deviations. explained: share of the signal's variance that the
-    bins explain, beyond what as many bins of nothing would.
+    bins explain, beyond what as many bins of noise would.
     """
 
     centres: Floats
@@ -120,8 +121,8 @@ class Bins:
 def binned(signal: Floats, quantity: Floats, edges: Floats, stretches: Sequence[slice], floor: float) -> Bins:
     """Means of a signal (m,) in bins of a quantity (m,), NaN where the quantity does not count.
 
-    The correlation is that of what the bins leave; so a strong dependence does not pass for its own noise. What
-    counts is how the bins differ: a signal that is off by the same everywhere depends on nothing.
+    The correlation is that of the remainder after the bins, so that a strong dependence does not count as its own
+    noise. Only differences between bins matter: a constant offset depends on nothing.
 
     Args:
         edges: (b + 1,) of the bins. stretches: without gaps. floor: least standard deviation of the signal.
@@ -157,7 +158,8 @@ def _pairs(member: Floats, correlation: Floats) -> Floats:
 
 
 def _significance(means: Floats, spread: Floats) -> float:
-    """Of the differences between means with this covariance: their chi-square about the best common value."""
+    """Significance of the differences between means with this covariance: their chi-square about the best common
+    value."""
     if len(means) < 2:
         return 0.0
     values, vectors = np.linalg.eigh(spread)
@@ -170,7 +172,7 @@ def _significance(means: Floats, spread: Floats) -> float:
 
 
 def _explained(signal: Floats, left: Floats, spread: Floats, counts: Floats) -> float:
-    """1 − left/whole about the mean, less the share that means of nothing would take."""
+    """1 − left/whole about the mean, less the share that bins of noise would take."""
     whole = float(np.sum((signal - signal.mean()) ** 2)) if len(signal) else 0.0
     if whole <= 0.0:
         return 0.0

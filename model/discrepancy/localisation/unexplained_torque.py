@@ -1,14 +1,13 @@
 """What none of the known effects explains, as a torque at a joint: when, and against what.
 
-A joint answers a torque with a deviation of its reading: its loop brings it back. The answer to an impulse is taken
-from the model itself, at a moment of the record in which the joint slides; the torque that would leave the residual is
+A joint responds to a torque with a deviation of its reading, which its loop brings back. The impulse response is taken
+from the model itself, at a moment of the record in which the joint slides. The torque that would leave the residual is
 then found by deconvolution, as smooth as the noise of the residual allows. A joint that friction holds shows no torque,
-and what is found there means little. A torque at one joint that moves another is left out.
+so that the result means little there. Torques at one joint that move another are neglected.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -17,115 +16,116 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from daq.contracts.machine import NoController
-from model.analysis.bodies import chain_of
 from model.discrepancy.diagnosis import RemainingShape
 from model.discrepancy.localisation.dependence import AGAINST, dependence, quantities
 from model.discrepancy.localisation.disagreement import optional
+from model.discrepancy.localisation.residuals import Residuals
 from model.dynamics.recursive import mass_matrix
 from model.fitting.records import Record, Signal
 from model.machine_model.model import Model
+from model.machine_model.parameter import initial_velocity
+from model.simulation.chain_of_model import chain_of
 from model.simulation.period import OUT_READING, OUT_SPEED
-from model.simulation.simulate import Options, sensitivities, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import sensitivities, simulate
 
 Floats = NDArray[np.float64]
 
 MEMORY = 40
-"""Periods over which a joint's answer to an impulse is followed."""
+"""Length of the impulse response, control periods."""
 ROUGHEST, SMOOTHEST = 1e-6, 1e6
-"""Weights of smoothness between which the right one lies, relative to that of the data."""
+"""Bounds of the weight of smoothness, relative to that of the data."""
 TRIALS = 16
+"""Bisections between them."""
 LEAST_EXCESS = 1.1
-"""Mean square of the weighted residual from which there is anything to explain."""
+"""Least mean square of the weighted residual with anything to explain."""
 LEAST_EXPLAINED = 0.05
 """Share of the torque's variance below which a dependence is no shape."""
 LEAST_SIGNIFICANCE = 4.0
 """Standard deviations of a dependence below which it is not shown."""
 
 
-def shapes(
-    model: Model,
-    records: Sequence[Record],
-    residuals: Sequence[Floats],
-    deviations: Floats,
-    signal: Signal = "position",
-    following: float = 0.0,
-) -> tuple[RemainingShape, ...]:  # fmt: skip
+def remaining_shapes(
+    residuals: Residuals, signal: Signal = "position", feedback_share: float = 0.0
+) -> tuple[RemainingShape, ...]:
     """What is left as torques in bins of time, position, speed, direction and drive; what explains most comes first.
 
-    Args:
-        residuals: per record (m, n) measured − simulated. deviations: (n,) of their noise.
-        signal: what was measured. following: the share of recorded readings that the residuals' simulation was given.
+    Empty where no joint is off by more than noise, or where what is left depends on none of these.
 
-    Empty where no joint is off by more than noise, or what is left goes with none of these.
-    Raises SpecError when a simulation does not stay finite.
+    Args:
+        signal: what was measured. feedback_share: share of the recorded readings that the residuals' simulation was
+            given.
+
+    Raises:
+        SpecError: when a simulation does not stay finite.
     """
-    known = quantities(model, records)
+    machine = residuals.model.machine
+    known = quantities(residuals.model, residuals.records)
     found = []
-    for j, joint in enumerate(model.machine.modelled_joints):
-        kept = np.concatenate([r[run, j] for r, record in zip(residuals, records, strict=True) for run in record.runs])
-        if np.mean(np.square(kept)) < LEAST_EXCESS * deviations[j] ** 2:
+    for j, joint in enumerate(machine.modelled_joints):
+        if np.mean(np.square(residuals.of_joint(j))) < LEAST_EXCESS * residuals.deviations[j] ** 2:
             continue
-        torque = np.concatenate(
-            [
-                _torque(model, rec, r[:, j], j, float(deviations[j]), signal, following)
-                for rec, r in zip(records, residuals, strict=True)
-            ]
-        )
+        torque = np.concatenate(_torques(residuals, j, signal, feedback_share))
         size = float(np.sqrt(np.mean(torque**2)))
         for against in AGAINST:
             bins = dependence(torque, j, against, known, 1e-3 * size) if size > 0 else None
             if bins is None or bins.significance < LEAST_SIGNIFICANCE or bins.explained < LEAST_EXPLAINED:
                 continue
-            found.append(RemainingShape(
-                joint=joint, against=against, unit=known.units[against][j],
-                torque_unit="N·m" if model.machine.joint(joint).kind == "revolute" else "N",
-                centres=tuple(map(float, bins.centres)), torque=optional(bins.mean), deviation=optional(bins.deviation),
-                explained=bins.explained,
-            ))  # fmt: skip
+            found.append(
+                RemainingShape(
+                    joint=joint,
+                    against=against,
+                    unit=known.units[against][j],
+                    torque_unit="N·m" if machine.joint(joint).kind == "revolute" else "N",
+                    centres=tuple(map(float, bins.centres)),
+                    torque=optional(bins.mean),
+                    deviation=optional(bins.deviation),
+                    explained=bins.explained,
+                )
+            )
     return tuple(sorted(found, key=lambda s: -s.explained))
 
 
-def torque_of(
-    model: Model, record: Record, residual: Floats, deviations: Floats, signal: Signal = "position",
-    following: float = 0.0,
-) -> Floats:  # fmt: skip
-    """Torque (m, n), N·m or N, that leaves a residual (m, n) of a record, joint by joint."""
-    columns = [
-        _torque(model, record, residual[:, j], j, float(deviations[j]), signal, following)
-        for j in range(model.joint_count)
-    ]
-    return np.stack(columns, axis=1)
+def torque_of(residuals: Residuals, signal: Signal = "position", feedback_share: float = 0.0) -> list[Floats]:
+    """Torque (m, n) per record, N·m or N, that leaves its residual, joint by joint."""
+    columns = [_torques(residuals, j, signal, feedback_share) for j in range(residuals.model.joint_count)]
+    return [np.stack(own, axis=1) for own in zip(*columns, strict=True)]
 
 
-def _torque(
-    model: Model, record: Record, residual: Floats, j: int, deviation: float, signal: Signal, following: float
-) -> Floats:
-    """The same for one joint, (m,); zero outside the stretches that are compared."""
-    answer = _answer(model, record, j, signal, following)
-    torque = np.zeros(len(residual))
-    for run in record.runs:
-        torque[run] = _deconvolved(residual[run], answer, deviation)
-    return torque
+def _torques(residuals: Residuals, j: int, signal: Signal, feedback_share: float) -> list[Floats]:
+    """The same of one joint, (m,) per record; zero outside the stretches that are compared."""
+    found = []
+    for record, residual in zip(residuals.records, residuals.signals, strict=True):
+        response = _impulse_response(residuals.model, record, j, signal, feedback_share)
+        torque = np.zeros(len(residual))
+        for run in record.runs:
+            torque[run] = _deconvolved(residual[run, j], response, float(residuals.deviations[j]))
+        found.append(torque)
+    return found
 
 
-def _answer(model: Model, record: Record, j: int, signal: Signal, following: float) -> Floats:
+def _impulse_response(model: Model, record: Record, j: int, signal: Signal, feedback_share: float) -> Floats:
     """Readings (MEMORY,) after 1 N·m (N) at joint j for one period: exact derivatives by the speeds at the start.
 
     An impulse p at joint j changes all speeds by D⁻¹ e_j p.
     """
     loop: Literal["open", "closed"] = "open" if isinstance(model.machine.controller, NoController) else "closed"
-    run = simulate(model, record.inputs, Options(loop=loop, quantise=False, following=following))
+    run = simulate(model, record.inputs, Options(loop=loop, quantise=False, following=feedback_share))
     begin = _sliding(run.velocity[:, j])
     part = slice(begin, begin + MEMORY)
     inputs = replace(
-        record.inputs, time=record.inputs.time[part], set_points=record.inputs.set_points[part],
-        drive=record.inputs.drive[part], readings=record.inputs.readings[part],
+        record.inputs,
+        time=record.inputs.time[part],
+        set_points=record.inputs.set_points[part],
+        drive=record.inputs.drive[part],
+        readings=record.inputs.readings[part],
         initial=np.stack([run.position[begin], run.velocity[begin]], axis=1),
-        first_drive=run.drive[max(begin - 1, 0)].copy(), rows=np.arange(float(len(run.time[part]))),
+        first_drive=run.drive[max(begin - 1, 0)].copy(),
+        rows=np.arange(float(len(run.time[part]))),
         noise=record.inputs.noise[part],
-    )  # fmt: skip
-    names = [f"initial.joint{number}.velocity" for number in model.machine.modelled_joints]
-    slopes = sensitivities(model, inputs, names, Options(loop=loop, following=following)).of(
+    )
+    speeds_at_start = [initial_velocity(joint) for joint in model.machine.modelled_joints]
+    slopes = sensitivities(model, inputs, speeds_at_start, Options(loop=loop, following=feedback_share)).of(
         OUT_SPEED if signal == "velocity" else OUT_READING
     )
     speeds = np.linalg.inv(mass_matrix(chain_of(model), run.position[begin]))[:, j]
@@ -144,17 +144,17 @@ def _sliding(speed: Floats) -> int:
     return int(slowest[: count + 1].argmax())
 
 
-def _deconvolved(residual: Floats, answer: Floats, deviation: float) -> Floats:
-    """The smoothest torque (k,) whose answer leaves no more of the residual (k,) than noise."""
-    scale = float(answer @ answer)
+def _deconvolved(residual: Floats, response: Floats, deviation: float) -> Floats:
+    """The smoothest torque (k,) whose response leaves no more of the residual (k,) than noise."""
+    scale = float(response @ response)
     if scale == 0.0 or len(residual) < 2:
         return np.zeros(len(residual))
     low, high = np.log(ROUGHEST * scale), np.log(SMOOTHEST * scale)
     torque = np.zeros(len(residual))
     for _ in range(TRIALS):
         middle = 0.5 * (low + high)
-        torque = _smoothed(residual, answer, float(np.exp(middle)))
-        left = residual - np.convolve(torque, answer)[: len(residual)]
+        torque = _smoothed(residual, response, float(np.exp(middle)))
+        left = residual - np.convolve(torque, response)[: len(residual)]
         if np.mean(left**2) > deviation**2:
             high = middle
         else:
@@ -162,13 +162,13 @@ def _deconvolved(residual: Floats, answer: Floats, deviation: float) -> Floats:
     return torque
 
 
-def _smoothed(residual: Floats, answer: Floats, weight: float) -> Floats:
-    """Least squares of residual − answer ∗ torque with `weight` times the squared differences of neighbours."""
-    count, reach = len(residual), min(len(answer), len(residual))
+def _smoothed(residual: Floats, response: Floats, weight: float) -> Floats:
+    """Least squares of residual − response ∗ torque with `weight` times the squared differences of neighbours."""
+    count, reach = len(residual), min(len(response), len(residual))
     bands = np.zeros((reach, count))
     for lag in range(reach):
-        bands[lag, : count - lag] = answer[lag:reach] @ answer[: reach - lag]
+        bands[lag, : count - lag] = response[lag:reach] @ response[: reach - lag]
     bands[0] += weight * np.concatenate([[1.0], np.full(count - 2, 2.0), [1.0]]) + 1e-9 * bands[0, 0]
     bands[1, : count - 1] -= weight
-    right = np.convolve(residual[::-1], answer)[:count][::-1]
+    right = np.convolve(residual[::-1], response)[:count][::-1]
     return np.asarray(solveh_banded(bands, right, lower=True))

@@ -1,34 +1,39 @@
-"""α(t): which parameter would have to move for the model to explain a trace, how much, and with what it moves."""
+"""α(t): which parameter would have to vary for the model to explain a trace, how much, and with what it varies."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from daq.contracts.trace import Trace
+from model import layout as at
 from model.discrepancy.diagnosis import AgainstWhat, MovingParameter
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 from model.validation.names import names_to_validate
 from model.validation.time_domain import vary_in_time
 from model.validation.variation import Variation
 
 SHOWN = 5
-"""Parameters, those that explain most of what is left."""
+"""Most parameters that are reported, those that explain most of the residual."""
 LEAST_EXPLAINED = 0.02
-"""Share of the residual's energy below which a parameter's variation says nothing."""
+"""Share of the residual's energy that a reported parameter's variation explains at least."""
 BY_CHANCE = 0.1
-"""Share of the time that noise alone takes α(t) beyond two of its deviations, doubled."""
+"""Twice the share of the time for which noise alone takes α(t) beyond two of its deviations."""
 TERMS: dict[str, AgainstWhat] = {
-    "position": "position", "speed": "speed", "magnitude of speed": "speed", "direction": "direction",
-    "load": "position", "drive": "drive", "time": "time",
-}  # fmt: skip
-"""What the time-domain form calls a quantity, and what the answer calls it; gravity's load is a matter of position."""
+    "position": "position",
+    "speed": "speed",
+    "magnitude of speed": "speed",
+    "direction": "direction",
+    "load": "position",
+    "drive": "drive",
+    "time": "time",
+}
+"""The time-domain form's names of quantities, and the answer's; the load by gravity depends on the position."""
 
 
 def moving_parameters(model: Model, trace: Trace) -> tuple[MovingParameter, ...]:
     """The parameters whose variation with time explains most, by the distortion method's time-domain form.
 
-    Empty for a trace without recorded drive, and for a model with a flexible transmission, which that form has not.
+    Empty for a trace without recorded drive, and for a model with a flexible transmission, which that form lacks.
     """
     if trace.drive is None or (model.flags & at.HAS_FLEXIBILITY).any():
         return ()
@@ -39,11 +44,13 @@ def moving_parameters(model: Model, trace: Trace) -> tuple[MovingParameter, ...]
 
 
 def _moving(v: Variation) -> MovingParameter:
-    """Its range between the 5th and the 95th percentile of a Gaussian, noise taken off, in terms of its value."""
+    """A variation for the answer: its range is that between the 5th and the 95th percentile of a Gaussian, without
+    noise, relative to the parameter's value."""
     size = abs(v.value) if v.value != 0.0 else v.expected
     strongest = next((c for c in v.against if c.significant and c.regressor in TERMS), None)
     return MovingParameter(
-        parameter=v.name, relative_range=2 * 1.645 * v.deviation / size,
+        parameter=v.name,
+        relative_range=2 * 1.645 * v.deviation / size,
         moves_with=None if strongest is None else TERMS[strongest.regressor],
         correlation=0.0 if strongest is None else float(np.clip(strongest.value, -1.0, 1.0)),
-    )  # fmt: skip
+    )

@@ -1,8 +1,8 @@
-"""The recorded controller against its own numbers: what it did with its set points needs no model of the arm.
+"""Evidence from the recorded controller's own numbers, which needs no model of the arm.
 
-A record of the board holds what was sent, what it read, the error it formed and the power it gave. To rounding, the
-error must be set point − position and the power the gain times the error: a violation proves lost set points or a wrong
-gain by itself, and its absence excludes them.
+The board's record holds the set point that was sent, the position it read, the error it formed and the power it gave.
+Up to rounding, the error must be set point − position and the power the gain times the error. A violation proves lost
+set points or a wrong gain by itself, and its absence excludes them.
 """
 
 from __future__ import annotations
@@ -15,19 +15,24 @@ from numpy.typing import NDArray
 
 from daq.contracts.machine import BoardPid, Machine
 from daq.contracts.trace import Trace
+from model import layout as at
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
+from model.discrepancy.grounds import ControllerProof
+from model.discrepancy.output_error.holdout import signal_errors
+from model.discrepancy.output_error.observation import Observation, Signals
 from model.drives.controller import POWER_MAX
-from model.machine_model import layout as at
 from model.machine_model.model import Model
 
 COUNTS_OF_ROUNDING = 1.5
-"""An error may differ by this many counts: set points are rounded to posture units, those to counts."""
+"""Counts by which a recorded error may differ: set points are rounded to posture units, and those to counts."""
 LEAST_SHARE = 1e-3
-"""Share of samples above which lost set points are no accident of the record's start."""
+"""Share of wrong samples below which they may be an accident of the record's start."""
 LEAST_GAIN_DEVIATION = 0.01
-"""Relative deviation of a gain that rounding cannot explain."""
+"""Least relative deviation of a gain that is reported: rounding may explain a smaller one."""
 LEAST_POWER = 4.0
-"""DAC counts below which a sample says little about a gain."""
+"""Least power of a sample that is used for a gain, DAC counts: rounding dominates below it."""
 LEAST_SAMPLES = 20
+"""Samples that the estimate of a gain needs."""
 
 Floats = NDArray[np.float64]
 
@@ -48,11 +53,11 @@ class ControllerFinding:
 def check_controller(
     traces: Sequence[Trace], machine: Machine, model: Model | None = None
 ) -> tuple[ControllerFinding, ...]:
-    """Violations of the recorded controller on the modelled joints; none where the traces do not hold its numbers.
+    """Violations on the modelled joints; none where the traces do not hold the controller's numbers.
 
     Args:
-        model: whose gain errors the power is compared with; None: the gains are what they are said to be. What is
-            found is the whole error of a gain, not what it is beyond that.
+        model: its stated gain errors are what the power is compared with; None: the gains are as configured. A finding
+            gives the whole error of a gain, the stated one included.
     """
     if not isinstance(machine.controller, BoardPid):
         return ()
@@ -63,8 +68,8 @@ def check_controller(
     return tuple(finding for finding in found if finding is not None)
 
 
-def judged_by_records(traces: Sequence[Trace], machine: Machine) -> tuple[str, ...]:
-    """Effects of the controller that its own numbers prove or exclude, so that nothing need be fitted to tell.
+def settled_by_records(traces: Sequence[Trace], machine: Machine) -> tuple[str, ...]:
+    """Effects of the controller that its own numbers prove or exclude, so that no fit is needed for them.
 
     An effect counts only where it could be checked on every modelled joint and every trace holds what that needs. A
     gain is one number for all traces, so its samples may come from any of them.
@@ -74,7 +79,7 @@ def judged_by_records(traces: Sequence[Trace], machine: Machine) -> tuple[str, .
     joints = machine.modelled_joints
     checks = {
         "wrong_gain": all(_usable(traces, machine, joint) is not None for joint in joints),
-        "lost_set_points": all(_tells_of_losses(_losses(traces, machine, joint)) for joint in joints),
+        "lost_set_points": all(_is_conclusive(_losses(traces, machine, joint)) for joint in joints),
     }
     return tuple(name for name, judged in checks.items() if judged)
 
@@ -106,8 +111,8 @@ def with_used_set_points(trace: Trace) -> Trace:
 
 @dataclass(frozen=True)
 class _Losses:
-    """Samples of a joint: those in which the set point moved, those of them in which it was lost, those in which the
-    error is not set point − position, and all."""
+    """Counts of a joint's samples. moved: the set point changed; lost: of these, it was lost; wrong: the error is not
+    set point − position; samples: all."""
 
     moved: int
     lost: int
@@ -116,8 +121,33 @@ class _Losses:
 
     @property
     def violated(self) -> bool:
-        """Whether the recorded error is another one too often for an accident."""
+        """Whether the recorded error is wrong too often for an accident."""
         return self.wrong >= max(2.0, LEAST_SHARE * self.samples)
+
+
+def proved_step(observation: Observation, finding: ControllerFinding) -> Step:
+    """A step that a finding proves. Nothing is fitted: its evidence is the number of samples, its errors are zero."""
+    part = "relative" if finding.effect == "wrong_gain" else "share"
+    name = f"joint{finding.joint}.{finding.effect}.{part}"
+    value = FoundValue(value=finding.value, low=finding.low, high=finding.high, unit="1")
+    evidence = float(finding.samples)
+    proof = Candidate(
+        effect=finding.effect, joints=(finding.joint,), evidence=evidence, parameters={name: value}, refitted=False
+    )
+    quiet: Signals = tuple(np.zeros_like(r.measured) for r in observation.records)
+    return Step(
+        effect=finding.effect,
+        joints=(finding.joint,),
+        parameters={name: value},
+        evidence=evidence,
+        margin=evidence,
+        candidates=(proof,),
+        rmse_fit=signal_errors(observation, quiet, quiet, observation.deviations),
+        where=Where(joint=finding.joint, phase=None, summary=UNWRITTEN, cells=(), dependences=()),
+        reason=UNWRITTEN,
+        proof=ControllerProof(samples=finding.samples, of=finding.of),
+        adopted=True,
+    )
 
 
 def _losses(traces: Sequence[Trace], machine: Machine, joint: int) -> _Losses | None:
@@ -138,9 +168,9 @@ def _losses(traces: Sequence[Trace], machine: Machine, joint: int) -> _Losses | 
     return _Losses(moved, lost, total, sum(len(t) for t in traces))
 
 
-def _tells_of_losses(losses: _Losses | None) -> bool:
-    """Whether set points are known to have been lost, or not to: errors that are wrong although no set point moved are
-    something else, and hide what was lost."""
+def _is_conclusive(losses: _Losses | None) -> bool:
+    """Whether the counts prove or exclude lost set points. Errors that are wrong although no set point moved have
+    another cause, and hide what was lost."""
     return losses is not None and (losses.moved > 0 or not losses.violated)
 
 
@@ -153,8 +183,8 @@ def _lost_set_points(traces: Sequence[Trace], machine: Machine, joint: int) -> C
 
 
 def _wrong_gain(traces: Sequence[Trace], machine: Machine, joint: int, stated: float) -> ControllerFinding | None:
-    """Power over P times the error, where only P acts and the power is not at its limit, and what that differs by from
-    the gain error that is stated."""
+    """The ratio of power to P times error, where only P acts and the power is not at its limit, if it differs from the
+    stated gain error."""
     usable = _usable(traces, machine, joint)
     if usable is None:
         return None

@@ -1,4 +1,4 @@
-"""Σλ² of the distortion method from what a diagnosis has anyway: residuals and their derivatives, no simulation more.
+"""Σλ² of the distortion method from residuals and derivatives that a diagnosis has anyway, without simulations.
 
 Near a minimum the squared error grows with the square of a change of one parameter, E = |r|² + α² |∂r/∂θ|², so it
 doubles at α = |r| / |∂r/∂θ| (4.63). `model.validation.fidelity` finds the same change by simulations, also where the
@@ -21,15 +21,20 @@ Floats = NDArray[np.float64]
 
 
 def sum_of_contributions(
-    model: Model, names: Sequence[str], residual: Floats, derivatives: Floats, *, convention: Convention = "source",
+    model: Model,
+    names: Sequence[str],
+    residual: Floats,
+    derivatives: Floats,
+    *,
+    convention: Convention = "source",
     damping_ratio: float = DAMPING_RATIO,
-) -> float:  # fmt: skip
+) -> float:
     """Σλ² (4.92): at 1 or more, parameters that deviate as much as is expected of them explain the residual.
 
     Names that are no parameters of the model, and parameters of which no deviation is expected, do not count.
 
     Args:
-        residual: (N,) over all samples and joints, weighted as one likes. derivatives: (p, N) by the p names, alike.
+        residual: (N,) over all samples and joints, in any weighting. derivatives: (p, N) by the p names, in the same.
     """
     size = float(np.linalg.norm(residual))
     total = 0.0

@@ -1,4 +1,4 @@
-"""What a step brings on traces it was not fitted to."""
+"""The errors of a fit, on the fitted traces and on traces that were held out."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import SignalError
-from model.discrepancy.output_error.feedback_share import FOLLOWING_FOR_ERRORS
 from model.discrepancy.output_error.noise_floor import noise_floor
-from model.discrepancy.output_error.observation import Observation, Signals, observed
-from model.discrepancy.output_error.search import Point, point_at, searched
+from model.discrepancy.output_error.observation import Observation, Signals, observe
+from model.discrepancy.output_error.search import Point, descend, point_at
+from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
@@ -23,43 +23,44 @@ Floats = NDArray[np.float64]
 
 DISTURBANCE = "periodic_disturbance"
 BLOCK = 0.2
-"""s over which errors may be alike."""
+"""Time over which errors may be correlated, s."""
 START_STEPS = 8
-"""Of the search for where a held-out trace begins: with play in a gear, that is not a smooth problem."""
+"""Steps of the search for the initial posture of a held-out trace: with play in a gear, that is not a smooth
+problem."""
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Traces that no parameter is fitted to; `starts`: unknowns that are the postures they begin at, each of one
-    trace."""
+    """Traces that no parameter is fitted to. starts: the unknowns of their initial postures, each of one trace."""
 
     observation: Observation
     starts: tuple[Unknown, ...]
 
     def floor(self, point: Point) -> Floats:
-        """(n,) rad, as `noise_floor`, where each arm starts being estimated here as well."""
-        unknowns, values = _here(point, self.starts)
+        """(n,) rad, as `noise_floor`, with the initial postures estimated here as well."""
+        unknowns, values = _values_here(point, self.starts)
         here = replace(point, unknowns=unknowns, values=values)
         return noise_floor(self.observation, here, lambda made: replace(self, observation=made).residuals(point))
 
     def residuals(self, point: Point) -> Signals:
         """Measured − simulated (m, n) rad of every held-out trace, with the point's values.
 
-        What nothing that was fitted elsewhere can know is estimated from each trace itself: where its arm starts,
-        within a count or so, for friction holds it there; and at which phase it meets a periodic disturbance, whose
-        size and frequency stay.
+        Each trace itself tells what no other trace can: its initial posture, within a count or so, because friction
+        holds the arm there; and its phase of a periodic disturbance, whose amplitude and frequency are kept.
         """
         return tuple(
             _residuals(
-                _only(self.observation, t), point, tuple(replace(u, trace=0) for u in self.starts if u.trace == t)
+                _record(self.observation, t), point, tuple(replace(u, trace=0) for u in self.starts if u.trace == t)
             )
             for t in range(len(self.observation.records))
         )
 
     def rise(self, before: Signals, after: Signals) -> tuple[float, float]:
-        """How much the weighted sum of squares of residuals rises, and the standard deviation that noise
-        alone gives that number: from the scatter of its blocks of 0.2 s or so, which are nearly independent. Infinite
-        where the simulation does not stay finite."""
+        """Rise of the weighted sum of squares of residuals, and the standard deviation that noise alone gives it.
+
+        The deviation is taken from the scatter of blocks of 0.2 s or so, which are nearly independent. The rise is
+        infinite where the simulation does not stay finite.
+        """
         old, new = (self.observation.weighted(residuals) for residuals in (before, after))
         if not np.isfinite(new).all():
             return float("inf"), 0.0
@@ -70,7 +71,29 @@ class HeldOut:
         return float(risen.sum()), float(np.sqrt(len(blocks)) * blocks.std())
 
 
-def _only(observation: Observation, number: int) -> Observation:
+def hold_out(model: Model, traces: Sequence[Trace]) -> HeldOut | None:
+    """The held-out traces, ready; None without any. Raises TraceError and SpecError as for the fitted ones."""
+    if not traces:
+        return None
+    observation, _, unknowns = observe(model, traces, FEEDBACK_SHARE_FOR_ERRORS)
+    return HeldOut(observation, tuple(u for u in unknowns if u.kind is Kind.INITIAL_POSITION))
+
+
+def signal_errors(observation: Observation, before: Signals, after: Signals, floor: Floats) -> tuple[SignalError, ...]:
+    """Root mean square of every joint's residual before and after, beside the floor (n,) rad."""
+    found = []
+    for column, joint in enumerate(observation.machine.modelled_joints):
+        sizes = []
+        for signals in (before, after):
+            parts = [s[run, column] for s, r in zip(signals, observation.records, strict=True) for run in r.runs]
+            sizes.append(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
+        unit = "rad" if observation.machine.joint(joint).kind == "revolute" else "m"
+        least = float(floor[column])
+        found.append(SignalError(joint=joint, unit=unit, before=sizes[0], after=sizes[1], floor=least))
+    return tuple(found)
+
+
+def _record(observation: Observation, number: int) -> Observation:
     """One record of several."""
     own = slice(number, number + 1)
     return replace(observation, records=observation.records[own], prepared=observation.prepared[own])
@@ -80,24 +103,24 @@ def _residuals(observation: Observation, point: Point, starts: tuple[Unknown, ..
     """Measured − simulated (m, n) rad of the one record of an observation."""
     phases = _phases(point)
     if phases:
-        point = _turned(point, phases, _searched(observation, point, (*starts, *phases)))
-    return _searched(observation, point, starts).residuals[0]
+        point = _with_phases(point, phases, _fitted_here(observation, point, (*starts, *phases)))
+    return _fitted_here(observation, point, starts).residuals[0]
 
 
-def _searched(observation: Observation, point: Point, own: tuple[Unknown, ...]) -> Point:
-    """The point with unknowns of the record's own at their best; not searched for where it has none, or where no
-    simulation stays finite."""
-    unknowns, values = _here(point, own)
+def _fitted_here(observation: Observation, point: Point, own: tuple[Unknown, ...]) -> Point:
+    """The point with the record's own unknowns at their best. They are not searched for where there are none, or where
+    the simulation does not stay finite."""
+    unknowns, values = _values_here(point, own)
     none = np.zeros((len(unknowns), observation.samples))
     begun = point_at(observation, point.model, unknowns, values, none)
-    if not own or not np.isfinite(begun.weighted).all():
+    if not own or not begun.is_finite:
         return begun
-    return searched(observation, begun, START_STEPS, range(len(unknowns) - len(own), len(unknowns)))
+    return descend(begun, START_STEPS, range(len(unknowns) - len(own), len(unknowns)))
 
 
-def _here(point: Point, own: tuple[Unknown, ...]) -> tuple[tuple[Unknown, ...], Floats]:
-    """A point's unknowns and values for held-out traces: unknowns of their own in place of where the fitted ones
-    begin."""
+def _values_here(point: Point, own: tuple[Unknown, ...]) -> tuple[tuple[Unknown, ...], Floats]:
+    """A point's unknowns and values for held-out traces: their own unknowns in place of the fitted traces' initial
+    postures."""
     names = {u.name for u in own}
     kept = [k for k, u in enumerate(point.unknowns) if u.kind is not Kind.INITIAL_POSITION and u.name not in names]
     held = [replace(point.unknowns[k], deviation=None) for k in kept]  # no prior and no derivative: they stay
@@ -105,12 +128,12 @@ def _here(point: Point, own: tuple[Unknown, ...]) -> tuple[tuple[Unknown, ...], 
 
 
 def _phases(point: Point) -> tuple[Unknown, ...]:
-    """Sine and cosine of every periodic disturbance of a point, in pairs, free but for a prior of their size."""
-    fitted = dict(zip((u.name for u in point.unknowns), point.values, strict=True))
-    found: list[Unknown] = []
-    for sine in (p for p in point.model.parameters if p.effect == DISTURBANCE and p.name.endswith(".sine")):
-        cosine = point.model.by_name.get(sine.name.removesuffix("sine") + "cosine")
-        if cosine is None:  # tied under another name: what is said of it there holds everywhere
+    """Sine and cosine of every periodic disturbance of a point, in pairs, free but for a prior of their amplitude."""
+    fitted, found = point.by_name, []
+    tones = [p for p in point.model.parameters if p.effect == DISTURBANCE]
+    for sine in (p for p in tones if p.part == "sine"):
+        cosine = next((p for p in tones if p.part == "cosine" and p.joints == sine.joints), None)
+        if cosine is None:  # it shares the value of another joint's
             continue
         values = [float(fitted.get(p.name, p.value)) for p in (sine, cosine)]
         size = math.hypot(*values)
@@ -119,40 +142,18 @@ def _phases(point: Point) -> tuple[Unknown, ...]:
     return tuple(found)
 
 
-def _turned(point: Point, phases: Sequence[Unknown], met: Point) -> Point:
-    """The point with its disturbances at the phases that were met. Their size stays: one that is not there may not
-    vanish from the traces that are to show it."""
+def _with_phases(point: Point, phases: Sequence[Unknown], fitted: Point) -> Point:
+    """The point with its disturbances at the fitted phases.
+
+    The amplitude is kept fixed, so that a spurious disturbance cannot be fitted away on held-out data.
+    """
     turned: list[Unknown] = []
     for sine, cosine in zip(phases[::2], phases[1::2], strict=True):
         size = math.hypot(sine.start, cosine.start)
-        angle = math.atan2(met.value(cosine.name), met.value(sine.name))
+        angle = math.atan2(fitted.value(cosine.name), fitted.value(sine.name))
         turned += [
             replace(u, start=size * part, deviation=None)
             for u, part in ((sine, math.cos(angle)), (cosine, math.sin(angle)))
         ]
-    unknowns, values = _here(point, tuple(turned))
+    unknowns, values = _values_here(point, tuple(turned))
     return replace(point, unknowns=unknowns, values=values)
-
-
-def held_out(model: Model, traces: Sequence[Trace]) -> HeldOut | None:
-    """The held-out traces, ready; None without any. Raises TraceError and SpecError as for the fitted ones."""
-    if not traces:
-        return None
-    observation, _, unknowns = observed(model, traces, FOLLOWING_FOR_ERRORS)
-    return HeldOut(observation, tuple(u for u in unknowns if u.kind is Kind.INITIAL_POSITION))
-
-
-def errors(
-    observation: Observation, model: Model, before: Signals, after: Signals, floor: Floats
-) -> tuple[SignalError, ...]:
-    """Root mean square of every joint before and after, beside the floor (n,) rad."""
-    found = []
-    for column, joint in enumerate(model.machine.modelled_joints):
-        sizes = []
-        for signals in (before, after):
-            parts = [s[run, column] for s, r in zip(signals, observation.records, strict=True) for run in r.runs]
-            sizes.append(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
-        unit = "rad" if model.machine.joint(joint).kind == "revolute" else "m"
-        least = float(floor[column])
-        found.append(SignalError(joint=joint, unit=unit, before=sizes[0], after=sizes[1], floor=least))
-    return tuple(found)

@@ -1,73 +1,67 @@
-"""Steps as the last fit has them: what was still missing at their turn has bent their parameters.
+"""Steps with the values of the last fit: effects that were still missing at their time had biased them.
 
-A reason tells the size of the last fit too, so that an answer has one number and one interval for it. Its pattern, and
-the errors that it tells, stay those of the turn.
+The sentences of an answer are made afterwards, so that they give the size of the last fit too. The pattern of a reason,
+and its errors, stay those of the step.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from model.discrepancy.candidates.estimates import found_values, moved_by_noise
+from model.discrepancy.candidates.estimates import found_values, shift_by_noise
 from model.discrepancy.diagnosis import FoundValue, Step
-from model.discrepancy.explanation.reasons import with_size
-from model.discrepancy.output_error.case import with_point
-from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.refitting import Judged, judge
-from model.discrepancy.output_error.search import Point, point_at, settled
+from model.discrepancy.grounds import Refusal
+from model.discrepancy.output_error.candidate_fit import Fit, judge
+from model.discrepancy.output_error.search import Point, converge, point_at
 from model.discrepancy.output_error.step import LAST_STEPS
 from model.machine_model.parameter import Parameter
 
-SUPERFLUOUS = "superfluous once a later effect was in"
 
+def update_to_last_fit(current: Fit, steps: Sequence[Step]) -> tuple[Fit, tuple[Step, ...]]:
+    """The last fit, and steps with its parameters.
 
-def as_last_fitted(
-    observation: Observation, current: Judged, steps: Sequence[Step]
-) -> tuple[Judged, tuple[Step, ...]]:  # fmt: skip
-    """The last fit, and steps with its parameters. An effect that came out as nothing, within its intervals, is none: a
-    later one explains what it did, and the last fit is made without it."""
+    An effect whose intervals contain the values at which it is absent is dropped: a later one explains what it did, and
+    the last fit is made without it.
+    """
     adopted = [s for s in steps if s.adopted]
     if not adopted:
         return current, tuple(steps)
-    values = _values(observation, current, adopted)
-    empty = [
-        s for s in adopted[:-1] if _is_nothing([(values[n], current.point.model.by_name[n]) for n in s.parameters])
-    ]
+    values = _values(current, adopted)
+    known = current.point.model.by_name
+    empty = [s for s in adopted[:-1] if _is_nothing([(values[n], known[n]) for n in s.parameters])]
     if empty:
-        current = _without(observation, current.point, [name for s in empty for name in s.parameters])
-        values = _values(observation, current, [s for s in adopted if s not in empty])
+        current = _without(current.point, [name for s in empty for name in s.parameters])
+        values = _values(current, [s for s in adopted if s not in empty])
 
-    def told(step: Step) -> Step:
+    def updated(step: Step) -> Step:
         if not step.adopted:
             return step
         if step in empty:
-            return step.model_copy(update={"adopted": False, "rejected_because": SUPERFLUOUS})
-        last = {n: values[n] for n in step.parameters}
-        reason = with_size(step.reason, step.effect or "", step.joints, step.parameters, last)
-        return step.model_copy(update={"parameters": last, "reason": reason})
+            return step.model_copy(update={"adopted": False, "refusal": Refusal(kind="superfluous")})
+        return step.model_copy(update={"parameters": {n: values[n] for n in step.parameters}})
 
-    return current, tuple(told(s) for s in steps)
+    return current, tuple(updated(s) for s in steps)
 
 
-def _values(observation: Observation, now: Judged, steps: Sequence[Step]) -> dict[str, FoundValue]:
-    """Parameters of steps, with intervals that know what noise has done to the estimates."""
+def _values(now: Fit, steps: Sequence[Step]) -> dict[str, FoundValue]:
+    """Parameters of steps, with intervals that include how far noise has shifted the estimates."""
     own = [now.point.model.by_name[name] for s in steps for name in s.parameters]
-    return found_values(observation, now, own, moved_by_noise(observation, now.point, own))
+    return found_values(now, own, shift_by_noise(now.point, own))
 
 
-def _without(observation: Observation, point: Point, gone: Sequence[str]) -> Judged:
+def _without(point: Point, gone: Sequence[str]) -> Fit:
     """The fit without the effects that have these parameters."""
-    model, known = with_point(point), point.model.by_name
+    model, known = point.fitted_model, point.model.by_name
     for effect, joints in dict.fromkeys((known[n].effect, known[n].joints) for n in gone):
         model = model.without_effect(effect or "", joints or None)
     kept = [k for k, u in enumerate(point.unknowns) if u.name not in gone]
     unknowns = [point.unknowns[k] for k in kept]
-    begun = point_at(observation, model, unknowns, point.values[kept], point.tangents[kept])
-    return judge(observation, settled(observation, begun, LAST_STEPS))
+    begun = point_at(point.observation, model, unknowns, point.values[kept], point.tangents[kept])
+    return judge(converge(begun, LAST_STEPS))
 
 
 def _is_nothing(found: Sequence[tuple[FoundValue, Parameter]]) -> bool:
-    """Whether the values at which an effect is absent lie in its intervals; bounds may keep an estimate from them."""
+    """Whether the values at which an effect is absent lie in its intervals, as far as bounds allow."""
     sizes = [(value, p.null, max(p.null, p.low)) for value, p in found if p.null is not None]
     return all(
         v.low is not None and v.high is not None and v.low <= nearest and null <= v.high for v, null, nearest in sizes

@@ -1,8 +1,8 @@
 """One effect on several joints at once.
 
-What all gears of one make have, or all motors, shows on every joint. Looked for joint by joint, the first find would be
-judged while the others are still missing: the tolerance parameters bend to make up for those, and what is left of them
-looks like effects of its own.
+An effect that all gears of one make have, or all motors, shows on every joint. Looked for joint by joint, it would
+first be judged on one joint while it is still missing on the others: the tolerance parameters bend to make up for
+those, and their remainder looks like other effects.
 """
 
 from __future__ import annotations
@@ -13,35 +13,38 @@ from itertools import groupby
 import numpy as np
 
 from daq.contracts.progress import Cancel, stop_if
-from model.discrepancy.candidates.library import TONES, Candidate, on_joints
-from model.discrepancy.candidates.probing import Probed
-from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.refitting import Judged, Refitted, begun_again, nearest, refitted
+from model.discrepancy.candidates.library import TONES, Hypothesis, on_joints
+from model.discrepancy.candidates.probing import Probe
+from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, nearest, refit, restart
 from model.discrepancy.thresholds import Thresholds
 
 WORTH_A_FIT = 0.7
-"""A set of joints is fitted where the evidence of its singles adds up to this share of the best so far."""
+"""A set of joints is fitted where the evidence of its single fits adds up to this share of the best so far."""
 
 
-def fitted_together(
-    observation: Observation, current: Judged, singles: Sequence[Refitted], probes: Sequence[Probed],
-    thresholds: Thresholds, cancel: Cancel,
-) -> list[Refitted]:  # fmt: skip
-    """The effects that are significant on two joints or more, each fitted on its best two joints at once; parameters
-    are each joint's own. The best such pairs are tried on further joints, one by one. Left out is what brings no more
-    than the effect on one joint fewer does.
+def fit_several_joints(
+    current: Fit,
+    singles: Sequence[CandidateFit],
+    probes: Sequence[Probe],
+    thresholds: Thresholds,
+    cancel: Cancel,
+) -> list[CandidateFit]:
+    """The effects that are significant on two joints or more, each fitted on its best two joints at once.
+
+    Parameters are each joint's own. The best such pairs are tried on further joints, one by one. A fit that brings no
+    more than the effect on one joint fewer is left out.
 
     Args:
-        probes: of this turn, which say where a fit begins on a joint where there is none alone.
+        singles: fits on single joints. probes: start values on joints where there is no such fit.
 
     Raises CancelledError.
     """
-    found: list[tuple[Refitted, list[Refitted]]] = []
+    found: list[tuple[CandidateFit, list[CandidateFit]]] = []
     best = max((r.evidence for r in singles), default=0.0)
     for alike in _alike(singles, thresholds):
         if sum(r.evidence for r in alike) >= WORTH_A_FIT * best:
             stop_if(cancel)
-            fit = _better(observation, current, alike[:2], thresholds)
+            fit = _better(current, alike[:2], thresholds)
             if fit is not None:
                 found.append((fit, alike[2:]))
                 best = max(best, fit.evidence)
@@ -50,75 +53,78 @@ def fitted_together(
         if pair.evidence <= best - thresholds.close:
             continue
         widest = pair
-        further: list[Refitted | Probed] = [*others, *_only_probed(pair, others, probes)]
+        further: list[CandidateFit | Probe] = [*others, *_only_probed(pair, others, probes)]
         for place in further:
             stop_if(cancel)
-            wider = _better(observation, current, [widest], thresholds, place)
+            wider = _better(current, [widest], thresholds, place)
             if wider is not None:
                 widest = wider
                 every.append(wider)
     return every
 
 
-def _only_probed(found: Refitted, fitted: Sequence[Refitted], probes: Sequence[Probed]) -> list[Probed]:
+def _only_probed(found: CandidateFit, fitted: Sequence[CandidateFit], probes: Sequence[Probe]) -> list[Probe]:
     """Probes of the same law on joints where there is no fit of it."""
-    known = {j for r in (found, *fitted) for j in r.candidate.joints}
-    return [p for p in probes if _law(p.candidate) == _law(found.candidate) and not set(p.candidate.joints) & known]
+    known = {j for r in (found, *fitted) for j in r.hypothesis.joints}
+    law = _law(found.hypothesis)
+    return [p for p in probes if _law(p.hypothesis) == law and not set(p.hypothesis.joints) & known]
 
 
 def _better(
-    observation: Observation, current: Judged, parts: Sequence[Refitted], thresholds: Thresholds,
-    further: Refitted | Probed | None = None,
-) -> Refitted | None:  # fmt: skip
+    current: Fit, parts: Sequence[CandidateFit], thresholds: Thresholds, further: CandidateFit | Probe | None = None
+) -> CandidateFit | None:
     """The parts fitted together, and on one further joint, where that brings what a further joint must bring."""
     most = max(r.evidence for r in parts)
     begun = _begun(current, parts, further)
-    fit = refitted(observation, current, nearest(observation, current.point, begun)) if begun else None
-    fit = None if fit is None else begun_again(observation, current, fit)
+    fit = refit(current, nearest(current.point, begun)) if begun else None
+    fit = None if fit is None else restart(current, fit)
     return fit if fit is not None and fit.evidence - most > thresholds.needed(elsewhere=most, kin=True) else None
 
 
-def _begun(current: Judged, parts: Sequence[Refitted], further: Refitted | Probed | None) -> list[Probed]:
-    """Where a fit of all of them may begin: each where its own fit has ended, other unknowns moved by what they moved
-    there, one on top of the other; or where the best of them alone has ended, the others still absent, which is nearer
-    where all of them explain the same. Empty where the model refuses them. Nothing is simulated for it: its gain is
-    what the parts add up to, and it has no response."""
+def _begun(current: Fit, parts: Sequence[CandidateFit], further: CandidateFit | Probe | None) -> list[Probe]:
+    """Two starts of a fit of all of them; empty where the model refuses them.
+
+    In the first, every part is where its own fit has ended, and the other unknowns are moved by the sum of their moves
+    there. In the second, the best part is where its fit has ended and the others are absent, which is nearer where all
+    of them explain the same. Nothing is simulated: the gain is the sum of the parts', and there is no response.
+    """
     point = current.point
-    fits = [*parts, further] if isinstance(further, Refitted) else list(parts)
-    values = {p.name: r.judged.point.value(p.name) for r in fits for p in r.candidate.free}
-    moves = {id(r): np.array([r.judged.point.value(u.name) for u in point.unknowns]) - point.values for r in fits}
-    alike, every = [r.candidate for r in fits], list(moves.values())
-    if isinstance(further, Probed):
+    fits = [*parts, further] if isinstance(further, CandidateFit) else list(parts)
+    values = {p.name: r.fit.point.value(p.name) for r in fits for p in r.hypothesis.free}
+    moves = {id(r): np.array([r.fit.point.value(u.name) for u in point.unknowns]) - point.values for r in fits}
+    alike, every = [r.hypothesis for r in fits], list(moves.values())
+    if isinstance(further, Probe):
         values |= further.start
         every.append(further.moved)
-        alike.append(further.candidate)
+        alike.append(further.hypothesis)
     best = max(parts, key=lambda r: r.evidence)
-    own = {p.name for p in best.candidate.free}
+    own = {p.name for p in best.hypothesis.free}
     absent = {p.name: p.null for c in alike for p in c.main if p.null is not None and p.name not in own}
     found = []
     for start, moved in ((values, np.sum(every, axis=0)), ({**values, **absent}, moves[id(best)])):
-        candidate = on_joints(point.model, alike, start)
-        if candidate is not None:
+        hypothesis = on_joints(point.model, alike, start)
+        if hypothesis is not None:
             gain = sum(r.evidence for r in fits)
-            found.append(Probed(candidate, gain, start, moved, np.zeros_like(point.weighted)))
+            found.append(Probe(hypothesis, gain, start, moved, np.zeros_like(point.weighted)))
     return found
 
 
-def _alike(singles: Sequence[Refitted], thresholds: Thresholds) -> list[list[Refitted]]:
-    """Significant fits of one law on different joints, the best first; the sets that add up to most first."""
+def _alike(singles: Sequence[CandidateFit], thresholds: Thresholds) -> list[list[CandidateFit]]:
+    """Sets of significant fits of one law on different joints, the best fit first; the set with the largest sum
+    first."""
     suited = [
         r
         for r in singles
-        if r.evidence >= thresholds.significant and len(r.candidate.joints) == 1 and r.candidate.name not in TONES
+        if r.evidence >= thresholds.significant and len(r.hypothesis.joints) == 1 and r.hypothesis.name not in TONES
     ]
-    sets: list[list[Refitted]] = []
-    for _, group in groupby(sorted(suited, key=lambda r: _law(r.candidate)), key=lambda r: _law(r.candidate)):
-        best = {r.candidate.joints: r for r in sorted(group, key=lambda r: r.evidence)}
+    sets: list[list[CandidateFit]] = []
+    for _, group in groupby(sorted(suited, key=lambda r: _law(r.hypothesis)), key=lambda r: _law(r.hypothesis)):
+        best = {r.hypothesis.joints: r for r in sorted(group, key=lambda r: r.evidence)}
         if len(best) > 1:
             sets.append(sorted(best.values(), key=lambda r: -r.evidence))
     return sorted(sets, key=lambda s: -sum(r.evidence for r in s))
 
 
-def _law(candidate: Candidate) -> tuple[str, str]:
-    """What makes two candidates alike: the name, and the law where a name stands for two."""
-    return candidate.name, candidate.free[0].effect or ""
+def _law(hypothesis: Hypothesis) -> tuple[str, str]:
+    """The effect's name, and its law, because a name may stand for two."""
+    return hypothesis.name, hypothesis.free[0].effect or ""

@@ -1,9 +1,9 @@
 """How well a residual is described as noise of its own kind: the yardstick by which candidates are compared.
 
-What the right model leaves is nearly white: noise and rounding, and the little by which laws of friction differ near
-zero speed. What a wrong model leaves is coloured. Each model is judged with an autoregression fitted to its own
-residual, joint by joint, and by the likelihood of the prediction errors that are left, so that no model is rejected for
-noise that another one's colour would make unlikely.
+The right model leaves nearly white noise: noise of the readings and rounding, and the little by which laws of friction
+differ near zero speed. A wrong model leaves a coloured residual. An autoregression is fitted to each residual, joint by
+joint, and the likelihood of its prediction errors is compared, so that no model is rejected for noise that the colour
+of another model's residual would make unlikely.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from model.fitting.whitening import Whitener, fitted_whitener
 Floats = NDArray[np.float64]
 
 LONGEST_MEMORY = 6
-"""Samples that the noise model looks back: 0.12 s at 20 ms."""
+"""Largest order of the autoregression in samples: 0.12 s at 20 ms."""
 LEAST_DEVIATION = 0.8
-"""Of a prediction error, in deviations of a reading: rounding is not always as random as its variance says. No
-likelihood counts an error as smaller, or a joint at rest would make evidence of shaving a rounding offset."""
+"""Lower bound of a prediction error's deviation, in deviations of a reading, so that a joint at rest gains no evidence
+by fitting its rounding offset: rounding is not always as random as its variance says."""
 PRICE_OF_MEMORY = 2.0
-"""Of each sample that a noise model looks back: Akaike's, by which the order was chosen. Without it, a description
-would jump by twelve where the choice is close, and with it a margin between rivals."""
+"""Cost of each order of the autoregression: Akaike's, by which the order was chosen. Without it, the description would
+jump by twelve where two orders are close, and the margin between rivals with it."""
 CLIP = 5.0
-"""Prediction errors beyond so many deviations count as that: one bad reading proves no effect."""
+"""Prediction errors are clipped to this many deviations, so that one bad reading proves no effect."""
 
 
 @dataclass(frozen=True)
-class NoiseModel:
+class AutoregressiveNoise:
     """Colour and size of a residual, joint by joint.
 
-    whiteners: a filter a joint. description: −2 ln likelihood of the prediction errors, up to a constant, and the price
-    of memory. by_joint: its parts.
+    whiteners: one filter per joint. by_joint: −2 ln likelihood of each joint's prediction errors, up to a constant, and
+    the price of the order.
     """
 
     whiteners: tuple[Whitener, ...]
@@ -43,11 +43,11 @@ class NoiseModel:
 
     @property
     def description(self) -> float:
-        """−2 ln likelihood and the price of memory, all joints."""
+        """−2 ln likelihood and the price of the orders, all joints."""
         return sum(self.by_joint)
 
 
-def noise_model(runs_by_joint: Sequence[Sequence[Floats]]) -> NoiseModel:
+def fit_noise_model(runs_by_joint: Sequence[Sequence[Floats]]) -> AutoregressiveNoise:
     """The noise model of a weighted residual, given as runs (m,) of every joint (`Observation.by_joint`)."""
     whiteners, parts = [], []
     for runs in runs_by_joint:
@@ -57,4 +57,4 @@ def noise_model(runs_by_joint: Sequence[Sequence[Floats]]) -> NoiseModel:
         order = len(whitener.predictors) - 1
         parts.append(2 * len(errors) * float(np.log(max(spread, LEAST_DEVIATION))) + PRICE_OF_MEMORY * order)
         whiteners.append(whitener)
-    return NoiseModel(tuple(whiteners), tuple(parts))
+    return AutoregressiveNoise(tuple(whiteners), tuple(parts))

@@ -1,24 +1,28 @@
 """Traces as a diagnosis sees them: the simulated controller is given most of what the real one has read.
 
-The noise of a reading goes through the controller into the motor, and round the loop: a simulation in closed loop that
-does not know it is off by what the noise has moved, comes to rest where the real arm creeps on, and hides a torque
-behind a controller that makes up for it. A simulation that reads the record has all of that right, but nothing brings
-it back: an error of the smallest torque adds up. So the controller reads a share of the way from the simulated reading
-to the recorded one (Forssell and Ljung 1999 compare the two ends). What is left, measured less simulated, is nearly
-white where the model is right, and a missing torque shows 1/(1 − share) times as large as in closed loop.
+The noise of a reading goes through the controller into the motor and round the loop. A closed-loop simulation that does
+not know this noise is off by what the noise has moved, comes to rest where the real arm creeps on, and hides a missing
+torque behind its controller, which makes up for it. A simulation whose controller reads the record has all of that
+right, but nothing brings it back: the smallest error of a torque adds up. So the controller reads a share of the way
+from the simulated to the recorded reading (Forssell and Ljung 1999 compare the two ends). The residual, measured less
+simulated, is then nearly white where the model is right, and a missing torque shows 1/(1 − share) times as large as in
+closed loop.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
-from model.discrepancy.output_error.feedback_share import FOLLOWING
+from model.discrepancy.thresholds import FEEDBACK_SHARE
 from model.fitting.fit import fit_problem
 from model.fitting.options import FitOptions
 from model.fitting.records import Record
@@ -26,49 +30,59 @@ from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
-from model.simulation.engines import engine_for
+from model.simulation.batch import BatchRun
 from model.simulation.inputs import readings_on_grid
 from model.simulation.period import OUT_READING, OUTPUTS
-from model.simulation.simulate import Options, Prepared, at_rows, prepare
+from model.simulation.prepared import Options, Prepared, prepare
+from model.simulation.simulate import at_rows
 
 Floats = NDArray[np.float64]
 Signals = tuple[Floats, ...]
 """One array (m, n) a record."""
 
+T = TypeVar("T")
+R = TypeVar("R")
+
 STEP, COARSE_STEP = 2e-3, 7e-3
-"""s; longest step of integration: ten a control period of 20 ms, and three for derivatives and probes, which are
-differences and need no more. With longer ones than the first a delay explains an inductance as well."""
+"""Longest step of integration, s: ten steps per control period of 20 ms, and three for derivatives and probes, which
+are differences and need no more. With steps longer than the first, a delay explains an inductance as well."""
 HALVINGS = 2
-"""Of the step, for runs that do not stay finite with it."""
+"""Times that the step is halved for runs that do not stay finite with it."""
 DIFFERENCE = 0.05
-"""Of an expected deviation: over it, derivatives are taken."""
+"""Step of a finite difference, as a share of the parameter's expected deviation."""
 TONE_DIFFERENCE = 0.02
-"""The same of a tone, in waves over a turn or over the longest record: its phase moves by an eighth of a radian."""
+"""Step of a finite difference by a tone's rate, in waves over a turn or over the longest record: it moves the phase by
+an eighth of a radian."""
 BEND_TERMS = 8
-"""Of the sine series of a sound potentiometer's curve: an arm moves over a part of the range, and what the curve does
-there, bent by a count or two, has to be within the series' reach."""
+"""Terms of the sine series that describes a sound potentiometer's curve. An arm moves over a part of the range, and the
+series must be able to describe a bend of a count or two there."""
 BEND_SHARE = 0.3
 """Standard deviation of each term of a potentiometer's curve, as a share of the stated linearity."""
 STIFF = ("backlash", "joint_compliance")
-"""Gears that give: longer steps would make them unstable."""
+"""Effects that make a gear flexible: with longer steps, derivatives of such models would be unstable."""
 CONTACT_STEP = 1e-3
-"""s; of models with play: parts in contact swing at up to 1500 rad/s, which steps of 2 ms cannot follow."""
+"""Longest step of integration of models with play, s: parts in contact swing at up to 1500 rad/s, which steps of 2 ms
+cannot follow."""
 LOOSE_START = 8.0
-"""Times the tolerance of a reading: how far a trace may begin from where its first reading says. The trace itself shows
-where it began, and what it is read by may be what is missing."""
+"""Prior width of the initial posture, in sensor tolerances. Wide, because the sensor itself may have the missing
+effect."""
 BATCH = 64
-"""Runs at a time: bounds the memory, 64 runs of 55 s take 26 MB."""
+"""Simulations per call of the engine. It bounds the memory: 64 runs of 55 s take 26 MB."""
+AT_ONCE = 2
+"""Fits that run at the same time. Fixed, not the core count: the batch size affects which candidates are fitted, and
+results must not depend on the machine."""
 
 
 @dataclass(frozen=True)
 class Observation:
     """Records of one machine, and how well a reading can be known.
 
-    records: what drives the simulations and what was measured. deviations: (n,) rad, noise and rounding of one reading.
-    unit: (n,) rad a count, 1 where the machine states no sensor. prepared: the records as compiled code reads them,
-    with the share of the recorded readings that is followed.
+    records: inputs of the simulations and what was measured. deviations: (n,) rad, noise and rounding of one reading.
+    unit: (n,) rad per count, 1 where the machine states no sensor. prepared: the records as compiled code reads them,
+    with the share of the recorded readings that the simulated controller is given.
     """
 
+    machine: Machine
     records: tuple[Record, ...]
     deviations: Floats
     unit: Floats
@@ -79,17 +93,17 @@ class Observation:
         """Readings that are compared, all joints together."""
         return sum(r.samples for r in self.records) * len(self.deviations)
 
-    def following(self, share: float) -> Observation:
-        """The same with another share of the recorded readings that simulated controllers are given."""
+    def with_feedback_share(self, share: float) -> Observation:
+        """The same with another share of the recorded readings that the simulated controller is given."""
         return replace(self, prepared=tuple(replace(p, following=share) for p in self.prepared))
 
     def with_noise(self, noise: Sequence[Floats]) -> Observation:
-        """The same with simulations that follow no record: noise (k, n), in counts, is on what they read."""
+        """The same with simulations that are given no recorded readings, but noise (k, n), in counts, on their own."""
         prepared = zip(self.prepared, noise, strict=True)
         return replace(self, prepared=tuple(replace(p, following=0.0, noise=own) for p, own in prepared))
 
-    def made_of(self, measured: Sequence[Floats]) -> Observation:
-        """The same records with other readings (m, n) rad, compared and followed as the real ones are."""
+    def with_readings(self, measured: Sequence[Floats]) -> Observation:
+        """The same records with other readings (m, n) rad in place of the measured ones, everywhere."""
         records = tuple(replace(r, measured=own) for r, own in zip(self.records, measured, strict=True))
         shown = [readings_on_grid(r.measured, r.inputs.rows, len(r.inputs)) for r in records]
         prepared = tuple(replace(p, readings=own) for p, own in zip(self.prepared, shown, strict=True))
@@ -98,16 +112,16 @@ class Observation:
     def readings(
         self, model: Model, vectors: Floats, initials: Sequence[Floats], longest_step: float = STEP
     ) -> list[Floats]:
-        """What each of p parameter sets would show, its noise included where the simulation has one.
+        """Simulated readings of p parameter sets, with noise where the simulation has some.
 
         Args:
             vectors: (p, size). initials: per record (p, n, 2). longest_step: of the integration, s.
 
         Returns:
             per record (p, m, n), rad; NaN where a run diverged.
-        """  # fmt: skip
+        """
         longest = max(len(r.inputs) for r in self.records)
-        engine, count = engine_for(model), len(self.records)
+        count = len(self.records)
         found: list[list[Floats]] = [[] for _ in self.records]
         for begin in range(0, len(vectors), BATCH):
             own = vectors[begin : begin + BATCH]
@@ -117,8 +131,7 @@ class Observation:
             repeated = np.ascontiguousarray(np.tile(own, (count, 1)))
             left, step = np.arange(len(which)), min(longest_step, longest_step_of(model))
             for _ in range(1 + HALVINGS):
-                tried = out[left]
-                engine.run(self.prepared, which[left], repeated[left], starts[left], model.flags, step, tried)
+                tried = BatchRun(model, self.prepared, which[left], repeated[left], starts[left], step).run()
                 out[left] = tried
                 left = left[~np.isfinite(tried[:, OUT_READING]).all(axis=(1, 2))]
                 if not len(left):
@@ -144,7 +157,7 @@ class Observation:
         return vector, initials
 
     def shown(self, model: Model, unknowns: Sequence[Unknown], values: Floats, longest_step: float = STEP) -> Signals:
-        """What one set of values of the unknowns shows, rad. Not finite where the simulation is not."""
+        """Simulated readings for values of the unknowns, rad. Not finite where the simulation is not."""
         vector, initials = self.state(model, unknowns, values)
         readings = self.readings(model, vector[None], [i[None] for i in initials], longest_step)
         return tuple(one[0] for one in readings)
@@ -161,11 +174,11 @@ class Observation:
         values: Floats,
         which: Sequence[int] | None = None,
     ) -> Floats:
-        """Derivatives of the weighted readings by the unknowns of those indices (all), (p, N): by differences over a
-        small share of what each is expected to deviate, at a third of the price of dual numbers.
+        """Derivatives (p, N) of the weighted readings by the unknowns `which` (indices; None: all).
 
-        Raises SpecError when the simulation does not stay finite.
-        """  # fmt: skip
+        They are finite differences over a small share of each unknown's expected deviation, at a third of the cost of
+        dual numbers. Raises SpecError when the simulation does not stay finite.
+        """
         which = range(len(unknowns)) if which is None else which
         seconds = max(len(r.inputs) * r.inputs.period for r in self.records)
         moves = [_difference(model, unknowns[k], float(values[k]), seconds) for k in which]
@@ -191,7 +204,7 @@ class Observation:
         return np.concatenate(parts, axis=-1)
 
     def by_joint(self, weighted: Floats) -> list[list[Floats]]:
-        """A weighted row (…, N) taken apart: per joint its uninterrupted runs (…, m)."""
+        """A weighted row (…, N) split up: for every joint its uninterrupted runs (…, m)."""
         n = len(self.deviations)
         runs: list[list[Floats]] = [[] for _ in range(n)]
         done = 0
@@ -205,12 +218,12 @@ class Observation:
         return runs
 
 
-def observed(
-    model: Model, traces: Sequence[Trace], following: float = FOLLOWING
+def observe(
+    model: Model, traces: Sequence[Trace], feedback_share: float = FEEDBACK_SHARE
 ) -> tuple[Observation, Model, tuple[Unknown, ...]]:
-    """Traces ready for a diagnosis, the model with potentiometers that may bend within their linearity, and all that
-    may differ from its values on a sound machine: every number with an expected deviation, the potentiometers' bends,
-    the form of friction near zero speed, and the posture at the start.
+    """Traces ready for a diagnosis, the model with potentiometers that may bend within their linearity, and the
+    tolerance parameters: all numbers that may differ from the model's on a sound machine. These are every number with
+    an expected deviation, the potentiometers' bends, the form of friction near zero speed, and the initial postures.
 
     Raises:
         TraceError, SpecError: as `model.fitting.fit.fit`.
@@ -222,44 +235,44 @@ def observed(
     )
     sensors = [model.machine.joint(j).sensor for j in model.machine.modelled_joints]
     unit = np.array([1.0 if s is None else s.range.value / 2**s.bits for s in sensors])
-    options = Options(quantise=False, following=following)
+    options = Options(quantise=False, following=feedback_share)
     prepared = tuple(prepare(problem.model, r.inputs, options) for r in problem.records)
     given = {p.name: p.value for p in model.parameters if p.effect is not None}
     unknowns = tuple(_loose_start(_even_bend(_as_given(u, given), problem.model)) for u in problem.unknowns)
-    return Observation(problem.records, problem.floor, unit, prepared), problem.model, unknowns
+    return Observation(model.machine, problem.records, problem.floor, unit, prepared), problem.model, unknowns
 
 
 def _as_given(unknown: Unknown, given: Mapping[str, float]) -> Unknown:
-    """An effect that the model was given with is expected to be what it was found to be."""
+    """The unknown; that of an effect in the given model is expected to have the value it has there."""
     return replace(unknown, expected=given[unknown.name]) if unknown.name in given else unknown
 
 
 def longest_step_of(model: Model) -> float:
-    """Longest step of integration, s, with which a model can be followed."""
+    """Longest step of integration, s, with which a model can be simulated."""
     return CONTACT_STEP if any(use.name == "backlash" for use in model.effects) else COARSE_STEP
 
 
 def step_of_derivatives(model: Model) -> float:
-    """Longest step of integration, s, of runs that are compared over a small move."""
+    """Longest step of integration, s, of the runs that a finite difference compares."""
     return STEP if any(use.name in STIFF for use in model.effects) else COARSE_STEP
 
 
 def _difference(model: Model, unknown: Unknown, value: float, seconds: float) -> float:
-    """The move over which a derivative is taken, towards the inside of the unknown's bounds. `seconds`: of the longest
+    """The step of the finite difference by an unknown, away from its upper bound. seconds: length of the longest
     record."""
     parameter = model.by_name.get(unknown.name)
     stated = None if parameter is None else parameter.deviation
     size = DIFFERENCE * (unknown.deviation or stated or unknown.scale)
-    last = None if parameter is None else (parameter.effect, unknown.name.rpartition(".")[2])
-    if last in (("torque_ripple", "cycles"), ("periodic_disturbance", "frequency")):
-        size = TONE_DIFFERENCE / (1.0 if last[1] == "cycles" else seconds)
+    rate = (unknown.parameter.effect, unknown.parameter.part)
+    if rate in (("torque_ripple", "cycles"), ("periodic_disturbance", "frequency")):
+        size = TONE_DIFFERENCE / (1.0 if rate[1] == "cycles" else seconds)
     if unknown.kind is Kind.INITIAL_POSITION:
         size /= LOOSE_START
     return -size if value + size > unknown.high else size
 
 
 def _loose_start(unknown: Unknown) -> Unknown:
-    """A posture at the start, free to be where the trace shows it."""
+    """The unknown; that of an initial posture is free to be where the trace shows it."""
     if unknown.kind is not Kind.INITIAL_POSITION or unknown.deviation is None:
         return unknown
     limit = 2 * LOOSE_START * unknown.deviation
@@ -267,10 +280,17 @@ def _loose_start(unknown: Unknown) -> Unknown:
 
 
 def _even_bend(unknown: Unknown, model: Model) -> Unknown:
-    """The bends of a sound potentiometer, every term alike: nothing says that its curve is a smooth one."""
-    if not (unknown.nuisance and unknown.name.rpartition(".")[2].startswith("bend_")):
+    """The unknown; the bends of a sound potentiometer get equal priors: nothing says that its curve is smooth."""
+    if not (unknown.nuisance and unknown.parameter.effect == "potentiometer_nonlinearity"):
         return unknown
-    sensor = model.machine.joint(int(unknown.name.partition(".")[0].removeprefix("joint"))).sensor
+    sensor = model.machine.joint(unknown.joints[0]).sensor
     if sensor is None or sensor.linearity is None:
         return unknown
     return replace(unknown, deviation=BEND_SHARE * sensor.linearity.value * sensor.range.value)
+
+
+def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    """`work` of every item, in their order, `AT_ONCE` at a time: simulations hold no lock of Python's, so two fits take
+    little longer than one. Raises what the first item that fails raises."""
+    with ThreadPoolExecutor(AT_ONCE) as threads:
+        return list(threads.map(work, items))

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from daq.acquisition.messages import Failed, Finished
-from daq.acquisition.process import EXIT_PROGRAM_FAULT
 from daq.acquisition.stop_socket import request_stop
+from daq.contracts import exit_codes
 from daq.contracts.experiment import ExperimentSpec, Pause
 from daq.traces.reader import read_trace
 from daq.traces.salvage import salvage_folder
@@ -170,6 +170,6 @@ def test_a_program_fault_is_told_as_one_and_freezes_nothing_else(tmp_path: Path)
     with running(text_of(job(tmp_path / "traces", QUICK)), before="ulimit -n 9") as process:  # too few open files
         end = process.end()
         assert isinstance(end, Failed), end
-        assert process.exit_code() == end.exit_code == EXIT_PROGRAM_FAULT
+        assert process.exit_code() == end.exit_code == exit_codes.PROGRAM_FAULT
     assert "\n" not in end.message
     assert not list(tmp_path.rglob("*.mcap*"))

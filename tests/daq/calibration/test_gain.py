@@ -173,7 +173,7 @@ def trace_of(errors: np.ndarray, powers: np.ndarray) -> Trace:
     return Trace(record, (1,), np.arange(len(errors)) * 0.02, rad * 0, error=rad, power_raw=powers[:, None])
 
 
-def test_gains_of_a_trace() -> None:
+def test_a_trace_gives_the_gain_of_every_joint() -> None:
     (result,) = gains_from_trace(trace_of(ERRORS, 2 * ERRORS), MA2000)
     assert isinstance(result, GainEstimate)
     assert (result.joint, result.per_unit) == (1, pytest.approx(1))

@@ -169,11 +169,24 @@ def test_a_trace_is_never_written_over_another(tmp_path: Path) -> None:
 
 def _entries(*names: tuple[str, str]) -> httpx.Response:
     items = [
-        {"id": number, "robot": "ma2000", "file": file, "created": "2026-01-01T00:00:00Z", "source": "mock",
-         "kind": None, "name": None, "joints": [1], "outcome": None, "samples": 1, "duration": 0, "size": 1,
-         "operator": None, "experiment": None}
+        {
+            "id": number,
+            "robot": "ma2000",
+            "file": file,
+            "created": "2026-01-01T00:00:00Z",
+            "source": "mock",
+            "kind": None,
+            "name": None,
+            "joints": [1],
+            "outcome": None,
+            "samples": 1,
+            "duration": 0,
+            "size": 1,
+            "operator": None,
+            "experiment": None,
+        }
         for number, file in names
-    ]  # fmt: skip
+    ]
     return httpx.Response(200, content=json.dumps({"items": items, "next": None}))
 
 
@@ -191,7 +204,7 @@ def test_a_trace_is_found_by_the_beginning_of_its_number_or_name() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "arm.lab:8300", "ftp://arm.lab", "http://", "http://a:b@arm.lab", "http://x?y=1"])
-def test_addresses_of_no_service(text: str) -> None:
+def test_an_address_that_can_be_no_services_is_refused(text: str) -> None:
     with pytest.raises(SpecError, match="server"):
         parse_url(text)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from daq.link.counters import RoundTrips, Tally
+from daq.link.counters import COUNTED, LinkCounters, RoundTrips, Tally
 
 
 def test_a_trace_counts_what_happened_while_it_was_recorded() -> None:
@@ -24,3 +24,14 @@ def test_a_trace_counts_what_happened_while_it_was_recorded() -> None:
     whole = tally.snapshot(4)
     assert (whole.retries, whole.damaged, whole.round_trips.count) == (69, 4, 110)
     assert whole.round_trips.max_s == 0.05
+
+
+def test_everything_is_counted_from_zero() -> None:
+    assert Tally().snapshot(damaged=0) == LinkCounters()
+    assert LinkCounters().numbers() == dict.fromkeys([*COUNTED, "damaged", "round_trip_count"], 0.0)
+
+
+def test_a_round_trip_longer_than_every_class_keeps_its_own_time() -> None:
+    tally = Tally()
+    tally.round_trip(3.0)
+    assert tally.snapshot(damaged=0).round_trips == RoundTrips(1, 3.0, 3.0, 3.0, 3.0)

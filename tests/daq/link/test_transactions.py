@@ -7,6 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq.link import Link, LinkLostError, LinkState, LinkTimeoutError, RequestRefusedError
+from daq.link.counters import Tally
+from daq.link.pending import SEQUENCE_NUMBERS, PendingReplies
 from daq.link.timing import CLEAN_TRANSACTIONS, HELLO_RETRIES, RETRIES
 from firmware_protocol.commands import (
     Block,
@@ -163,6 +165,30 @@ def test_after_the_channel_has_ended_nothing_is_asked_until_reconnected() -> Non
     assert link.request(ReadStatus(), Status) == STATUS
     assert second.asked[0][0] == 1, "numbers go on: an old reply is never taken for a new one"
     assert link.counters.reconnections == 1
+
+
+def test_half_a_reply_is_forgotten_with_the_channel_it_came_over() -> None:
+    def breaks_off(sequence: int, _request: Request) -> list[tuple[float, bytes]]:
+        if len(first.asked) > 1:
+            first.broken = "cable pulled"
+        return [(0.0, frame_of(sequence, STATUS)[:6])]
+
+    first = ScriptedChannel(breaks_off)
+    second = ScriptedChannel(lambda sequence, _: [(0.0, frame_of(sequence, STATUS))])
+    link = Link(ScriptedEndpoint([first, second]), now=first.now, chance=Zeros())
+    with pytest.raises(LinkLostError, match="cable pulled"):
+        link.request(ReadStatus(), Status)
+    link.reconnect()
+    assert link.request(ReadStatus(), Status) == STATUS
+    assert link.counters.damaged == 0
+
+
+def test_when_the_numbers_come_round_one_that_still_waits_is_passed_over() -> None:
+    pending = PendingReplies(Tally())
+    waiting = pending.begin(ReadStatus())
+    for _ in range(SEQUENCE_NUMBERS - 1):
+        pending.forget(pending.begin(ReadStatus()))
+    assert (waiting.sequence, pending.begin(ReadStatus()).sequence) == (0, 1)
 
 
 class _Waits:

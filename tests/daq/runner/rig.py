@@ -14,7 +14,7 @@ from daq.contracts.machine import Machine, load_machine
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import Trace, TraceEvent
 from daq.driver import Controller
-from daq.runner import ArmControl, Arrangement, Consent, Outside, RunResult, run_experiment
+from daq.runner import ArmControl, Consent, RunResult, RunSetup, StopRequests, run_experiment
 from daq.traces.reader import read_trace
 from daq.transport.mock_process import MockProcess
 from tests.control_port import told_by
@@ -69,8 +69,8 @@ class Rig:
     ) -> RunResult:
         """One run."""
         machine = machine or self.machine
-        outside = Outside(lambda: self.wants_end, lambda: self.orphaned)
-        run = Arrangement(self.controller, self.control, spec, machine, machine.limits, self.folder, self.ears, outside)
+        requests = StopRequests(lambda: self.wants_end, lambda: self.orphaned)
+        run = RunSetup(self.controller, self.control, spec, machine, machine.limits, self.folder, self.ears, requests)
         return run_experiment(run, consent or Consent())
 
     def trace(self, result: RunResult) -> Trace:

@@ -9,7 +9,7 @@ import pytest
 
 from daq.driver import Controller, StopConfirmation
 from daq.runner import ArmControl, StoppedError
-from daq.runner.arm_control import told
+from daq.runner.arm_control import stop_line
 from daq.safety import Event, State
 
 
@@ -109,5 +109,5 @@ def test_a_freeze_that_was_not_confirmed_is_tried_again() -> None:
     ids=["confirmed", "sent", "not sent"],
 )
 def test_what_is_said_of_a_stop_is_what_is_known(confirmation: StopConfirmation, words: str) -> None:
-    assert words in told(confirmation)
-    assert ("emergency stop" in told(confirmation)) == (not confirmation.acknowledged)
+    assert words in stop_line(confirmation)
+    assert ("emergency stop" in stop_line(confirmation)) == (not confirmation.acknowledged)

@@ -34,12 +34,12 @@ def refused(arm: Rig, error: type[DaqError], match: str, spec: ExperimentSpec = 
     ],
     ids=["range", "speed", "start"],
 )
-def test_a_plan_outside_the_limits(arm: Rig, tmp_path: Path, change: dict[str, object], match: str) -> None:
+def test_a_plan_outside_the_limits_is_refused(arm: Rig, tmp_path: Path, change: dict[str, object], match: str) -> None:
     refused(arm, SafetyError, match, OTHER_GAINS.model_copy(update=change))
     assert not list(tmp_path.iterdir())
 
 
-def test_a_real_arm_without_the_operators_consent(arm: Rig) -> None:
+def test_a_real_arm_is_not_moved_without_the_operators_consent(arm: Rig) -> None:
     arm.pretend_real()
     refused(arm, MissingConsentError, "is a real arm: it moves only with the operator's consent")
 
@@ -63,7 +63,7 @@ def test_an_arm_that_is_not_where_its_controller_holds_it(arm: Rig) -> None:
     refused(arm, SafetyError, r"joint 1 is \d+ ADC counts from its set point, allowed are ±127.*blocked")
 
 
-def test_an_arm_with_a_joint_that_nothing_drives(arm: Rig) -> None:
+def test_an_arm_with_a_joint_without_drive_is_refused(arm: Rig) -> None:
     arm.controller.set_gains(2, 0, 5, 5)
     refused(arm, SafetyError, r"joints 2 have gain P = 0 and no drive: support the arm, then `daq gains set` them")
 
@@ -90,7 +90,7 @@ def full(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("place", [below_a_file, full])
-def test_a_place_that_takes_no_trace(
+def test_a_folder_that_can_take_no_trace_is_refused(
     arm: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: Callable[[Path], Path]
 ) -> None:
     arm.folder = place(tmp_path)
@@ -99,6 +99,6 @@ def test_a_place_that_takes_no_trace(
     refused(arm, TraceError, "cannot be written there|MB are free")
 
 
-def test_a_start_that_the_machine_does_not_have(arm: Rig) -> None:
+def test_a_machine_without_a_rest_posture_is_refused_where_it_is_the_start(arm: Rig) -> None:
     arm.machine = arm.machine.model_copy(update={"rest_posture": None})
     refused(arm, SpecError, "has no rest_posture")

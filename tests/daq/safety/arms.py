@@ -28,8 +28,14 @@ def limits(**changes: object) -> Limits:
     return LIMITS.model_copy(update=changes)
 
 
-def row(tick: int, *, error: tuple[float, ...] = (0, 0, 0), position: tuple[float, ...] | None = None,
-        status: int = 0, host_time: float | None = None) -> SampleRow:  # fmt: skip
+def row(
+    tick: int,
+    *,
+    error: tuple[float, ...] = (0, 0, 0),
+    position: tuple[float, ...] | None = None,
+    status: int = 0,
+    host_time: float | None = None,
+) -> SampleRow:
     """A sample of joints 1–3; `error` and `position` (from rest) in ADC counts."""
     errors = tuple(counts * COUNT for counts in error)
     away = position or tuple(-counts for counts in error)

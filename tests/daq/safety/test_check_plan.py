@@ -28,7 +28,7 @@ def test_the_default_ramp_is_allowed() -> None:
         (4, 1.58, r"joint 4: 90\.53° at 10\.00 s: allowed are -89\.38° to 89\.38°"),
     ],
 )
-def test_joint_range(joint: int, target: float, line: str) -> None:
+def test_an_angle_outside_a_joints_range_is_a_violation(joint: int, target: float, line: str) -> None:
     way = np.linspace(REST[joint - 1], target, 501)
     (found, *_) = [v for v in check_plan(plan_of(joint, *way), MA2000, LIMITS) if v.rule == "range"]
     assert str(found) == line.replace("\\", "")
@@ -78,13 +78,13 @@ def test_a_joint_of_smaller_range_may_make_smaller_steps() -> None:
     assert largest_step(MA2000, Limits(), 1) is None
 
 
-def test_floor() -> None:
+def test_a_link_below_the_floor_is_a_violation() -> None:
     way = np.linspace(REST[1], math.radians(-44), 501)
     (found,) = check_plan(plan_of(2, *way), MA2000, LIMITS)
     assert str(found) == "end of link 3: height of -315 mm at 10.00 s: allowed are -300 mm and above"
 
 
-def test_reach() -> None:
+def test_a_link_beyond_the_reach_is_a_violation() -> None:
     way = np.linspace(math.radians(90), 0, 501)
     assert check_plan(plan_of(3, *way), MA2000, limits(reach=0.4545)) == []
     (found,) = check_plan(plan_of(3, *way), MA2000, limits(reach=0.45))

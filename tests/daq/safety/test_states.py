@@ -42,7 +42,7 @@ TRANSITIONS = {
 
 
 @pytest.mark.parametrize(("before", "event"), list(itertools.product(State, Event)))
-def test_transition(before: State, event: Event) -> None:
+def test_each_event_leads_to_its_state_and_actions(before: State, event: Event) -> None:
     if (before, event) in TRANSITIONS:
         arm, actions = advance(UP[before], event)
         assert (arm.state, actions) == TRANSITIONS[before, event]

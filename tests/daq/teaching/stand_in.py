@@ -78,9 +78,16 @@ class StandIn:
         seen = np.array([own.counts_to_rad(c) for own, c in zip(CALIBRATIONS, counts, strict=True)])
         status = StatusFlag.FROZEN if self.frozen else 0
         return SampleRow(
-            self.tick, self.tick * PERIOD, self.tick * PERIOD, tuple(targets.tolist()), tuple(seen.tolist()),
-            tuple((targets - seen).tolist()), (0.0,) * 6, (0,) * 6, int(status),
-        )  # fmt: skip
+            self.tick,
+            self.tick * PERIOD,
+            self.tick * PERIOD,
+            tuple(targets.tolist()),
+            tuple(seen.tolist()),
+            tuple((targets - seen).tolist()),
+            (0.0,) * 6,
+            (0,) * 6,
+            int(status),
+        )
 
     def set_points(self, postures: Mapping[int, int]) -> None:
         assert self.running
@@ -89,11 +96,11 @@ class StandIn:
             self.postures[joint - 1] = posture
         self.log.append("set points")
 
-    def stopped(self, cause: str) -> StoppedError:
+    def freeze_for_stop(self, cause: str) -> StoppedError:
         self._freeze()
         return StoppedError(cause)
 
-    def tripped(self, cause: str) -> TeachingError:
+    def freeze_for_fault(self, cause: str) -> TeachingError:
         self._freeze()
         return TeachingError(cause)
 

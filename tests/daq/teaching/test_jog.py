@@ -33,7 +33,7 @@ def test_a_joint_moves_at_the_speed_asked_for_while_the_key_is_held() -> None:
     assert arm.position[1:] == pytest.approx(REST[1:], abs=0.005)
 
 
-def test_several_joints_at_once() -> None:
+def test_several_joints_are_jogged_at_once() -> None:
     arm = StandIn()
     driven(arm, {1: 0.2, 3: -0.1}, held_until=100, periods=100)
     assert arm.position[2] - REST[2] == pytest.approx(-0.1 * 100 * PERIOD, abs=0.02)

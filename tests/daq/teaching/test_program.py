@@ -105,9 +105,16 @@ def test_a_whole_program_is_carried_out_in_order() -> None:
     diary, told = Diary(input_on_after=27), list[str]()
     run_program(items, MA2000, diary, told.append)
     assert diary.entries == [
-        "follow (1, 2)", "gripper True", "follow (2,)", "follow ()", "follow (1,)", "output 3 True", "observe 25",
-        "observe 1", "observe 1",
-    ]  # fmt: skip
+        "follow (1, 2)",
+        "gripper True",
+        "follow (2,)",
+        "follow ()",
+        "follow (1,)",
+        "output 3 True",
+        "observe 25",
+        "observe 1",
+        "observe 1",
+    ]
     assert told[0] == "instruction 1 of 7: absolute"
 
 
@@ -158,7 +165,7 @@ def test_a_program_comes_back_from_its_file_to_the_bit(parts: list[dict[str, obj
     assert parse_program(program_text(made)) == made
 
 
-def test_files(tmp_path: Path) -> None:
+def test_a_saved_program_loads_as_it_was(tmp_path: Path) -> None:
     made = Program.model_validate(EVERYTHING)
     save_program(made, tmp_path / "pick.json")
     assert load_program(tmp_path / "pick.json") == made

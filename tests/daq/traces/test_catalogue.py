@@ -82,7 +82,7 @@ def test_what_names_no_trace_or_several_is_one_line(folder: Path, wanted: str, c
         find_trace(folder, wanted)
 
 
-def test_folders_without_traces(tmp_path: Path) -> None:
+def test_a_folder_without_traces_has_an_empty_list(tmp_path: Path) -> None:
     assert list_traces(tmp_path) == ()
     with pytest.raises(TraceError, match="has no finished trace yet"):
         find_trace(tmp_path, "last")

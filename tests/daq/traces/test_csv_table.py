@@ -69,9 +69,15 @@ def test_the_same_trace_gives_the_same_bytes_and_plain_columns(tmp_path: Path) -
     assert header.split(",")[:5] == ["time", "set_point_1", "position_1", "drive_1", "set_point_2"]
     assert row.startswith("0.0,2.01")
     assert tomllib.loads((tmp_path / "b.toml").read_text()) == {
-        "source": "mock", "machine": "ma2000", "robot": "ma2000", "joints": [1, 2, 3], "drive_unit": "V",
-        "period": 0.02, "created": CREATED, "outcome": "complete",
-    }  # fmt: skip
+        "source": "mock",
+        "machine": "ma2000",
+        "robot": "ma2000",
+        "joints": [1, 2, 3],
+        "drive_unit": "V",
+        "period": 0.02,
+        "created": CREATED,
+        "outcome": "complete",
+    }
 
 
 def test_a_file_of_another_tool_needs_no_toml(tmp_path: Path) -> None:

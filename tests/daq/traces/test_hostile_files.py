@@ -309,7 +309,7 @@ def test_a_part_file_is_never_complete_even_when_only_its_name_was_missing(
     assert read_trace(path).record.outcome is None
 
 
-def test_an_excerpt_of_the_campaign(tmp_path: Path) -> None:
+def test_an_excerpt_of_the_damage_campaign_finds_no_fault(tmp_path: Path) -> None:
     """Two hundred damaged files of `python -m benchmarks trace_damage`, always the same."""
     tally = campaign(200, 11, tmp_path, share=0.005)
     assert (tally.examples, sum(tally.faults.values())) == ([], 0)

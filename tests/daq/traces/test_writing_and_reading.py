@@ -31,11 +31,18 @@ def recordings(draw: st.DrawFn) -> tuple[tuple[int, ...], list[SampleRow]]:
     powers = st.tuples(*[st.integers(-(2**31), 2**31 - 1) for _ in joints])
     rows = [
         SampleRow(
-            tick, tick * PERIOD, draw(number), draw(values), draw(values), draw(values), draw(values), draw(powers),
+            tick,
+            tick * PERIOD,
+            draw(number),
+            draw(values),
+            draw(values),
+            draw(values),
+            draw(values),
+            draw(powers),
             draw(st.integers(0, 2**32 - 1)),
         )
         for tick in ticks
-    ]  # fmt: skip
+    ]
     return joints, rows
 
 

@@ -33,7 +33,7 @@ def test_staircase_goes_up_and_down_in_equal_steps_and_dwells_on_each() -> None:
     assert marked(planned, "reversal") == [6]
 
 
-def test_staircase_of_one_step_and_back() -> None:
+def test_a_staircase_of_one_step_goes_up_and_back() -> None:
     planned = motion(joints=(1,), trajectory={"kind": "staircase", "amplitude": 0.1, "steps": 1, "dwell": 0.02})
     assert offsets(planned) == pytest.approx([0, 0.1, 0])
 
@@ -165,9 +165,13 @@ def test_sequence_goes_on_from_where_each_piece_ended_on_its_own_joints() -> Non
     assert offsets(planned, 2)[[5, 10, 15]] == pytest.approx([0.0, 0.0, -0.2])
     marks = [(mark.kind, mark.index, mark.joint) for mark in planned.marks]
     assert marks == [
-        ("start", 0, None), ("ramp_start", 0, 1), ("ramp_end", 5, 1), ("ramp_start", 10, None), ("ramp_end", 15, None),
+        ("start", 0, None),
+        ("ramp_start", 0, 1),
+        ("ramp_end", 5, 1),
+        ("ramp_start", 10, None),
+        ("ramp_end", 15, None),
         ("end", 15, None),
-    ]  # fmt: skip
+    ]
 
 
 def test_pause_alone_stands_still() -> None:

@@ -27,17 +27,26 @@ def _moves() -> st.SearchStrategy[dict[str, object]]:
             {"kind": st.just("staircase"), "amplitude": amplitude, "steps": st.integers(1, 5), "dwell": short}
         ),
         st.fixed_dictionaries(
-            {"kind": st.just("slow_ramp"), "amplitude": amplitude, "speed": st.floats(0.1, 3),
-             "reversals": st.integers(0, 3)}
+            {
+                "kind": st.just("slow_ramp"),
+                "amplitude": amplitude,
+                "speed": st.floats(0.1, 3),
+                "reversals": st.integers(0, 3),
+            }
         ),
         st.fixed_dictionaries(
-            {"kind": st.just("sine"), "amplitude": amplitude, "period": st.floats(0.1, 2), "cycles": st.floats(0.25, 3),
-             "phase": st.floats(-6, 6)}
+            {
+                "kind": st.just("sine"),
+                "amplitude": amplitude,
+                "period": st.floats(0.1, 2),
+                "cycles": st.floats(0.25, 3),
+                "phase": st.floats(-6, 6),
+            }
         ),
         st.fixed_dictionaries({"kind": st.just("multisine"), "amplitude": amplitude, "duration": st.floats(0.2, 2.0)}),
         st.fixed_dictionaries({"kind": st.just("cubic"), "amplitude": amplitude, "duration": short}),
         st.fixed_dictionaries({"kind": st.just("pause"), "duration": short}),
-    )  # fmt: skip
+    )
 
 
 @st.composite

@@ -70,8 +70,9 @@ def test_every_joint_passes_its_points_at_their_times_and_the_marks_say_so() -> 
     for time, point in zip((1.0, 1.6, 3.0), points, strict=True):
         assert moved[round(time / PERIOD), :2] == pytest.approx([point[1], point[2]], abs=1e-12)
     assert [(m.index, m.message) for m in made.marks if m.kind == "note"] == [
-        (50, "via point 1 of 2"), (80, "via point 2 of 2"),
-    ]  # fmt: skip
+        (50, "via point 1 of 2"),
+        (80, "via point 2 of 2"),
+    ]
 
 
 def test_via_points_go_into_sequences_and_are_checked_like_all_motions() -> None:
@@ -102,9 +103,7 @@ def test_via_points_nearer_than_a_control_period_are_refused() -> None:
 
 
 @settings(max_examples=40, deadline=None)
-@given(
-    st.lists(st.floats(-1, 1), min_size=4, max_size=4), st.lists(st.floats(0.05, 20), min_size=3, max_size=3)
-)  # fmt: skip
+@given(st.lists(st.floats(-1, 1), min_size=4, max_size=4), st.lists(st.floats(0.05, 20), min_size=3, max_size=3))
 def test_the_4_3_4_meets_its_fourteen_conditions(knots: list[float], durations: list[float]) -> None:
     times = np.array(durations)
     pieces = polynomials(np.array(knots)[:, None], times)
@@ -151,8 +150,9 @@ def test_the_arms_end_passes_straight_above_both_places() -> None:
     assert (ends[:, 2] >= min(ends[0, 2], ends[-1, 2]) - 1e-3).all()
     assert check_plan(made, MA2000, MA2000.limits) == []
     assert [(m.index, m.message) for m in made.marks if m.kind == "note"] == [
-        (50, "lift-off point"), (150, "set-down point"),
-    ]  # fmt: skip
+        (50, "lift-off point"),
+        (150, "set-down point"),
+    ]
 
 
 def test_it_begins_and_ends_at_rest_without_a_jerk() -> None:

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
-import pytest
-from serial.tools import list_ports
+from serial.tools.list_ports_common import ListPortInfo
 
 from daq.transport import FoundPort, parse_port_url, ports
 
 
-def test_found_ports_are_named_by_urls_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    adapter = SimpleNamespace(
-        device="/dev/ttyUSB1", name="ttyUSB1", description="USB serial", manufacturer="Maker", serial_number="42"
-    )
-    bare = SimpleNamespace(
-        device="/dev/ttyS0", name="ttyS0", description="n/a", manufacturer=None, serial_number=None
-    )  # fmt: skip
-    monkeypatch.setattr(list_ports, "comports", lambda: [adapter, bare])
-    assert ports() == (
+def test_found_ports_are_named_by_urls_in_order() -> None:
+    adapter, bare = ListPortInfo("/dev/ttyUSB1"), ListPortInfo("/dev/ttyS0")
+    adapter.description, adapter.manufacturer, adapter.serial_number = "USB serial", "Maker", "42"
+    assert ports(lambda: [adapter, bare]) == (
         FoundPort("serial:///dev/ttyS0", "ttyS0", None, None),
         FoundPort("serial:///dev/ttyUSB1", "USB serial", "Maker", "42"),
     )

@@ -25,10 +25,12 @@ from daq.transport import MockPort, SerialPort, TcpPort, TransportError, parse_p
             "mock://?fault=flip:rate=0.01&fault=drop:rate=0.02,seed=4",
             MockPort(("--fault", "flip:rate=0.01", "--fault", "drop:rate=0.02,seed=4")),
         ),
-        ("mock://?baud=19200&start=500,500,500,500,500,500", MockPort(
-            ("--baud", "19200", "--start", "500,500,500,500,500,500"), baud=19200)),
+        (
+            "mock://?baud=19200&start=500,500,500,500,500,500",
+            MockPort(("--baud", "19200", "--start", "500,500,500,500,500,500"), baud=19200),
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_url_names_a_port(url: str, port: object) -> None:
     assert parse_port_url(url) == port
 

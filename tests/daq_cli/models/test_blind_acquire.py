@@ -11,7 +11,7 @@ import pytest
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
 from daq.traces.reader import read_trace
-from daq_cli.models.diagnose_asking import as_run, next_to_run, time_left
+from daq_cli.models.stopping_rule import as_run, next_to_run, time_left
 from daq_cli.trial import diagnoser
 from daq_cli.trial.campaign import ROBOT_TIME, Campaign
 from daq_cli.trial.experiments import trial_experiment
@@ -30,24 +30,35 @@ SOUND = compose(7654321, "clean", "nominal")
 
 def asked(duration: float) -> NextExperiment:
     return NextExperiment(
-        name="ramp", spec=ExperimentSpec(name="ramp"), duration=duration, separates=("a", "b"),
-        predicted_separation=4.0, reason="a and b would differ",
-    )  # fmt: skip
+        name="ramp",
+        spec=ExperimentSpec(name="ramp"),
+        duration=duration,
+        separates=("a", "b"),
+        predicted_separation=4.0,
+        reason="a and b would differ",
+    )
 
 
 def answered(wanted: NextExperiment | None, verdict: Any = "ambiguous") -> Diagnosis:
     model = base_model(MACHINE)
     return Diagnosis(
-        verdict=verdict, summary="", steps=(), model_before=model, model_after=model, traces=(),
-        next_experiment=wanted, seconds=0.0, robot_seconds=0.0,
-    )  # fmt: skip
+        verdict=verdict,
+        summary="",
+        steps=(),
+        model_before=model,
+        model_after=model,
+        traces=(),
+        next_experiment=wanted,
+        seconds=0.0,
+        robot_seconds=0.0,
+    )
 
 
 def run(duration: float, outcome: str = "complete") -> Acquired:
     return Acquired(experiment="ramp", trace="1", file="1.mcap", outcome=outcome, duration=duration, reason="")
 
 
-def test_what_is_asked_is_run_while_it_fits_into_the_time_that_is_left() -> None:
+def test_an_experiment_is_run_while_it_fits_into_the_remaining_robot_time() -> None:
     assert next_to_run(answered(asked(20.0)), [], 20.0) == asked(20.0)
     assert next_to_run(answered(asked(20.1)), [], 20.0) is None
     assert next_to_run(answered(asked(8.0)), [run(7.0), run(5.0)], 20.0) == asked(8.0)
@@ -56,12 +67,12 @@ def test_what_is_asked_is_run_while_it_fits_into_the_time_that_is_left() -> None
     assert next_to_run(answered(None), [], 20.0) is None
 
 
-def test_a_name_that_is_not_sure_is_asked_about_too() -> None:
+def test_an_uncertain_name_is_followed_by_an_experiment() -> None:
     assert next_to_run(answered(asked(8.0), "named"), [], 20.0) == asked(8.0)
 
 
 @pytest.mark.parametrize("outcome", ["stopped", "fault", "interrupted"])
-def test_a_run_that_did_not_come_to_its_end_is_the_last(outcome: str) -> None:
+def test_no_experiment_follows_an_incomplete_run(outcome: str) -> None:
     assert next_to_run(answered(asked(8.0)), [run(1.0, outcome)], 20.0) is None
 
 
@@ -76,7 +87,8 @@ def ramp(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made.file
 
 
-def test_the_diagnoser_asks_where_it_may_and_only_there(
+@pytest.mark.slow
+def test_the_diagnoser_asks_for_an_experiment_only_where_it_may(
     ramp: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = workflow.diagnose
@@ -101,7 +113,7 @@ def test_the_diagnoser_asks_where_it_may_and_only_there(
     assert wanted.duration <= 15.0
 
 
-def test_a_run_is_told_by_its_trace(ramp: Path) -> None:
+def test_a_run_is_recorded_with_its_trace(ramp: Path) -> None:
     trace = read_trace(ramp)
     told = as_run(asked(8.0), trace, ramp, "complete")
     assert (told.trace, told.experiment, told.outcome) == (trace.record.trace_id, "ramp", "complete")
@@ -110,7 +122,9 @@ def test_a_run_is_told_by_its_trace(ramp: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_the_diagnosis_of_a_trial_gets_what_it_asks_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_trial_runs_the_experiment_that_its_diagnosis_asks_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("DAQ_RUNTIME_FOLDER", str(tmp_path / "run"))
     folder = TrialFolder.open(tmp_path / "trial", "ramp", True, None, "")
     folder.add("detect", {"seed": SOUND, "d_prime": 0.0, "effects": [], "load_kg": None})

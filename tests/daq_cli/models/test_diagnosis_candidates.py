@@ -18,9 +18,17 @@ def probed(effect: str, evidence: float) -> Candidate:
 
 def step(effect: str, *candidates: Candidate) -> Step:
     return Step(
-        effect=effect, joints=(1,), parameters={}, evidence=0.0, margin=0.0, candidates=candidates, rmse_fit=(),
-        where=WHERE, reason="", adopted=True,
-    )  # fmt: skip
+        effect=effect,
+        joints=(1,),
+        parameters={},
+        evidence=0.0,
+        margin=0.0,
+        candidates=candidates,
+        rmse_fit=(),
+        where=WHERE,
+        reason="",
+        adopted=True,
+    )
 
 
 def test_probes_stand_below_what_was_fitted_however_much_they_promise() -> None:

@@ -55,7 +55,7 @@ def beginning(swing: Path) -> Path:
 
 
 @pytest.mark.timeout(300)
-def test_a_file_named_takes_part_in_every_command(
+def test_an_effect_file_is_used_by_every_command(
     daq: CommandLine, tmp_path: Path, swing: Path, beginning: Path
 ) -> None:
     model, file = tmp_path / "drag.json", ("--effect-file", AIR_DRAG)
@@ -74,7 +74,7 @@ def test_a_file_named_takes_part_in_every_command(
 
 
 @pytest.mark.parametrize("command", ["simulate", "validate"])
-def test_a_model_whose_file_is_not_named_says_which(
+def test_a_model_that_needs_an_effect_file_names_it(
     daq: CommandLine, tmp_path: Path, swing: Path, command: str
 ) -> None:
     model = tmp_path / "drag.json"
@@ -87,7 +87,7 @@ def test_a_model_whose_file_is_not_named_says_which(
 @pytest.mark.parametrize(
     ("text", "told"), [(None, "cannot be read"), ("1/0", "ZeroDivisionError"), ("x = 1", "states no effect")]
 )
-def test_a_file_that_gives_no_effect_is_one_line(
+def test_a_file_without_an_effect_is_refused_in_one_line(
     daq: CommandLine, tmp_path: Path, swing: Path, text: str | None, told: str
 ) -> None:
     file = tmp_path / "wrong.py"

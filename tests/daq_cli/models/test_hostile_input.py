@@ -30,26 +30,32 @@ def rig(nobodys_desk: Path) -> None:
 
 @pytest.mark.parametrize("kind", FILES)
 @pytest.mark.parametrize("words", READERS)
-def test_a_file_that_nobody_means(daq: CommandLine, words: str, kind: str) -> None:
+def test_a_hostile_file_is_refused_in_one_line(daq: CommandLine, words: str, kind: str) -> None:
     refuses(daq(*words.format(hostile_file(kind, READERS[words])).split()))
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-1", "1e400", "0", "x", "9" * 6000])
 @pytest.mark.parametrize(
     "words",
-    ["validate single.toml good.csv --damping-ratio={}", "diagnose good.csv --model single.toml --load={}",
-     "design single.toml --duration={}", "diagnose good.csv --acquire --budget={}",
-     "design single.toml --experiments={}",
-     "fit good.csv --machine single.toml -o out.json --starts={}", "validate single.toml good.csv --joint={}",
-     "fit good.csv --machine single.toml -o out.json --bound=link1.mass={}:{}", "blind --folder t --seeds=1 --shard={}",
-     "blind --folder t --seeds=1 --cases={}"],
-)  # fmt: skip
-def test_a_number_that_nobody_means(daq: CommandLine, words: str, value: str) -> None:
+    [
+        "validate single.toml good.csv --damping-ratio={}",
+        "diagnose good.csv --model single.toml --load={}",
+        "design single.toml --duration={}",
+        "diagnose good.csv --acquire --budget={}",
+        "design single.toml --experiments={}",
+        "fit good.csv --machine single.toml -o out.json --starts={}",
+        "validate single.toml good.csv --joint={}",
+        "fit good.csv --machine single.toml -o out.json --bound=link1.mass={}:{}",
+        "blind --folder t --seeds=1 --shard={}",
+        "blind --folder t --seeds=1 --cases={}",
+    ],
+)
+def test_a_number_without_meaning_is_refused_in_one_line(daq: CommandLine, words: str, value: str) -> None:
     if "--load" in words and value == "0":
         return
     refuses(daq(*words.format(value, value).split()))
 
 
-def test_the_limits_that_are_configured_hold_for_a_csv(daq: CommandLine) -> None:
+def test_configured_limits_of_traces_hold_for_a_csv(daq: CommandLine) -> None:
     Path("daq.toml").write_text("[traces.limits]\nrecords = 20\n")
     daq("simulate", "single.toml", "good.csv").complains(2, "good.csv", "traces.limits.records")

@@ -13,6 +13,7 @@ from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
 from daq_cli.app.context import Invocation
 from daq_cli.models.model_input import check_made_for, machine_of
+from daq_cli.robot.local import LocalRobot
 from tests.daq.traces.samples import record
 from tests.daq_cli.models.conftest import ROOT
 
@@ -37,27 +38,29 @@ def second_link(**changes: Any) -> Machine:
     )
 
 
-def test_two_machines_of_one_name_are_refused_with_where_they_differ() -> None:
+def test_different_machines_of_one_name_are_refused_with_the_differing_field() -> None:
     with pytest.raises(SpecError, match=r"both called ma2000: joints\.2\.link\.mass\.value differs"):
-        machine_of([trace(MA2000), trace(second_link(value=1.0))], Invocation())
+        machine_of([trace(MA2000), trace(second_link(value=1.0))], LocalRobot(Invocation()))
 
 
-def test_what_is_only_said_otherwise_is_the_same_machine() -> None:
+def test_machines_that_differ_only_in_words_are_the_same() -> None:
     other = second_link(source="weighed").model_copy(update={"title": "the arm", "limits": Limits(reach=0.5)})
-    assert machine_of([trace(MA2000), unnamed(1, 2, 3), trace(other)], Invocation()) == other
+    assert machine_of([trace(MA2000), unnamed(1, 2, 3), trace(other)], LocalRobot(Invocation())) == other
 
 
-def test_traces_that_name_none_are_of_the_configured_machine_which_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    assert machine_of([unnamed(1, 2, 3)], Invocation(), ["bench.csv"]) == MA2000
+def test_traces_without_a_machine_are_taken_for_the_configured_one_with_a_remark(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert machine_of([unnamed(1, 2, 3)], LocalRobot(Invocation()), ["bench.csv"]) == MA2000
     assert "bench.csv: no machine is named there: taken for the configured ma2000" in capsys.readouterr().err
 
 
-def test_a_trace_that_names_none_and_lacks_joints_needs_a_model() -> None:
+def test_a_trace_without_a_machine_that_lacks_joints_needs_a_model() -> None:
     with pytest.raises(SpecError, match=r"^bench\.csv: names no machine, and has no joint 2 or 3 of ma2000.*--model"):
-        machine_of([unnamed(1)], Invocation(), ["bench.csv"])
+        machine_of([unnamed(1)], LocalRobot(Invocation()), ["bench.csv"])
 
 
-def test_a_trace_of_another_machine_is_told_by_its_file() -> None:
+def test_a_trace_of_another_machine_is_refused_with_its_file_name() -> None:
     bench = load_machine(str(ROOT / "examples" / "motor_bench.toml"))
     with pytest.raises(SpecError, match=r"^axis\.csv: has no velocity, which the sensors of motor-bench measure"):
         check_made_for(bench, [unnamed(1)], ["axis.csv"])

@@ -26,7 +26,7 @@ def rig_traces(folder: Path) -> list[Path]:
     return [Path(line) for line in run.stdout.split()]
 
 
-def test_a_simulated_trace_simulated_again_leaves_nothing(daq: CommandLine, tmp_path: Path) -> None:
+def test_a_simulated_trace_is_reproduced_without_residual(daq: CommandLine, tmp_path: Path) -> None:
     """What `simulate` writes is a trace like any other; the model explains its own motion to one count, since the
     start posture is known no better."""
     trace = write_csv(tmp_path / "sine.csv")
@@ -44,7 +44,7 @@ def test_a_simulated_trace_does_not_replace_the_machine_file(daq: CommandLine, t
     assert machine.read_text() == SINGLE_AXIS.read_text()
 
 
-def test_a_fit_is_kept_when_what_comes_after_it_fails(
+def test_a_fitted_model_is_kept_when_the_comparison_fails(
     daq: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Found:
@@ -83,7 +83,7 @@ def test_compare_names_the_parameter_that_differs(daq: CommandLine, tmp_path: Pa
 
 @pytest.mark.slow
 @pytest.mark.timeout(400)
-def test_a_fit_finds_what_the_rig_was_made_with(daq: CommandLine, tmp_path: Path) -> None:
+def test_a_fit_with_an_own_effect_finds_its_parameter(daq: CommandLine, tmp_path: Path) -> None:
     """The rig is integrated by a script that shares nothing with the model; the guide shows this very example."""
     first, second = rig_traces(tmp_path)
     out, page = tmp_path / "axis.json", tmp_path / "axis.html"

@@ -12,7 +12,8 @@ import pytest
 from daq.contracts.machine import load_machine
 from daq.traces.store import write_trace
 from model.machine_model.model import base_model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from tests.daq_cli.invoke import CommandLine
 from tests.model.simulation.records import ramp_trace
 
@@ -25,7 +26,7 @@ def ramp(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_trace(ramp_trace(load_machine("ma2000")), tmp_path_factory.mktemp("ramp") / "ramp.mcap")
 
 
-def test_curves_are_the_changes_of_a_simulation_and_are_written_as_csv(
+def test_sensitivity_curves_equal_simulated_changes_and_are_written_as_csv(
     daq: CommandLine, ramp: Path, tmp_path: Path
 ) -> None:
     said = daq("sensitivity", "ma2000", ramp, "--parameters", f"{BACK_EMF},{LOAD}", "-o", tmp_path / "c.csv", "--json")
@@ -57,7 +58,7 @@ def test_the_table_names_the_joint_and_the_moment_and_the_strongest_parameter_fi
     assert "joint 3" in picture.read_text("utf-8")
 
 
-def test_what_cannot_be_is_said_in_one_line(daq: CommandLine, ramp: Path, tmp_path: Path) -> None:
+def test_wrong_options_of_sensitivity_are_refused_in_one_line(daq: CommandLine, ramp: Path, tmp_path: Path) -> None:
     daq("sensitivity", "ma2000", ramp, "-o", tmp_path / "curves.xyz").complains(2, "curves.xyz", ".csv", ".png")
     daq("sensitivity", "ma2000", ramp, "--parameters", "link9.mass").complains(2, "link9.mass")
     daq("sensitivity", "ma2000", ramp, "--open-loop").complains(2, "no drive")

@@ -20,12 +20,12 @@ def fitting(*traces: object) -> tuple[object, ...]:
     return ("fit", *traces, "--machine", SINGLE_AXIS, "-o", "out.json")
 
 
-def test_a_trace_without_motion(daq: CommandLine, tmp_path: Path) -> None:
+def test_a_trace_without_motion_is_refused(daq: CommandLine, tmp_path: Path) -> None:
     still = write_csv(tmp_path / "still.csv", amplitude=0.0)
     refused(daq, *fitting(still), says=("no motion", "4 counts"))
 
 
-def test_a_trace_with_a_value_that_is_no_number(daq: CommandLine, tmp_path: Path) -> None:
+def test_a_trace_with_a_value_that_is_no_number_is_refused(daq: CommandLine, tmp_path: Path) -> None:
     path = write_csv(tmp_path / "nan.csv")
     path.write_text(path.read_text().replace("0.100000,", "0.100000,nan,", 1).replace(",nan,", ",nan,", 1))
     lines = path.read_text().splitlines()
@@ -35,11 +35,11 @@ def test_a_trace_with_a_value_that_is_no_number(daq: CommandLine, tmp_path: Path
     refused(daq, *fitting(path), says=(f"row {row + 1}", "'nan' is not a finite number"))
 
 
-def test_a_trace_of_two_samples(daq: CommandLine, tmp_path: Path) -> None:
+def test_a_trace_of_two_samples_is_refused(daq: CommandLine, tmp_path: Path) -> None:
     refused(daq, *fitting(write_csv(tmp_path / "two.csv", count=2)), says=("2 samples", "at least 10"))
 
 
-def test_a_joint_that_the_trace_lacks(daq: CommandLine, tmp_path: Path) -> None:
+def test_a_model_with_a_joint_that_the_trace_lacks_is_refused(daq: CommandLine, tmp_path: Path) -> None:
     one = write_csv(tmp_path / "one.csv")
     refused(daq, "fit", one, "--machine", "ma2000", "-o", "out.json", says=("joint 2 is not in it",))
 
@@ -49,25 +49,25 @@ def test_degrees_instead_of_radians_are_named(daq: CommandLine, tmp_path: Path) 
     refused(daq, *fitting(degrees), says=("joint 1", "degrees", "rad"))
 
 
-def test_fewer_samples_than_parameters(daq: CommandLine, tmp_path: Path) -> None:
+def test_fewer_samples_than_parameters_are_refused(daq: CommandLine, tmp_path: Path) -> None:
     short = write_csv(tmp_path / "short.csv", count=12)
     everything = ("--effects", "viscous,coulomb,stribeck,stiction,torque_ripple,gear_loss,spring,potentiometer_gain")
     words = (*fitting(short), *everything, "--parameters", "*")
     refused(daq, *words, says=("12 samples for", "more samples than parameters"))
 
 
-def test_a_bound_the_wrong_way_round(daq: CommandLine, tmp_path: Path) -> None:
+def test_a_lower_bound_above_the_upper_is_refused(daq: CommandLine, tmp_path: Path) -> None:
     trace = write_csv(tmp_path / "good.csv")
     words = (*fitting(trace), "--bound", "link1.mass=2:1")
     refused(daq, *words, says=("link1.mass=2:1", "lower bound 2 is not below the upper 1"))
 
 
-def test_a_bound_that_is_no_number(daq: CommandLine, tmp_path: Path) -> None:
+def test_a_bound_that_is_no_number_is_refused(daq: CommandLine, tmp_path: Path) -> None:
     trace = write_csv(tmp_path / "good.csv")
     refused(daq, *fitting(trace), "--bound", "link1.mass=much:", says=("link1.mass=much:", "numbers"))
 
 
-def test_a_machine_without_inertia(daq: CommandLine, tmp_path: Path) -> None:
+def test_a_machine_without_inertia_is_refused(daq: CommandLine, tmp_path: Path) -> None:
     text = SINGLE_AXIS.read_text().replace("value = 0.8, unit", "value = 0.0, unit")
     text = text.replace("value = 0.004, unit", "value = 0.0, unit")
     (tmp_path / "weightless.toml").write_text(text)
@@ -77,7 +77,7 @@ def test_a_machine_without_inertia(daq: CommandLine, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["simulate", "validate"])
-def test_a_model_of_a_newer_version(daq: CommandLine, tmp_path: Path, command: str) -> None:
+def test_a_model_of_a_newer_version_is_refused(daq: CommandLine, tmp_path: Path, command: str) -> None:
     trace = write_csv(tmp_path / "good.csv")
     newer = tmp_path / "newer.json"
     newer.write_text(json.dumps({"format": 99, "machine": {}}))
@@ -86,10 +86,14 @@ def test_a_model_of_a_newer_version(daq: CommandLine, tmp_path: Path, command: s
 
 @pytest.mark.parametrize(
     ("text", "says"),
-    [("{", ("not JSON",)), ("[]", ("neither a model",)), ('{"machine": {}}', ("no version",)),
-     ('{"format": 1, "machine": {}}', ("machine.version",))],
-)  # fmt: skip
-def test_a_file_that_is_no_model(daq: CommandLine, tmp_path: Path, text: str, says: tuple[str, ...]) -> None:
+    [
+        ("{", ("not JSON",)),
+        ("[]", ("neither a model",)),
+        ('{"machine": {}}', ("no version",)),
+        ('{"format": 1, "machine": {}}', ("machine.version",)),
+    ],
+)
+def test_a_file_that_is_no_model_is_refused(daq: CommandLine, tmp_path: Path, text: str, says: tuple[str, ...]) -> None:
     (tmp_path / "model.json").write_text(text)
     trace = write_csv(tmp_path / "good.csv")
     refused(daq, "simulate", tmp_path / "model.json", trace, says=("model.json", *says))
@@ -108,7 +112,7 @@ def test_a_file_that_is_no_model(daq: CommandLine, tmp_path: Path, text: str, sa
         ("--model model.json", ("--model and --machine",)),
     ],
 )
-def test_what_is_not_there_is_named(daq: CommandLine, tmp_path: Path, words: str, says: tuple[str, ...]) -> None:
+def test_missing_files_are_named(daq: CommandLine, tmp_path: Path, words: str, says: tuple[str, ...]) -> None:
     trace = write_csv(tmp_path / "good.csv")
     refused(daq, *fitting(trace), *words.split(), says=says)
 
@@ -125,17 +129,17 @@ def test_what_is_not_there_is_named(daq: CommandLine, tmp_path: Path, words: str
         ("fit nothing -o out.json --torques --seed 2", ("--torques", "--seed")),
     ],
 )
-def test_what_cannot_be_is_said_before_a_trace_is_read(daq: CommandLine, words: str, says: tuple[str, ...]) -> None:
+def test_wrong_options_are_refused_before_a_trace_is_read(daq: CommandLine, words: str, says: tuple[str, ...]) -> None:
     refused(daq, *words.split(), says=says)
 
 
-def test_the_same_trace_twice(daq: CommandLine, tmp_path: Path) -> None:
+def test_the_same_trace_twice_is_refused(daq: CommandLine, tmp_path: Path) -> None:
     trace = write_csv(tmp_path / "good.csv")
     imported = Path(daq("traces", "import", trace, "--folder", tmp_path).out.strip())
     refused(daq, *fitting(imported, imported), says=("more than once",))
 
 
-def test_one_model_is_not_compared(daq: CommandLine, tmp_path: Path) -> None:
+def test_a_comparison_needs_two_models(daq: CommandLine, tmp_path: Path) -> None:
     refused(daq, "compare", SINGLE_AXIS, write_csv(tmp_path / "good.csv"), says=("1 model named", "at least two"))
 
 
@@ -144,6 +148,6 @@ def test_models_of_different_joints_are_not_compared(daq: CommandLine, tmp_path:
     refused(daq, "compare", SINGLE_AXIS, "ma2000", trace, says=("cannot be compared", "[1, 2, 3]"))
 
 
-def test_a_report_of_another_kind(daq: CommandLine, tmp_path: Path) -> None:
+def test_a_report_that_is_not_html_is_refused(daq: CommandLine, tmp_path: Path) -> None:
     trace = write_csv(tmp_path / "good.csv")
     daq("simulate", SINGLE_AXIS, trace, "--report", "page.txt").complains(2, "page.txt", ".html")

@@ -9,7 +9,7 @@ import pytest
 
 from firmware_protocol.memory_map import default_memory_map
 from mock_controller.board import Board, default_board
-from mock_controller.modifications.interface import Modification
+from mock_controller.modification import Modification
 from mock_controller.plant import Plant, default_plant
 
 MakeBoard = Callable[..., Board]

@@ -137,7 +137,7 @@ def test_set_points_are_in_the_memory_and_taken_by_the_next_period(host: LockSte
     assert readings[2].set_point == host.board.memory.values("set_point")[1]
 
 
-def test_peek_and_poke(host: LockStepHost) -> None:
+def test_bytes_that_are_poked_can_be_peeked(host: LockStepHost) -> None:
     assert host.ask(WriteBlock(0xFC78, b"\x01\x02\x03")) == BlockWritten()
     assert host.ask(ReadBlock(0xFC77, 5)) == Block(b"\x00\x01\x02\x03\x00")
 

@@ -27,9 +27,14 @@ from mock_controller.lock_step import HOST_PATIENCE_US
 from tests.mock.host import LockStepHost
 
 EVERY_WIRE_FAULT = (
-    "flip:rate=0.2", "drop:rate=0.1", "duplicate:rate=0.1,ms=3", "delay:rate=0.2,ms=4,jitter_ms=30", "split:rate=0.2",
-    "junk:rate=0.2", "stall:start=0.4,duration=0.1",
-)  # fmt: skip
+    "flip:rate=0.2",
+    "drop:rate=0.1",
+    "duplicate:rate=0.1,ms=3",
+    "delay:rate=0.2,ms=4,jitter_ms=30",
+    "split:rate=0.2",
+    "junk:rate=0.2",
+    "stall:start=0.4,duration=0.1",
+)
 
 
 def conversation(**options: object) -> bytes:

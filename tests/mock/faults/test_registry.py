@@ -12,9 +12,20 @@ from mock_controller.faults.fault import FaultError, fields_of
 from mock_controller.faults.registry import FAULTS, describe, parse_fault, table
 
 NAMES = (
-    "flip", "drop", "duplicate", "delay", "split", "junk", "stall", "disconnect", "busy_memory", "stuck_potentiometer",
-    "noisy_potentiometer", "stalled_joint", "brown_out",
-)  # fmt: skip
+    "flip",
+    "drop",
+    "duplicate",
+    "delay",
+    "split",
+    "junk",
+    "stall",
+    "disconnect",
+    "busy_memory",
+    "stuck_potentiometer",
+    "noisy_potentiometer",
+    "stalled_joint",
+    "brown_out",
+)
 
 
 def test_every_fault_has_a_name_a_line_and_parameters_that_are_explained() -> None:
@@ -28,8 +39,14 @@ def test_every_fault_has_a_name_a_line_and_parameters_that_are_explained() -> No
 def test_a_fault_is_asked_for_with_its_parameters() -> None:
     fault = parse_fault("flip:rate=0.01, seed=3, direction=to_host")
     assert describe(fault) == {
-        "name": "flip", "rate": 0.01, "seed": 3, "direction": "to_host", "bits": 1, "start": 0.0, "duration": None,
-    }  # fmt: skip
+        "name": "flip",
+        "rate": 0.01,
+        "seed": 3,
+        "direction": "to_host",
+        "bits": 1,
+        "start": 0.0,
+        "duration": None,
+    }
 
 
 @pytest.mark.parametrize(

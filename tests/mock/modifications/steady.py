@@ -8,9 +8,9 @@ from typing import Any
 
 import mujoco
 
+from mock_controller.modification import Modification
 from mock_controller.modifications import build_modifications
 from mock_controller.modifications.changes import change_joint
-from mock_controller.modifications.interface import Modification
 from mock_controller.plant import Plant, PlantParameters, default_plant
 from mock_controller.plant.rigid_body import build_model
 

@@ -67,7 +67,7 @@ def test_a_warming_potentiometer_drifts_to_its_end() -> None:
     assert shown[-1] == pytest.approx(1.02, abs=1e-5)
 
 
-def test_converter_bits() -> None:
+def test_a_faulty_converter_bit_changes_the_readings_that_have_it() -> None:
     heavy = sensor("converter_bit_weight", joint=1, bit=8, error=5.0)
     assert heavy.reading(255.2) == 255.2
     assert heavy.reading(256.2) == 261.2

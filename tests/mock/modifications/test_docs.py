@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from mock_controller.hidden.sizes import OPEN_SIZES, SHARED_SIZES, SizeRange
-from mock_controller.modifications.registry import fields_of, known_modifications
+from mock_controller.modifications.parameter import fields_of
+from mock_controller.modifications.registry import known_modifications
 
 PAGE = (Path(__file__).parents[3] / "docs" / "mock.md").read_text("utf-8")
 

@@ -10,9 +10,10 @@ import pytest
 from daq.contracts.effects import effect_names
 from firmware_protocol.memory_map import default_memory_map
 from mock_controller.board import Board, default_board
-from mock_controller.modifications.interface import Modification
+from mock_controller.modification import Modification
 from mock_controller.modifications.library import LIBRARY, OPEN_SET, SHARED
-from mock_controller.modifications.registry import build_modifications, fields_of, is_null, table
+from mock_controller.modifications.parameter import fields_of
+from mock_controller.modifications.registry import build_modifications, is_null, table
 from mock_controller.plant import Plant, default_plant
 
 NO_LIMIT_AT_NULL = ("backlash", "joint_compliance", "amplifier_slew_rate", "stuck_converter_bit")

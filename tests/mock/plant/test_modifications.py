@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import pytest
 
+from mock_controller.modification import Modification
 from mock_controller.modifications import ModificationError, build_modifications
-from mock_controller.modifications.interface import Modification
 from mock_controller.plant import Plant, PlantError, default_plant
 
 LOW = (math.pi, 0.3, 0.2, 0.0, 0.0, 0.0)

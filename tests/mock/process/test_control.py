@@ -124,7 +124,7 @@ def test_the_guide_lists_every_command(desk: Desk) -> None:
     assert set(re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)) - {"do"} == set(desk.say("help")["commands"])
 
 
-def test_help_and_modifications(desk: Desk) -> None:
+def test_commands_and_modifications_are_listed(desk: Desk) -> None:
     assert "state" in desk.say("help")["commands"]
     assert all(desk.say("help")["commands"].values())
     assert desk.say("modifications") == {"ok": True, "modifications": []}
@@ -133,13 +133,23 @@ def test_help_and_modifications(desk: Desk) -> None:
 @pytest.mark.parametrize(
     "line",
     [
-        b"", b"{", b"\xff\xfe", b"[]", b"7", b'{"do": 3}', b'{"do": "dance"}', b'{"do": "fault_on"}',
-        b'{"do": "fault_on", "fault": "flop"}', b'{"do": "fault_off", "fault": "flip"}',
-        b'{"do": "inputs", "bits": 256}', b'{"do": "inputs", "bits": true}',
-        b'{"do": "disconnect", "seconds": -1}', b"[" * 100_000,
+        b"",
+        b"{",
+        b"\xff\xfe",
+        b"[]",
+        b"7",
+        b'{"do": 3}',
+        b'{"do": "dance"}',
+        b'{"do": "fault_on"}',
+        b'{"do": "fault_on", "fault": "flop"}',
+        b'{"do": "fault_off", "fault": "flip"}',
+        b'{"do": "inputs", "bits": 256}',
+        b'{"do": "inputs", "bits": true}',
+        b'{"do": "disconnect", "seconds": -1}',
+        b"[" * 100_000,
         b'{"do": "disconnect", "seconds": NaN}',
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_done_is_answered_by_one_line(desk: Desk, line: bytes) -> None:
     answer = desk.control.execute(line)
     assert answer.count(b"\n") == 1

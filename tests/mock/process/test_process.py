@@ -30,7 +30,7 @@ WHERE = pytest.mark.parametrize("where", [("--pty",), ("--tcp", "127.0.0.1:0")],
 
 
 @WHERE
-def test_a_conversation_in_real_time(where: tuple[str, ...]) -> None:
+def test_requests_are_answered_in_real_time(where: tuple[str, ...]) -> None:
     with RunningMock(*where) as mock, SerialHost(mock.url) as host:
         assert isinstance(host.ask(Hello(2, 1)), HelloReply)
         first = host.ask(Sample(AFTER_NEWEST, 7))

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
-from model.analysis.bodies import chain_of
 from model.analysis.sensitivity import sensitivity_curves
 from model.analysis.torques import TorqueAnalysis, largest, torques_along, torques_of_run, torques_of_trace
 from model.dynamics import recursive
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, simulate
+from model.simulation.chain_of_model import chain_of
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from tests.model.validation.synthetic import arm, ramp_trace
 
 K = 12

@@ -41,19 +41,19 @@ def multisine(size: float, **fields: object) -> ExperimentSpec:
     )
 
 
-def test_more_motion_tells_more() -> None:
+def test_a_larger_motion_gives_more_information() -> None:
     small, large = (information_gain(arm(), [multisine(s)], plan, options=FEW) for s in (0.05, 0.2))
     assert 0 < small.nats < large.nats
     for little, much in zip(small.parameters, large.parameters, strict=True):
         assert much.after < little.after <= little.before
 
 
-def test_standing_still_tells_nothing_worth_having() -> None:
+def test_standing_still_gives_hardly_any_information() -> None:
     with pytest.raises(TraceError, match="no motion"):
         information_gain(arm(), [multisine(0.1, trajectory=Pause(duration=4.0))], plan, options=FEW)
 
 
-def test_what_is_known_already_gains_less() -> None:
+def test_an_experiment_adds_less_to_a_fitted_model_than_to_priors() -> None:
     known = fit(arm(), traces(arm(), 1, 5.0), FEW.model_copy(update={"replicas": 0, "rounds": 1}))
     fresh = information_gain(arm(), [multisine(0.2)], plan, options=FEW)
     after = information_gain(arm(), [multisine(0.2)], plan, fitted=known)
@@ -95,7 +95,7 @@ def test_the_page_shows_every_experiment_and_what_becomes_known(tmp_path: Path) 
     assert f"{gain.nats:.1f} nats" in page
 
 
-def test_nothing_within_the_limits_is_said_with_the_reason() -> None:
+def test_a_design_without_any_allowed_candidate_is_refused_with_the_last_reason() -> None:
     def refusing(_spec: ExperimentSpec) -> NDArray[np.float64]:
         raise SafetyError("joint 2 leaves its range")
 
@@ -103,7 +103,7 @@ def test_nothing_within_the_limits_is_said_with_the_reason() -> None:
         design(arm(), refusing, DesignOptions(candidates=4), FEW)
 
 
-def test_can_be_cancelled() -> None:
+def test_a_design_can_be_cancelled() -> None:
     now = threading.Event()
     now.set()
     with pytest.raises(CancelledError):
@@ -115,12 +115,12 @@ def test_the_best_set_is_found_where_greed_alone_fails() -> None:
     prior = 0.01 * np.eye(2)
     middling, first, second = np.diag([5.0, 5.0]), np.diag([9.0, 0.5]), np.diag([0.5, 9.0])
     assert sorted(best_set(prior, [middling, first, second], 2)) in ([1, 2], [0, 1], [0, 2])
-    total = {s: np.linalg.det(prior + a + b) for s, a, b in (
-        ("mf", middling, first), ("ms", middling, second), ("fs", first, second))}  # fmt: skip
+    pairs = {"mf": (middling, first), "ms": (middling, second), "fs": (first, second)}
+    total = {name: np.linalg.det(prior + a + b) for name, (a, b) in pairs.items()}
     chosen = best_set(prior, [middling, first, second], 2)
     value = np.linalg.det(prior + sum([middling, first, second][k] for k in chosen))
     assert value == pytest.approx(max(total.values()))
 
 
-def test_all_are_taken_when_there_are_too_few() -> None:
+def test_the_best_set_of_too_few_experiments_is_all_of_them() -> None:
     assert best_set(np.eye(2), [np.eye(2)], 4) == [0]

@@ -45,5 +45,7 @@ def test_a_step_of_any_allowed_size_can_be_judged() -> None:
         ([0, 114, 70, 80], [0, 114, 0, 0], 3),  # had died away
     ],
 )
-def test_what_counts_as_falling_behind(error: list[float], change: list[float], behind: int | None) -> None:
+def test_set_points_count_as_outrunning_the_arm_when_its_error_grows_beyond_the_limit(
+    error: list[float], change: list[float], behind: int | None
+) -> None:
     assert _falls_behind(np.array(error, float), np.array(change, float), 28.0, 127) == behind

@@ -7,13 +7,16 @@ import numpy as np
 from daq.contracts.experiment import ExperimentSpec, SlowRamp
 from daq.contracts.trace import Trace
 from model.comparison.compare import Comparison, compare
-from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, NextExperiment, SignalError, Step
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, FoundValue, NextExperiment, SignalError, Step
 from model.discrepancy.explanation.reasons import reason
-from model.discrepancy.localisation.disagreement import located
-from model.discrepancy.localisation.unexplained_torque import shapes
+from model.discrepancy.explanation.renderer import with_sentences
+from model.discrepancy.localisation.disagreement import locate
+from model.discrepancy.localisation.residuals import Residuals
+from model.discrepancy.localisation.unexplained_torque import remaining_shapes
 from model.fitting.records import noise_floor, records_of
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from tests.model.discrepancy.motions import trace_of
 from tests.model.fitting import imagined
 
@@ -33,7 +36,7 @@ def an_answer(seconds: float = 20.0) -> tuple[Diagnosis, Comparison]:
     held = trace_of(after, seconds, seed=4)
     records = records_of([fit], before.machine, "position")
     deviations = noise_floor(records, before.machine, "position")
-    left = residual(before, fit)
+    left = Residuals(before, records, [residual(before, fit)], deviations)
     value = FoundValue(value=TORQUE, low=7.8, high=8.2, unit="N·m")
     candidates = (
         Candidate(effect=EFFECT, joints=(2,), evidence=2410.0, misfit=1.02, refitted=True, parameters={NAME: value}),
@@ -44,29 +47,26 @@ def an_answer(seconds: float = 20.0) -> tuple[Diagnosis, Comparison]:
         Candidate(effect="base_tilt", joints=(), evidence=-6.0),
         Candidate(effect="viscous_friction", joints=(1,), evidence=-11.0),
     )
-    told = reason(
-        EFFECT, (2,), {NAME: value}, 2410.0, 520.0, model=after, before=before, records=records,
-        runner_up=candidates[1],
-    )  # fmt: skip
+    speaks = reason(EFFECT, (2,), {NAME: value}, model=after, before=before, records=records, rival=candidates[1])
     comparison = compare([("before", before), ("after", after)], [fit, held], [held.record.trace_id])
     step = Step(
         effect=EFFECT, joints=(2,), parameters={NAME: value}, evidence=2410.0, margin=520.0, candidates=candidates,
         rmse_fit=_errors(comparison, "in_sample"), rmse_holdout=_errors(comparison, "held_out"),
         excess_removed_holdout=0.982, sum_lambda2_before=0.31, sum_lambda2_after=1.42,
-        where=located(before, records, [left], deviations), reason=told, adopted=True,
+        where=locate(left), reason=UNWRITTEN, reason_data=speaks, adopted=True,
     )  # fmt: skip
     asked = NextExperiment(
         name="slow reversals on joint 2", spec=ExperimentSpec(trajectory=SlowRamp(), joints=(2,)), duration=12.0,
         separates=("stiction", "stribeck_friction"), predicted_separation=6.4,
-        reason="at 2 °/s stiction jerks and Stribeck friction does not",
+        reason="At 2 °/s stiction jerks and Stribeck friction does not.",
     )  # fmt: skip
     answer = Diagnosis(
-        verdict="named", summary="Coulomb friction on joint 2 is missing.", steps=(step,),
-        remaining=shapes(before, records, [left], deviations), next_experiment=asked, model_before=before,
+        verdict="named", summary=UNWRITTEN, steps=(step,),
+        remaining=remaining_shapes(left), next_experiment=asked, model_before=before,
         model_after=after, traces=(fit.record.trace_id,), holdout=(held.record.trace_id,), seconds=4.2,
         robot_seconds=2 * seconds, notes=("The recorded drive was used.",),
     )  # fmt: skip
-    return answer, comparison
+    return with_sentences(answer), comparison
 
 
 def residual(model: Model, trace: Trace) -> np.ndarray:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from model import layout as at
 from model.effects.effect import Effect, EffectFile, EffectParameter
-from model.machine_model import layout as at
 
 
 def own_effect(name: str, joints: tuple[int, ...] = (), parameters: int = 1) -> Effect:

@@ -11,7 +11,7 @@ from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import Trace, TraceEvent
 from daq.driver import Controller
-from daq.runner import Arrangement, Consent, Outside, run_experiment
+from daq.runner import Consent, RunSetup, StopRequests, run_experiment
 from daq.runner.arm_control import ArmControl
 from daq.traces.reader import read_trace
 
@@ -37,8 +37,8 @@ def recorded(
     traces = []
     with Controller.connect(f"mock://?{options}") as controller:
         for spec in specs:
-            run = Arrangement(
-                controller, ArmControl(controller), spec, machine, machine.limits, folder, Unheard(), Outside()
+            run = RunSetup(
+                controller, ArmControl(controller), spec, machine, machine.limits, folder, Unheard(), StopRequests()
             )
             result = run_experiment(run, Consent())
             assert result.outcome == "complete", result.reason

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.options import DiagnosisOptions
 from tests.model.discrepancy.diagnosed import diagnosed
 
 HIDDEN = {
@@ -14,17 +16,28 @@ HIDDEN = {
     "backlash": ("backlash:joint=2,play=0.012,stiffness=20000,damping=10", 2),
     "wrong_gain": ("wrong_gain:joint=1,factor=1.15", 1),
 }
-SLOW = ("motor_inductance", "backlash")
-"""Of them, those that take minutes: left to the slow tests."""
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in HIDDEN]
+FRICTION = DiagnosisOptions(
+    effects=("coulomb_friction", "stribeck_friction", "stiction", "viscous_friction", "backlash"), joints=(2, 3)
 )
+"""Effects that look alike, on two joints: a tenth of the library's work."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", HIDDEN)
 @pytest.mark.timeout(400)
 def test_a_hidden_effect_is_named_at_its_joint_and_the_gap_shrinks(name: str, tmp_path: Path) -> None:
     modification, joint = HIDDEN[name]
-    answer = diagnosed(tmp_path, modification)
+    _is_named(diagnosed(tmp_path, modification), name, joint)
+
+
+@pytest.mark.timeout(400)
+def test_coulomb_friction_is_told_from_what_looks_like_it(tmp_path: Path) -> None:
+    modification, joint = HIDDEN["coulomb_friction"]
+    _is_named(diagnosed(tmp_path, modification, options=FRICTION), "coulomb_friction", joint)
+
+
+def _is_named(answer: Diagnosis, name: str, joint: int) -> None:
+    """Checks that the effect is named at its joint, and that the error on the held-out trace falls."""
     assert answer.verdict == "named", answer.summary
     assert [(s.effect, s.joints) for s in answer.steps if s.adopted] == [(name, (joint,))]
     gap = {e.joint: e for e in answer.rmse_holdout}[joint]
@@ -36,7 +49,7 @@ def test_a_hidden_effect_is_named_at_its_joint_and_the_gap_shrinks(name: str, tm
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_two_effects_so_strong_that_the_tolerance_parameters_go_astray_are_both_named(tmp_path: Path) -> None:
+def test_two_effects_so_strong_that_the_fit_diverges_from_the_prior_are_both_named(tmp_path: Path) -> None:
     """Either alone is found from where the first fit ends; of both, no fit was any good there, and none was begun
     again."""
     answer = diagnosed(tmp_path, "spring_torque:joint=2,stiffness=8", "dead_zone:joint=1,width=0.8")

@@ -15,22 +15,31 @@ IMITATORS = DiagnosisOptions(effects=("coulomb_friction", "motor_inductance", "d
 """Laws that take most of it, on the joint that it reaches."""
 
 
+SLOW_REVERSALS, WHOLE = "diagnostic-b", "diagnostic"
+"""A quarter of the 55 s set, for every day, and the whole of it, for the slow tests."""
+
+
 @pytest.mark.parametrize(
-    "options", [pytest.param(IMITATORS, id="its imitators"), pytest.param(None, id="library", marks=pytest.mark.slow)]
+    ("experiment", "options"),
+    [
+        pytest.param(SLOW_REVERSALS, IMITATORS, id="its imitators"),
+        pytest.param(WHOLE, None, id="library", marks=pytest.mark.slow),
+    ],
 )
 @pytest.mark.timeout(400)
 def test_an_effect_that_no_law_of_the_library_describes_is_not_given_a_name(
-    tmp_path: Path, options: DiagnosisOptions | None
+    tmp_path: Path, experiment: str, options: DiagnosisOptions | None
 ) -> None:
-    answer = diagnosed(tmp_path, COUPLED, options=options)
+    answer = diagnosed(tmp_path, COUPLED, experiment=experiment, options=options)
     assert answer.verdict == "unknown-effect", answer.summary
     assert not [s for s in answer.steps if s.adopted]
-    assert answer.summary.startswith("joint 2")
+    assert answer.summary.startswith("Joint 2")
 
 
+@pytest.mark.parametrize("experiment", [SLOW_REVERSALS, pytest.param(WHOLE, marks=pytest.mark.slow)])
 @pytest.mark.timeout(400)
-def test_a_sound_arm_is_called_sound(tmp_path: Path) -> None:
-    answer = diagnosed(tmp_path)
+def test_a_sound_arm_is_called_sound(tmp_path: Path, experiment: str) -> None:
+    answer = diagnosed(tmp_path, experiment=experiment)
     assert answer.verdict == "nothing-significant", answer.summary
     assert not [s for s in answer.steps if s.adopted]
     assert answer.where is not None

@@ -31,7 +31,7 @@ def test_effects_that_are_unknown_or_none_are_refused() -> None:
         check_options(DiagnosisOptions(effects=()), imagined.arm())
 
 
-def test_what_can_be_looked_for_is_allowed() -> None:
+def test_options_with_known_effects_and_joints_are_allowed() -> None:
     for options in (
         DiagnosisOptions(),
         DiagnosisOptions(joints=(3, 1)),

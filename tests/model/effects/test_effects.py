@@ -8,11 +8,12 @@ import pytest
 from daq.contracts.effects import effect_names
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
+from model import layout as at
 from model.effects.library import library
-from model.machine_model import layout as at
 from model.machine_model.model import Model, base_model
 from model.simulation.inputs import RunInputs
-from model.simulation.simulate import Options, Simulation, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import Simulation, simulate
 from tests.model.simulation.records import ramp_inputs
 
 SMOOTH = Options(quantise=False)

@@ -70,7 +70,7 @@ def test_it_acts_as_its_equation_says_and_has_exact_derivatives(air_drag: Effect
     model = axis(0.02)
     run = simulate(model, SWING, SMOOTH)
     assert np.abs(run.position - simulate(axis(0.0), SWING, SMOOTH).position).max() > 1e-3
-    found = sensitivities(model, SWING, [DRAG], SMOOTH).of(0)[0]
+    found = sensitivities(model, SWING, [model.parameter(DRAG)], SMOOTH).of(0)[0]
     step = 1e-6
     above, below = (simulate(axis(0.02 + s), SWING, SMOOTH).position for s in (step, -step))
     np.testing.assert_allclose(found, (above - below) / (2 * step), atol=1e-6 * np.abs(found).max())

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace, TraceRecord
 from model.machine_model.model import Model, base_model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 
 PERIOD = 0.02
 STARTS = ((3.1, 0.7, 0.0), (2.6, 1.7, -1.0), (3.6, 2.2, -0.6), (3.0, 1.2, 0.8))

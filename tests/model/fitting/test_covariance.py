@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from model.fitting.covariance import inverse, sandwich
-
-Floats = NDArray[np.float64]
 
 
 def estimates(bandwidth: int, repeats: int = 300) -> tuple[float, float]:

@@ -7,17 +7,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import least_squares, lsq_linear
 
 from daq.contracts.progress import Never
+from model.arrays import Floats
 from model.fitting.least_squares import Search, solve
 from model.fitting.problem import Evaluation
 from model.fitting.unknowns import Unknown
 from model.fitting.whitening import white
 from model.machine_model.parameter import Kind, Parameter
-
-Floats = NDArray[np.float64]
 
 
 @dataclass

@@ -15,7 +15,8 @@ from model.fitting.options import FitOptions
 from model.inverse_dynamics.recorded_motion import low_pass, recorded_motion
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import base_model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from tests.model.inverse_dynamics.test_fit_torques import rod, swinging
 from tests.model.simulation.records import trace_of
 

@@ -74,10 +74,13 @@ def test_the_line_that_an_effect_has_to_reach_is_drawn(figure: Figure) -> None:
 @pytest.mark.parametrize(
     ("low", "high", "told"),
     [
-        (0.027, 0.055, [0.03, 0.04, 0.05]), (0.028, 0.0315, [0.028, 0.029, 0.03, 0.031]), (0.4, 30.0, [1, 3, 10, 30]),
-        (0.007, 7.0, [0.01, 0.1, 1.0]), (1e-9, 1e9, [1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9][:5]),
+        (0.027, 0.055, [0.03, 0.04, 0.05]),
+        (0.028, 0.0315, [0.028, 0.029, 0.03, 0.031]),
+        (0.4, 30.0, [1, 3, 10, 30]),
+        (0.007, 7.0, [0.01, 0.1, 1.0]),
+        (1e-9, 1e9, [1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9][:5]),
     ],
-)  # fmt: skip
+)
 def test_a_logarithmic_axis_has_few_round_ticks(low: float, high: float, told: list[float]) -> None:
     ticks = log_ticks(low, high)
     assert 2 <= len(ticks) <= 5

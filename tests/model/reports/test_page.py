@@ -15,23 +15,22 @@ from model.reports.comparison_report import comparison_report
 from model.reports.page import Report, Section, Table, Text, cells, html, write_report
 
 
+def _agreement(name: str, held: bool, rmse: float) -> TraceAgreement:
+    sizes = {"rmse": rmse, "largest": 3 * rmse, "floor": 0.001, "count": 0.002, "share": 0.01}
+    joints = tuple(JointAgreement(joint=j, unit="rad", **sizes) for j in (1, 2))
+    return TraceAgreement(trace=name, held_out=held, samples=100, joints=joints)
+
+
 def a_comparison() -> Comparison:
     """One model on two traces of two joints, the second held out."""
     time = np.arange(0.0, 2.0, 0.02)
     measured = np.stack([np.sin(time), np.cos(time)], axis=1)
     joints = (1, 2)
     traces = tuple(
-        TraceAgreement(
-            trace=name, held_out=held, samples=100,
-            joints=tuple(JointAgreement(joint=j, unit="rad", rmse=rmse, largest=3 * rmse, floor=0.001, count=0.002,
-                                        share=0.01) for j in joints),
-        )
-        for name, held, rmse in (("first", False, 0.003), ("second", True, 0.004))
-    )  # fmt: skip
-    model = ModelAgreement(
-        label="<arm> & model", model="abc", effects=("coulomb_friction",), traces=traces,
-        in_sample=pooled(traces[:1]), held_out=pooled(traces[1:]),
-    )  # fmt: skip
+        _agreement(name, held, rmse) for name, held, rmse in (("first", False, 0.003), ("second", True, 0.004))
+    )
+    pool = {"in_sample": pooled(traces[:1]), "held_out": pooled(traces[1:])}
+    model = ModelAgreement(label="<arm> & model", model="abc", effects=("coulomb_friction",), traces=traces, **pool)
     signals = tuple(
         TraceSignals(t.trace, t.held_out, joints, ("rad", "rad"), time, measured, (measured + 0.01,), None)
         for t in traces

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from daq.contracts.machine import Machine, load_machine
-from daq_cli.commands.compare import _tell
+from daq_cli.commands.compare import _print_result
 from daq_cli.commands.validate import _print_in_time
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.comparison.compare import Comparison
@@ -76,7 +76,7 @@ def test_a_comparison_is_in_the_squares_of_its_joints_units(
     capsys: pytest.CaptureFixture[str], units: tuple[str, ...], said: str
 ) -> None:
     model = agreement(*units)
-    _tell([model], (), as_json=False)
+    _print_result([model], (), as_json=False)
     assert f"in sample {said}\n" in capsys.readouterr().out
     report = comparison_report(Comparison((model,), ()))
     assert f"mean squared error {said} summed" in report.answer
@@ -89,22 +89,51 @@ def test_a_validation_of_a_sliding_joint_is_in_metres(
     axis: Machine, labels: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     mass = ParameterDistortion(
-        name="link1.mass", unit="kg", value=1.0, change_down=None, change_up=None, required=None, expected=0.1,
-        basis="stated", contribution=0.0,
-    )  # fmt: skip
+        name="link1.mass",
+        unit="kg",
+        value=1.0,
+        change_down=None,
+        change_up=None,
+        required=None,
+        expected=0.1,
+        basis="stated",
+        contribution=0.0,
+    )
     fidelity = Fidelity(
-        model="abc", traces=("first",), outputs=(1,), convention="source", damping_ratio=0.5, error=0.02,
-        error_by_joint=(0.02,), parameters=(mass,), sum_of_contributions=0.0,
-    )  # fmt: skip
+        model="abc",
+        traces=("first",),
+        outputs=(1,),
+        convention="source",
+        damping_ratio=0.5,
+        error=0.02,
+        error_by_joint=(0.02,),
+        parameters=(mass,),
+        sum_of_contributions=0.0,
+    )
     residual = JointResidual(joint=1, values=(0.1, 0.2), noise=0.01, rms=0.15, against=())
     variation = Variation(
-        name="link1.mass", unit="kg", value=1.0, values=(0.0, 0.1), noise=(0.1, 0.1), deviation=0.1, expected=0.1,
-        mean=0.0, significant=0.0, alone_constant=0.0, alone_varying=0.0, against=(),
-    )  # fmt: skip
+        name="link1.mass",
+        unit="kg",
+        value=1.0,
+        values=(0.0, 0.1),
+        noise=(0.1, 0.1),
+        deviation=0.1,
+        expected=0.1,
+        mean=0.0,
+        significant=0.0,
+        alone_constant=0.0,
+        alone_varying=0.0,
+        against=(),
+    )
     in_time = TimeDomain(
-        model="abc", trace="first", convention="source", smoothing=0.02, time=(0.0, 1.0), joints=(residual,),
+        model="abc",
+        trace="first",
+        convention="source",
+        smoothing=0.02,
+        time=(0.0, 1.0),
+        joints=(residual,),
         parameters=(variation,),
-    )  # fmt: skip
+    )
     report = validation_report("axis", (fidelity, fidelity), [in_time], axis)
     assert dict(report.facts)["squared error"].startswith("0.02 m² (")
     assert "measured − expected / m/s²" in labels

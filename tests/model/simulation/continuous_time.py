@@ -12,12 +12,11 @@ from math import cos, exp, sin
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.machine import Cylinder, Sensor
+from model.arrays import Floats
 from model.machine_model.model import Model, base_model
 
-Floats = NDArray[np.float64]
 STEP = 1e-5
 """s."""
 GRAVITY = 9.81

@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.machine import load_machine
+from model.arrays import Floats
 from model.effects.library import library
 from model.machine_model.model import Model, base_model
 from model.simulation.inputs import RunInputs, inputs_of
-from model.simulation.simulate import Options, prepare, simulate
+from model.simulation.prepared import Options, prepare
+from model.simulation.simulate import simulate
 from tests.model.simulation import continuous_time
 from tests.model.simulation.records import PERIOD, START, trace_of
 
-Floats = NDArray[np.float64]
 COUNT = 1.5 * np.pi / 4096
 """rad."""
 

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from daq.contracts.machine import load_machine
+from model import layout as at
 from model.drives.controller import GAINS, MEMORY, SCALE, D, I, P, board_pid
 from model.drives.sensor import reading
-from model.machine_model import layout as at
 from model.machine_model.model import base_model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from tests.model.simulation.records import ramp_inputs
 
 

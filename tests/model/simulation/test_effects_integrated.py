@@ -6,7 +6,7 @@ import pytest
 
 from model.discrepancy.output_error.observation import STEP as STEP_OF_DIAGNOSES
 from model.effects.library import library
-from model.simulation.simulate import LONGEST_STEP as STEP_OF_FITS
+from model.simulation.prepared import LONGEST_STEP as STEP_OF_FITS
 from tests.model.simulation.effect_cases import CASES, Bench, Case
 
 LARGEST_ERROR, LARGEST_SHARE = 0.02, 0.05

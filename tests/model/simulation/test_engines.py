@@ -7,7 +7,8 @@ import pytest
 
 from daq.contracts.machine import load_machine
 from model.machine_model.model import Model, base_model
-from model.simulation.simulate import Options, parameter_vectors, simulate, simulate_many
+from model.simulation.prepared import Options
+from model.simulation.simulate import parameter_vectors, simulate, simulate_many
 from tests.model.simulation.records import ramp_inputs
 
 COUNT = 2 * np.pi * 0.75 / 4096

@@ -10,7 +10,8 @@ import pytest
 from daq.contracts.machine import load_machine
 from model.machine_model.model import base_model
 from model.simulation.inputs import inputs_of, readings_on_grid
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from tests.model.fitting import imagined
 from tests.model.simulation.records import ramp_inputs
 

@@ -9,7 +9,7 @@ import pytest
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
-from model.machine_model import layout as at
+from model import layout as at
 from model.machine_model.model import Lineage, Model, base_model
 from model.machine_model.model_file import load_model, save_model
 

@@ -10,12 +10,13 @@ from scipy.special import ellipk
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import load_machine
+from model import layout as at
 from model.dynamics import recursive
-from model.machine_model import layout as at
 from model.machine_model.model import base_model
 from model.simulation.bodies import chain_body
 from model.simulation.inputs import inputs_of
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from tests.model.simulation.machines import pendulum, slide
 from tests.model.simulation.records import ramp_trace, trace_of
 

@@ -7,7 +7,9 @@ import pytest
 
 from daq.contracts.machine import load_machine
 from model.machine_model.model import base_model
-from model.simulation.simulate import Options, sensitivities, simulate
+from model.machine_model.parameter import initial_position
+from model.simulation.prepared import Options
+from model.simulation.simulate import sensitivities, simulate
 from tests.model.simulation.records import ramp_inputs
 
 SMOOTH = Options(quantise=False, step=2.5e-4)
@@ -26,7 +28,7 @@ CASES = {
 def test_dual_numbers_give_the_slope_of_finite_differences(name: str) -> None:
     model = base_model(load_machine("ma2000"))
     inputs = ramp_inputs(model.machine)
-    exact = sensitivities(model, inputs, [name], SMOOTH).reading[0]
+    exact = sensitivities(model, inputs, [model.parameter(name)], SMOOTH).reading[0]
     value, width = model.parameter(name).value, CASES[name]
     ends = [simulate(model.with_values({name: value + w}), inputs, SMOOTH).reading for w in (-width, width)]
     difference = (ends[1] - ends[0]) / (2 * width)
@@ -36,10 +38,10 @@ def test_dual_numbers_give_the_slope_of_finite_differences(name: str) -> None:
 
 def test_effects_at_their_null_value_have_derivatives_too() -> None:
     model = base_model(load_machine("ma2000")).with_effect("spring_torque", (2,)).with_effect("input_delay", (3,))
-    names = ["joint2.spring_torque.stiffness", "joint3.input_delay.time", "initial.joint1.position"]
+    spring, delay = model.parameter("joint2.spring_torque.stiffness"), model.parameter("joint3.input_delay.time")
     inputs = ramp_inputs(model.machine)
-    found = sensitivities(model, inputs, names, SMOOTH)
-    stiffer = simulate(model.with_values({names[0]: 0.05}), inputs, SMOOTH).reading
+    found = sensitivities(model, inputs, [spring, delay, initial_position(1)], SMOOTH)
+    stiffer = simulate(model.with_values({spring.name: 0.05}), inputs, SMOOTH).reading
     slope = (stiffer - found.simulation.reading) / 0.05
     assert np.abs(found.reading[0] - slope).max() < 0.02 * np.abs(slope).max()
     assert np.abs(found.reading[1][:, 2]).max() > 10 * np.abs(found.reading[1][:, 0]).max()

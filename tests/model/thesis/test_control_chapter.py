@@ -30,7 +30,7 @@ def test_the_tabled_back_emf_of_the_basic_model_is_too_much_for_the_plant(chapte
     assert chapter.case("case 1: basic, back-EMF as tabled").amplitude_ratio[0] > 1.5
 
 
-def test_in_the_last_case_both_readings_are_one(chapter: ControlChapter) -> None:
+def test_in_the_last_case_both_readings_of_the_law_give_the_same(chapter: ControlChapter) -> None:
     one, other = (chapter.case(f"case 3: complete, back-EMF {w}") for w in ("as tabled", "of the plant"))
     assert one.position == other.position
 
@@ -53,7 +53,7 @@ def test_pid_lags_on_every_joint(chapter: ControlChapter) -> None:
     assert "lag" in next(c.ours for c in chapter.checks if c.name == "PID follows with a lag")
 
 
-def test_what_does_not_come_out_is_said(chapter: ControlChapter) -> None:
+def test_statements_that_do_not_come_out_are_among_the_findings(chapter: ControlChapter) -> None:
     failed = {c.name for c in chapter.checks if not c.holds}
     assert failed == {"with the tabled back-EMF constants cases 1 and 2 are damped", "PID from 90°: joint 3 overshoots"}
 

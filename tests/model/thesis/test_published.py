@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from daq.contracts.machine import load_machine
-from model.machine_model import layout as at
+from model import layout as at
 from model.simulation.bodies import rod_arm_body
 from model.thesis.figures import influence_tables
 from model.thesis.published_fidelity import basis_of_symbol, recomputed_fidelities

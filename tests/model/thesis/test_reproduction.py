@@ -37,7 +37,7 @@ def test_the_waist_s_link_is_insensitive_throughout(ladder: Ladder) -> None:
             assert step.fidelity.parameter(name).contribution < 0.01 * step.fidelity.sum_of_contributions
 
 
-def test_only_what_is_known_not_to_come_out_does_not(result: Reproduction) -> None:
+def test_only_the_known_statements_do_not_come_out(result: Reproduction) -> None:
     assert {c.name for c in result.failed} == {
         "table 5.1, joint 1",
         "table 5.2, joint 1",
@@ -53,7 +53,7 @@ def test_text_shows_ours_beside_the_published(result: Reproduction) -> None:
     assert Reproduction.model_validate_json(result.model_dump_json()) == result
 
 
-def test_nothing_to_reproduce_from_is_an_error() -> None:
+def test_a_reproduction_without_traces_or_methods_is_refused() -> None:
     with pytest.raises(SpecError, match="at least one trace"):
         reproduce_thesis([])
 
@@ -64,6 +64,6 @@ def test_elements_of_the_inertia_matrix_are_those_of_the_equation_that_figure_7_
     assert (min(coupling), max(coupling)) == pytest.approx((0.109, 0.114), abs=6e-4)
 
 
-def test_it_says_that_one_ramp_does_not_tell_the_parameters(result: Reproduction, ladder: Ladder) -> None:
+def test_the_findings_say_that_one_ramp_does_not_determine_the_parameters(result: Reproduction, ladder: Ladder) -> None:
     (said,) = (f for f in result.findings if "one ramp does not tell the 13 parameters" in f)
     assert f"MLOAD {ladder.steps[-1].values['MLOAD']:.3g} for 1.25" in said

@@ -30,46 +30,74 @@ def candidate(effect: str, *joints: int, evidence: float = 10.0) -> Candidate:
 
 
 def step(
-    effect: str | None, *joints: int, ranked: Sequence[str] = (), group: Sequence[str] = (), adopted: bool = True,
-    holdout: tuple[float, float] | None = None, parameters: dict[str, FoundValue] | None = None,
+    effect: str | None,
+    *joints: int,
+    ranked: Sequence[str] = (),
+    group: Sequence[str] = (),
+    adopted: bool = True,
+    holdout: tuple[float, float] | None = None,
+    parameters: dict[str, FoundValue] | None = None,
     seen_at: int | None = 1,
-) -> Step:  # fmt: skip
+) -> Step:
     """A step with its ranking; `holdout`: held-out error before and after, in floors."""
     errors = ()
     if holdout is not None:
         errors = (SignalError(joint=1, unit="rad", before=holdout[0] * 1e-3, after=holdout[1] * 1e-3, floor=1e-3),)
     return Step(
-        effect=effect, joints=joints, parameters=parameters or {}, evidence=100.0, margin=50.0,
+        effect=effect,
+        joints=joints,
+        parameters=parameters or {},
+        evidence=100.0,
+        margin=50.0,
         candidates=tuple(candidate(name, *joints) for name in ranked),
-        group=tuple(candidate(name, *joints) for name in group), rmse_fit=(), rmse_holdout=errors,
-        where=Where(joint=seen_at, phase=None, summary="", cells=(), dependences=()), reason="", adopted=adopted,
-    )  # fmt: skip
+        group=tuple(candidate(name, *joints) for name in group),
+        rmse_fit=(),
+        rmse_holdout=errors,
+        where=Where(joint=seen_at, phase=None, summary="", cells=(), dependences=()),
+        reason="",
+        adopted=adopted,
+    )
 
 
 def answer(verdict: Verdict, *steps: Step, seconds: float = 5.0) -> Diagnosis:
     return Diagnosis(
-        verdict=verdict, summary="", steps=steps, model_before=MODEL, model_after=MODEL, traces=("a",),
-        seconds=seconds, robot_seconds=56.0,
-    )  # fmt: skip
+        verdict=verdict,
+        summary="",
+        steps=steps,
+        model_before=MODEL,
+        model_after=MODEL,
+        traces=("a",),
+        seconds=seconds,
+        robot_seconds=56.0,
+    )
 
 
 def remaining(joint: int, explained: float) -> RemainingShape:
     """A torque that is left at a joint and goes with its speed."""
     return RemainingShape(
-        joint=joint, against="speed", unit="rad/s", torque_unit="N·m", centres=(-1.0, 1.0), torque=(-2.0, 2.0),
-        deviation=(0.1, 0.1), explained=explained,
-    )  # fmt: skip
+        joint=joint,
+        against="speed",
+        unit="rad/s",
+        torque_unit="N·m",
+        centres=(-1.0, 1.0),
+        torque=(-2.0, 2.0),
+        deviation=(0.1, 0.1),
+        explained=explained,
+    )
 
 
 def truth(kind: Kind, *hidden: Hidden, parameters: dict[str, float] | None = None, known: bool = True) -> Truth:
     names = [f"{name}_{j}" for name in ("viscous_friction", "coulomb_arm") for j in (1, 2, 3)]
     effects = tuple(
         HiddenEffect(
-            effect=name, known_as=name if known else "unknown_effect", joints=joints,
-            parameters=tuple({"joint": j, **(parameters or {})} for j in joints) or (parameters or {},), strength=0.5,
+            effect=name,
+            known_as=name if known else "unknown_effect",
+            joints=joints,
+            parameters=tuple({"joint": j, **(parameters or {})} for j in joints) or (parameters or {},),
+            strength=0.5,
         )
         for name, joints in hidden
-    )  # fmt: skip
+    )
     return Truth(
         seed=120, kind=kind, load="nominal", load_kg=None, effects=effects, deviations=dict.fromkeys(names, 0.1)
     )

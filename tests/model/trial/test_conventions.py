@@ -16,7 +16,8 @@ from mock_controller.hidden.experiment import Experiment
 from mock_controller.modifications import build_modifications
 from mock_controller.plant import default_plant
 from model.machine_model.model import Model, base_model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from model.trial.conventions import LEFT_OUT, TRANSLATIONS, true_parameters
 from model.trial.truth import HiddenEffect, Truth
 from tests.model.simulation.records import trace_of
@@ -56,8 +57,10 @@ SHAPES = {
 }
 """Parameters that no interval is counted for, needed to simulate; phases are zero here."""
 DECIDES = {
-    "stribeck_friction": "torque", "torque_ripple": "cycles", "spring_torque": "stiffness",
-}  # fmt: skip
+    "stribeck_friction": "torque",
+    "torque_ripple": "cycles",
+    "spring_torque": "stiffness",
+}
 """The parameter that is varied, where there are several."""
 
 
@@ -66,10 +69,20 @@ def experiment() -> Experiment:
     """9 s of fast and slow moves, no settling: both arms begin at rest at the first set points."""
     rows = [np.array((500.0, 333.0, 500.0))] * 20
     for move, periods in (
-        ((80, 80, -80), 33), ((0, 0, 0), 20), ((-80, -80, 80), 33), ((0, 0, 0), 20), ((12, 10, 14), 60),
-        ((-12, -10, -14), 60), ((0, 0, 0), 10), ((60, 60, 60), 12), ((0, 0, 0), 30), ((-90, -60, -90), 25),
-        ((0, 0, 0), 20), ((30, 120, 30), 60), ((0, 0, 0), 40),
-    ):  # fmt: skip
+        ((80, 80, -80), 33),
+        ((0, 0, 0), 20),
+        ((-80, -80, 80), 33),
+        ((0, 0, 0), 20),
+        ((12, 10, 14), 60),
+        ((-12, -10, -14), 60),
+        ((0, 0, 0), 10),
+        ((60, 60, 60), 12),
+        ((0, 0, 0), 30),
+        ((-90, -60, -90), 25),
+        ((0, 0, 0), 20),
+        ((30, 120, 30), 60),
+        ((0, 0, 0), 40),
+    ):
         last = rows[-1]
         rows += [last + np.array(move) * k / periods for k in range(1, periods + 1)]
     return Experiment(tuple((*(round(v) for v in row), 500, 500, 500) for row in rows), settle=0)

@@ -40,7 +40,7 @@ def test_seeds_are_the_mock_s() -> None:
             assert ours == compose_seed(77, kinds.get(kind) or Kind[kind.upper()], Load[load.upper()])
 
 
-def test_numbers() -> None:
+def test_arms_are_named_by_a_range_or_a_list_of_numbers() -> None:
     assert parse_numbers("3:6") == [3, 4, 5, 6]
     assert parse_numbers("1,5") == [1, 5]
     for wrong in ("", "a", "5:3", "-1", "1:2:3"):
@@ -50,7 +50,7 @@ def test_numbers() -> None:
         parse_choice("clean,all", KINDS, "kind")
 
 
-def test_loads_go_in_turn() -> None:
+def test_arms_carry_the_loads_in_turn() -> None:
     assert arms([1, 3, 4], ["single"]) == [120, 321, 422]
     assert arms([1], ["single", "clean"], ["heavy"]) == [122, 112]
 
@@ -76,7 +76,7 @@ def test_seeds_drawn_from_a_commit_are_new_with_each_commit_and_far_from_those_f
     assert {draw_arm(seed).load for seed in first} == set(Load)
 
 
-def test_more_of_a_kind_keeps_those_drawn_before() -> None:
+def test_a_larger_registration_keeps_the_arms_of_a_smaller_one() -> None:
     assert drawn_arms("c0ffee", {"pair": 5})[:3] == drawn_arms("c0ffee", {"pair": 3})
 
 

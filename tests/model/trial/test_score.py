@@ -24,7 +24,7 @@ def test_a_right_name_at_the_right_joint() -> None:
     assert result.detectable
 
 
-def test_below_the_limit_it_is_not_detectable() -> None:
+def test_an_effect_below_the_limit_of_d_prime_is_not_detectable() -> None:
     assert not judged(BACKLASH, answer("nothing-significant"), d_prime=4.99).detectable
 
 
@@ -93,7 +93,7 @@ def test_the_same_effect_at_several_joints_takes_one_place_of_the_ranking() -> N
     assert judged(BACKLASH, answer("named", step("dead_zone", 2, ranked=ranked))).in_first
 
 
-def test_a_wrong_joint() -> None:
+def test_the_right_effect_at_a_wrong_joint_is_named_right_but_not_placed_right() -> None:
     result = judged(BACKLASH, answer("named", step("backlash", 3)))
     assert result.named_right
     assert result.joint_right is False
@@ -153,7 +153,7 @@ def test_outside_the_library_a_name_is_dishonest_and_nothing_is_no_answer() -> N
     assert judged(strange, answer("nothing-significant")).honest is False
 
 
-def test_pairs() -> None:
+def test_of_a_pair_both_names_or_at_least_one_can_be_right() -> None:
     pair = truth("pair", ("dead_zone", (1,)), ("wrong_gain", (2,)), parameters={"width": 0.5, "factor": 1.2})
     both = judged(pair, answer("named", step("wrong_gain", 2), step("dead_zone", 1)))
     one = judged(pair, answer("named", step("wrong_gain", 2), step("payload")))

@@ -30,12 +30,12 @@ def test_three_hundred_clean_cases_without_an_alarm_bound_it_at_one_and_a_quarte
     assert (found.low, found.high) == (0.0, pytest.approx(0.01222, abs=1e-4))
 
 
-def test_what_was_no_question_does_not_count() -> None:
+def test_a_case_without_the_question_does_not_count_in_its_rate() -> None:
     assert rate([None, True, None]).cases == 1
     assert str(rate([None])) == "no cases"
 
 
-def test_quantiles_leave_out_what_is_not_there() -> None:
+def test_quantiles_ignore_missing_values() -> None:
     found = quantiles([None, *map(float, range(101))])
     assert (found.cases, found.tenth, found.median, found.ninety_fifth, found.largest) == (101, 10, 50, 95, 100)
 
@@ -89,7 +89,7 @@ def test_the_page_shows_every_rate_with_its_interval(table: TrialTable) -> None:
             assert line.count("|") in (4, 7, 8)
 
 
-def test_nothing_scored_yet_is_said() -> None:
+def test_a_table_without_cases_says_that_none_was_scored() -> None:
     assert as_markdown(trial_table([])) == "No case has been scored yet.\n"
 
 

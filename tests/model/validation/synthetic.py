@@ -10,7 +10,8 @@ import numpy as np
 from daq.contracts.machine import load_machine
 from daq.contracts.trace import Trace, TraceRecord
 from model.machine_model.model import Model, base_model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 
 PERIOD = 0.02
 START = (np.pi, np.pi / 4, 0.0)
@@ -57,17 +58,29 @@ def _run(plant: Model, set_points: np.ndarray, seed: int, held: bool) -> Trace:
     set_points = np.concatenate([np.repeat(set_points[:1], before, axis=0), set_points])
     count = len(set_points)
     record = TraceRecord(
-        trace_id=f"synthetic-{seed}", created=datetime(2026, 1, 1, tzinfo=UTC), software="test", source="imported",
+        trace_id=f"synthetic-{seed}",
+        created=datetime(2026, 1, 1, tzinfo=UTC),
+        software="test",
+        source="imported",
         period=PERIOD,
-    )  # fmt: skip
+    )
     trace = Trace(
-        record=record, joints=(1, 2, 3), time=PERIOD * np.arange(count), position=np.tile(START, (count, 1)),
-        set_point=set_points, drive=np.zeros((count, 3)), tick=np.arange(count),
-    )  # fmt: skip
+        record=record,
+        joints=(1, 2, 3),
+        time=PERIOD * np.arange(count),
+        position=np.tile(START, (count, 1)),
+        set_point=set_points,
+        drive=np.zeros((count, 3)),
+        tick=np.arange(count),
+    )
     noise = 0.3 * np.random.default_rng(seed).standard_normal((count, 3))
     run = simulate(plant, trace, Options(noise=noise))
     kept = slice(before, None)
     return replace(
-        trace, time=trace.time[kept], tick=np.arange(count)[kept], set_point=set_points[kept],
-        position=run.reading[kept], drive=run.drive[kept],
-    )  # fmt: skip
+        trace,
+        time=trace.time[kept],
+        tick=np.arange(count)[kept],
+        set_point=set_points[kept],
+        position=run.reading[kept],
+        drive=run.drive[kept],
+    )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
-from model.machine_model import layout as at
+from model import layout as at
 from model.validation import differentiation as d
 from model.validation.acceleration_model import averaged_volts
 from tests.model.validation.synthetic import arm
@@ -27,7 +27,7 @@ def test_second_differences_are_triangular_averages_of_the_acceleration() -> Non
     assert found == pytest.approx(averaged(lambda t: -(rate**2) * np.sin(rate * t), TIME[50]), rel=1e-6)
 
 
-def test_speeds_are_the_same_averages() -> None:
+def test_speeds_are_triangular_averages_too() -> None:
     rate = 20.0
     found = d.speeds(np.sin(rate * TIME)[:, None], PERIOD)[50, 0]
     assert found == pytest.approx(averaged(lambda t: rate * np.cos(rate * t), TIME[50]), rel=2e-3)
@@ -41,7 +41,7 @@ def test_smoothing_keeps_a_constant_and_a_slope() -> None:
 
 
 @pytest.mark.parametrize("width", [0.5, 2.0])
-def test_noise_comes_through_as_predicted(width: float) -> None:
+def test_noise_of_speeds_and_accelerations_is_as_predicted(width: float) -> None:
     noise = np.random.default_rng(3).standard_normal((20000, 1))
     gain = d.noise_gain(width, PERIOD)
     smooth = d.smoothed(noise, width)
@@ -71,7 +71,7 @@ def test_volts_are_averaged_over_the_time_they_act(delay: float) -> None:
     assert averaged_volts(drive, PERIOD, vector)[20, 1] == pytest.approx(expected, abs=5e-3)
 
 
-def test_their_derivative_by_the_delay_is_exact() -> None:
+def test_the_derivative_of_averaged_volts_by_the_delay_is_exact() -> None:
     drive = np.random.default_rng(1).uniform(-10, 10, (40, 3))
     vector = arm().vector.astype(np.complex128)
     vector[at.DELAY] += 1e-20j

@@ -48,7 +48,7 @@ def test_a_run_that_diverges_counts_as_doubled() -> None:
     assert doubling_changes(errors, BEST, LOW, HIGH, FIRST)[1][0].up == pytest.approx(0.7, rel=2 * TOLERANCE)
 
 
-def test_a_step_is_found_by_halving() -> None:
+def test_an_error_with_a_step_is_doubled_at_the_step() -> None:
     def errors(points: np.ndarray) -> np.ndarray:
         return np.where(points[:, 0] > 3.0, 1e9, 1.0)
 

@@ -8,7 +8,8 @@ import pytest
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from model.validation.fidelity import validate_by_distortion
 from tests.model.validation.synthetic import arm, ramp_trace
 
@@ -58,7 +59,7 @@ def test_a_wrong_model_explains_less_and_says_that_it_is_no_minimum(model: Model
     assert any(K_B2 in note and "not at its minimum" in note for note in result.notes)
 
 
-def test_a_single_output_counts_alone(model: Model, trace: Trace) -> None:
+def test_with_one_output_joint_only_its_error_counts(model: Model, trace: Trace) -> None:
     result = validate_by_distortion(model, [trace], (K_B2, "joint1.motor.back_emf_constant"), outputs=(1,))
     everything = validate_by_distortion(model, [trace], (K_B2,))
     assert result.error == pytest.approx(everything.error_by_joint[0])
@@ -79,7 +80,7 @@ def test_a_wider_damping_changes_every_contribution_alike(model: Model, trace: T
     assert half.sum_of_contributions / one.sum_of_contributions == pytest.approx((8 / 3) / 1.5)
 
 
-def test_wrong_input_is_named(model: Model, trace: Trace) -> None:
+def test_missing_traces_parameters_and_unknown_names_are_refused(model: Model, trace: Trace) -> None:
     with pytest.raises(SpecError, match="no trace"):
         validate_by_distortion(model, [], NAMES)
     with pytest.raises(SpecError, match="no parameters"):

@@ -57,26 +57,26 @@ def test_too_little_damping_shows_as_that_parameter_and_as_a_constant(model: Mod
     assert strongest.value < -0.9
 
 
-def test_friction_that_is_missing_goes_with_direction(model: Model) -> None:
+def test_missing_coulomb_friction_correlates_with_direction(model: Model) -> None:
     plant = model.with_effect("coulomb_friction", (1,), {"torque": 2.0})
     result = vary_in_time(model, swinging_trace(plant), NAMES)
     assert result.joints[0].against[0].regressor == "direction"
     assert result.joints[0].against[0].value < -0.9
 
 
-def test_a_spring_that_is_missing_goes_with_position(model: Model) -> None:
+def test_a_missing_spring_correlates_with_position(model: Model) -> None:
     plant = model.with_effect("spring_torque", (1,), {"stiffness": 8.0, "rest": np.pi})
     result = vary_in_time(model, swinging_trace(plant), NAMES)
     assert result.joints[0].against[0].regressor == "position"
 
 
-def test_rest_says_nothing(model: Model) -> None:
+def test_a_joint_at_rest_has_no_variation(model: Model) -> None:
     result = vary_in_time(model, ramp_trace(model, 3.0), NAMES)
     assert result.parameter(VISCOUS_2).values[-20] is None
     assert any(v is not None for v in result.parameter(VISCOUS_2).values)
 
 
-def test_what_does_not_act_is_said_so(model: Model) -> None:
+def test_a_parameter_that_does_not_act_on_accelerations_is_noted(model: Model) -> None:
     offset = model.with_effect("potentiometer_offset", (1,))
     name = next(p.name for p in offset.parameters if p.effect == "potentiometer_offset")
     result = vary_in_time(offset, swinging_trace(model, 2.0), (name, VISCOUS_2))

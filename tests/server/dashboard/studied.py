@@ -54,9 +54,13 @@ def _studied(service: Service) -> Studied:
 def diagnosis_request(traces: tuple[str, str]) -> dict[str, Any]:
     """A small one: two candidates on one joint, one step."""
     return {
-        "kind": "diagnose", "traces": [traces[0]], "held_out": [traces[1]], "joints": [2], "most_steps": 1,
+        "kind": "diagnose",
+        "traces": [traces[0]],
+        "held_out": [traces[1]],
+        "joints": [2],
+        "most_steps": 1,
         "effects": list(CANDIDATES),
-    }  # fmt: skip
+    }
 
 
 def done(service: Service, request: dict[str, Any]) -> dict[str, Any]:

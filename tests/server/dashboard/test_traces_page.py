@@ -46,9 +46,7 @@ def _taken_in(service: Service, folder: Path, name: str, amplitude: float) -> st
         outcome="complete",
     )
     error = set_point - position
-    trace = Trace(
-        record, JOINTS, time, position, set_point, error, 20 * error, tick=np.arange(len(time)),
-    )  # fmt: skip
+    trace = Trace(record, JOINTS, time, position, set_point, error, 20 * error, tick=np.arange(len(time)))
     path = write_trace(trace, folder / f"{name}.mcap")
     sent = service.robot.post(
         "/traces", content=path.read_bytes(), headers={"Content-Type": "application/octet-stream"}

@@ -74,3 +74,11 @@ export function dayAndTime(moment: string): string {
 export function dayAndSecond(moment: string): string {
   return DAY_AND_SECOND.format(new Date(moment));
 }
+
+/** A one-line message of the service with a capital letter and a full stop; nothing remains nothing. */
+export function sentence(text: string): string {
+  const whole = text.trim();
+  if (whole === '') return '';
+  const first = whole.charAt(0).toUpperCase() + whole.slice(1);
+  return /[.!?]$/.test(first) ? first : `${first}.`;
+}

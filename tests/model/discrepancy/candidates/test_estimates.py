@@ -7,11 +7,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from model.discrepancy.candidates.estimates import found_values, moved_by_noise, standard_deviations
-from model.discrepancy.output_error.noise_model import noise_model
-from model.discrepancy.output_error.observation import Observation, observed
-from model.discrepancy.output_error.refitting import Judged, judge
-from model.discrepancy.output_error.search import point_at, settled
+from model.discrepancy.candidates.estimates import found_values, shift_by_noise, standard_deviations
+from model.discrepancy.output_error.candidate_fit import Fit, judge
+from model.discrepancy.output_error.noise_model import fit_noise_model
+from model.discrepancy.output_error.observation import observe
+from model.discrepancy.output_error.search import converge, point_at
 from model.fitting.fit import INTERVAL
 from model.fitting.unknowns import Unknown
 from model.machine_model.parameter import Parameter
@@ -34,44 +34,44 @@ def test_slow_noise_is_as_uncertain_as_repeated_records_show() -> None:
     for seed in range(300):
         noise = slow_noise(seed, 2000)
         estimates.append((tangent @ noise / (tangent @ tangent.T))[0, 0])
-        noise_of_it = noise_model([[noise]])
+        noise_of_it = fit_noise_model([[noise]])
         deviations.append(float(standard_deviations(np.zeros(1), noise_of_it.whiteners, [[tangent]])[0]))
     assert np.std(estimates) == pytest.approx(np.median(deviations), rel=0.12)
     white = 1 / np.sqrt((tangent @ tangent.T)[0, 0])
     assert np.median(deviations) > 3 * white
 
 
-def test_where_the_record_says_nothing_the_prior_stays() -> None:
-    whiteners = noise_model([[slow_noise(1, 500)]]).whiteners
+def test_an_estimate_without_information_keeps_the_deviation_of_its_prior() -> None:
+    whiteners = fit_noise_model([[slow_noise(1, 500)]]).whiteners
     assert standard_deviations(np.array([4.0]), whiteners, [[np.zeros((1, 500))]])[0] == pytest.approx(0.5)
 
 
 def test_parameters_of_very_different_units_are_known_as_well_as_alone() -> None:
     rng = np.random.default_rng(2)
     tangents = rng.normal(size=(2, 500)) * np.array([[1e8], [1e-3]])
-    whiteners = noise_model([[rng.normal(size=500)]]).whiteners
+    whiteners = fit_noise_model([[rng.normal(size=500)]]).whiteners
     alone = [standard_deviations(np.zeros(1), whiteners, [[tangents[[k]]]])[0] for k in range(2)]
     assert standard_deviations(np.zeros(2), whiteners, [[tangents]]) == pytest.approx(alone, rel=0.02)
 
 
-def dead_zone_fitted(noise: float) -> tuple[Observation, Judged, Parameter]:
+def dead_zone_fitted(noise: float) -> tuple[Fit, Parameter]:
     """A dead zone, fitted on a record of so much noise, and the parameter that is its width."""
     arm = imagined.arm().with_effect("dead_zone", (1,), {"width": WIDTH})
     begun = imagined.arm().with_effect("dead_zone", (1,), {"width": 0.7 * WIDTH})
-    observation, model, unknowns = observed(begun, [imagined.trace(arm, seconds=20.0, noise=noise)])
+    observation, model, unknowns = observe(begun, [imagined.trace(arm, seconds=20.0, noise=noise)])
     parameter = model.by_name["joint1.dead_zone.width"]
     width = Unknown(parameter, 0.7 * WIDTH, 0.0, 10.0, 0.0, None)
     free = (*(u for u in unknowns if u.name != parameter.name), width)
     given = point_at(observation, model, free, np.array([u.start for u in free]))
-    return observation, judge(observation, settled(observation, given, 4)), parameter
+    return judge(converge(given, 4)), parameter
 
 
-def test_an_interval_knows_how_far_noise_has_moved_an_estimate() -> None:
+def test_an_interval_includes_how_far_noise_has_shifted_the_estimate() -> None:
     """A dead zone of little more than a count, under noise of one and a half."""
-    observation, found, parameter = dead_zone_fitted(noise=1.5)
-    moved = moved_by_noise(observation, found.point, [parameter])
-    narrow = found_values(observation, found, [parameter])[parameter.name]
-    wide = found_values(observation, found, [parameter], moved)[parameter.name]
+    found, parameter = dead_zone_fitted(noise=1.5)
+    moved = shift_by_noise(found.point, [parameter])
+    narrow = found_values(found, [parameter])[parameter.name]
+    wide = found_values(found, [parameter], moved)[parameter.name]
     assert narrow.low is not None
     assert wide.low is not None
     assert wide.high is not None
@@ -82,10 +82,10 @@ def test_an_interval_knows_how_far_noise_has_moved_an_estimate() -> None:
     assert wide.low <= WIDTH <= wide.high
 
 
-def test_derivatives_by_a_tones_frequency_are_taken_over_little_of_a_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_derivatives_by_a_tones_rate_do_not_depend_on_their_step(monkeypatch: pytest.MonkeyPatch) -> None:
     ripple = {"sine": 0.6, "cosine": 0.3, "cycles": 30.0}
     arm = imagined.arm().with_effect("torque_ripple", (3,), ripple)
-    observation, model, unknowns = observed(arm, [imagined.trace(arm, seconds=20.0)])
+    observation, model, unknowns = observe(arm, [imagined.trace(arm, seconds=20.0)])
     cycles = model.by_name["joint3.torque_ripple.cycles"]
     free = (*unknowns, Unknown(cycles, 30.0, 1.0, 100.0, 30.0, 18.0))
     values = np.array([u.start for u in free])

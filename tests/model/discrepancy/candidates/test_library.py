@@ -5,16 +5,16 @@ from __future__ import annotations
 import pytest
 
 from daq.contracts.errors import SpecError
-from model.discrepancy.candidates.library import STICTION_SPEED, TONES, candidates, tone
+from model import layout as at
+from model.discrepancy.candidates.library import STICTION_SPEED, TONES, hypotheses, tone
 from model.effects.library import add_own, library, remove_own
-from model.machine_model import layout as at
 from tests.model.discrepancy.own_effects import own_effect
 from tests.model.fitting import imagined
 
 
 def test_every_effect_is_tried_on_every_joint() -> None:
     arm = imagined.arm()
-    found = {(c.name, c.joints) for c in candidates(arm)}
+    found = {(c.name, c.joints) for c in hypotheses(arm)}
     for name, effect in library().items():
         if name in TONES:
             assert all(tone(arm, name, j, {"sine": 0.1, "cosine": 0.0}) is not None for j in (1, 2, 3))
@@ -25,23 +25,23 @@ def test_every_effect_is_tried_on_every_joint() -> None:
 
 
 def test_trials_stay_within_bounds() -> None:
-    for candidate in candidates(imagined.arm()):
-        assert candidate.trials, candidate.name
-        for trial in candidate.trials:
+    for hypothesis in hypotheses(imagined.arm()):
+        assert hypothesis.trials, hypothesis.name
+        for trial in hypothesis.trials:
             for name, value in trial.items():
-                p = candidate.model.parameter(name)
+                p = hypothesis.model.parameter(name)
                 assert p.low <= value <= p.high, name
 
 
-def test_what_the_model_has_is_tried_by_lifting_its_prior() -> None:
+def test_an_effect_of_the_model_is_tried_by_lifting_its_prior() -> None:
     arm = imagined.arm()
-    own = next(c for c in candidates(arm, ["viscous_friction"]) if c.joints == (2,))
+    own = next(c for c in hypotheses(arm, ["viscous_friction"]) if c.joints == (2,))
     assert own.model is arm
     assert [p.name for p in own.free] == ["joint2.viscous_friction.coefficient"]
 
 
 def test_stiction_and_stribeck_friction_are_told_apart_by_speed() -> None:
-    found = {c.name: c.bounds for c in candidates(imagined.arm(), ["stribeck_friction", "stiction"]) if c.bounds}
+    found = {c.name: c.bounds for c in hypotheses(imagined.arm(), ["stribeck_friction", "stiction"]) if c.bounds}
     slow = found["stiction"]["joint3.stribeck_friction.speed"]
     fast = found["stribeck_friction"]["joint3.stribeck_friction.speed"]
     assert slow[1] == fast[0] == STICTION_SPEED
@@ -49,12 +49,12 @@ def test_stiction_and_stribeck_friction_are_told_apart_by_speed() -> None:
 
 def test_an_unknown_effect_is_refused() -> None:
     with pytest.raises(SpecError, match="not in the library"):
-        candidates(imagined.arm(), ["gremlins"])
+        hypotheses(imagined.arm(), ["gremlins"])
 
 
 def test_a_joint_that_is_not_modelled_is_refused() -> None:
     with pytest.raises(SpecError, match="on joint 5: modelled are joints"):
-        candidates(imagined.arm(), ["coulomb_friction", "dead_zone"], [5])
+        hypotheses(imagined.arm(), ["coulomb_friction", "dead_zone"], [5])
 
 
 def test_effects_of_the_users_own_are_tried_where_they_can_be() -> None:
@@ -63,10 +63,10 @@ def test_effects_of_the_users_own_are_tried_where_they_can_be() -> None:
     add_own(own_effect("grease", joints=(2,)))
     add_own(large)
     try:
-        assert {c.joints for c in candidates(imagined.arm(), ["grease"])} == {(2,)}
-        assert {c.joints for c in candidates(imagined.arm(), ["large"])} == {(1,), (2,), (3,)}
+        assert {c.joints for c in hypotheses(imagined.arm(), ["grease"])} == {(2,)}
+        assert {c.joints for c in hypotheses(imagined.arm(), ["large"])} == {(1,), (2,), (3,)}
         full = imagined.arm().with_effect("grease", (2,))
-        assert candidates(full, ["large"]) == ()
+        assert hypotheses(full, ["large"]) == ()
     finally:
         remove_own("grease")
         remove_own("large")

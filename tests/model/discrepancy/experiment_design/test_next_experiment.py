@@ -16,20 +16,22 @@ from daq.safety.planned import planned
 from daq.trajectories.offered import offered_experiments
 from daq_cli.trial.experiments import trial_experiment
 from model.discrepancy.candidates.decision import decide
-from model.discrepancy.candidates.library import Candidate
-from model.discrepancy.candidates.probing import Probed
-from model.discrepancy.candidates.ranking import Ranking, ranked
+from model.discrepancy.candidates.library import Hypothesis
+from model.discrepancy.candidates.probing import Probe
+from model.discrepancy.candidates.ranking import Ranking, rank
 from model.discrepancy.experiment_design.next_experiment import (
+    Asker,
     best_experiment,
+    converge_rivals,
     most_information,
     rivals_of,
-    settled,
 )
+from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.output_error import search
-from model.discrepancy.output_error.observation import observed
-from model.discrepancy.output_error.refitting import Refitted, judge
-from model.discrepancy.output_error.search import Point, point_at, searched, with_new_tangents
+from model.discrepancy.output_error.candidate_fit import CandidateFit, judge
+from model.discrepancy.output_error.case import build_case
+from model.discrepancy.output_error.observation import observe
+from model.discrepancy.output_error.search import Point, converge, descend, point_at
 from model.discrepancy.thresholds import THRESHOLDS
 from model.machine_model.model import Model
 from tests.model.fitting import imagined
@@ -55,16 +57,16 @@ def record(arm: Model, spec: ExperimentSpec, seed: int) -> Trace:
 
 def known(trace: Trace) -> Point:
     """The model without an effect, fitted."""
-    observation, model, unknowns = observed(imagined.arm(), [trace])
+    observation, model, unknowns = observe(imagined.arm(), [trace])
     given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
-    return search.settled(observation, given, 6)
+    return converge(given, 6)
 
 
-def turn(trace: Trace, effects: tuple[str, ...]) -> Ranking:
+def ranking(trace: Trace, effects: tuple[str, ...]) -> Ranking:
     """These effects on joint 2, fitted and ranked."""
-    observation, *_ = observed(imagined.arm(), [trace])
-    options = DiagnosisOptions(effects=effects, joints=(2,))
-    return ranked(observation, judge(observation, known(trace)), options, (), THRESHOLDS, silent, Never())
+    point = known(trace)
+    case = build_case(point, [trace], options=DiagnosisOptions(effects=effects, joints=(2,)))
+    return rank(case, judge(point), silent, Never())
 
 
 @pytest.fixture(scope="module")
@@ -74,105 +76,103 @@ def ramp_step() -> Trace:
 
 
 @pytest.fixture(scope="module")
-def friction(ramp_step: Trace) -> tuple[Refitted, ...]:
-    observation, *_ = observed(imagined.arm(), [ramp_step])
-    return tuple(settled(observation, turn(ramp_step, FRICTION).fitted))
+def friction(ramp_step: Trace) -> tuple[CandidateFit, ...]:
+    return tuple(converge_rivals(ranking(ramp_step, FRICTION).fitted))
 
 
-def test_a_record_of_what_is_asked_for_separates_as_predicted(ramp_step: Trace, friction: tuple[Refitted, ...]) -> None:
+def test_a_record_of_what_is_asked_for_separates_as_predicted(
+    ramp_step: Trace, friction: tuple[CandidateFit, ...]
+) -> None:
     offered = [EXPERIMENTS["diagnostic-b"], EXPERIMENTS["diagnostic-d"]]
-    asked = best_experiment(friction, offered, plan, budget=60.0)
+    asked = best_experiment(friction, Asker(tuple(offered), plan, budget=60.0))
     assert asked.experiment is not None
     found = asked.experiment
-    assert set(found.separates) == {"coulomb friction on joint 2", "stribeck friction on joint 2"}
-    assert found.reason.startswith(next(e.description for e in offered if e.name == found.name))
+    assert set(found.separates) == {"Coulomb friction on joint 2", "Stribeck friction on joint 2"}
+    assert found.description == next(e.description for e in offered if e.name == found.name)
+    assert set(found.hardest) == set(found.separates)
+    assert found.differs_at is not None
     squares = []
     for true, wrong in (friction, friction[::-1]):
-        records = [record(with_values(true.judged.point), found.spec, seed) for seed in (8, 9)]
+        records = [record(true.fit.point.fitted_model, found.spec, seed) for seed in (8, 9)]
         squares.append(np.mean([misfit(wrong, ramp_step, r) - misfit(true, ramp_step, r) for r in records]))
     measured = np.sqrt(min(squares))
     assert found.predicted_separation / 1.5 < measured < 1.5 * found.predicted_separation
 
 
-def misfit(rival: Refitted, before: Trace, new: Trace) -> float:
+def misfit(rival: CandidateFit, before: Trace, new: Trace) -> float:
     """What a new record adds to the cost of a rival that is fitted to it too."""
-    return again(rival.judged.point, [before, new]).cost - rival.judged.point.cost
-
-
-def with_values(point: Point) -> Model:
-    """The model of a point."""
-    named = {
-        u.name: float(v) for u, v in zip(point.unknowns, point.values, strict=True) if u.name in point.model.by_name
-    }
-    return point.model.with_values(named)
+    return again(rival.fit.point, [before, new]).cost - rival.fit.point.cost
 
 
 def again(point: Point, traces: list[Trace]) -> Point:
     """A rival fitted anew to more traces, from where it was."""
-    observation, _, unknowns = observed(point.model, traces)
+    observation, _, unknowns = observe(point.model, traces)
     shared = [k for k, u in enumerate(point.unknowns) if u.trace is None]
     starts = [u for u in unknowns if u.trace is not None]
     every = (*(point.unknowns[k] for k in shared), *starts)
     values = np.concatenate([point.values[shared], [u.start for u in starts]])
     begun = point_at(observation, point.model, every, values)
-    return search.settled(observation, begun, 6)
+    return converge(begun, 6)
 
 
-def speed_law(trace: Trace, point: Point, effect: str) -> Refitted:
+def speed_law(trace: Trace, point: Point, effect: str) -> CandidateFit:
     """The point with one law of speed freed from its prior, fitted."""
-    observation, *_ = observed(imagined.arm(), [trace])
     unknowns = tuple(replace(u, deviation=None) if u.name == SPEED_LAWS[effect] else u for u in point.unknowns)
-    found = searched(observation, replace(point, unknowns=unknowns), 6)
-    candidate = Candidate(effect, (2,), point.model, (), (), True, {})
-    probe = Probed(candidate, 50.0, {}, np.zeros(len(unknowns)), np.zeros_like(found.weighted))
-    return Refitted(probe, judge(observation, with_new_tangents(observation, found)), 50.0)
+    found = descend(replace(point, unknowns=unknowns), 6)
+    hypothesis = Hypothesis(effect, (2,), point.model, (), (), True, {})
+    probe = Probe(hypothesis, 50.0, {}, np.zeros(len(unknowns)), np.zeros_like(found.weighted))
+    return CandidateFit(probe, judge(found.with_new_tangents()), 50.0)
 
 
-def test_what_no_experiment_tells_is_said() -> None:
+def test_candidates_that_no_experiment_separates_are_named_in_a_note() -> None:
     coefficient = SPEED_LAWS["viscous_friction"]
     arm = imagined.arm()
     trace = record(arm.with_values({coefficient: 1.5 * arm.parameter(coefficient).value}), trial_experiment("ramp"), 4)
     point = known(trace)
     rivals = [speed_law(trace, point, effect) for effect in SPEED_LAWS]
-    moved = [r.judged.point.value(SPEED_LAWS[r.candidate.name]) for r in rivals]
+    moved = [r.fit.point.value(SPEED_LAWS[r.hypothesis.name]) for r in rivals]
     assert moved[0] > 1.2 * arm.parameter(coefficient).value
     assert moved[1] > 1.02 * arm.parameter(SPEED_LAWS["back_emf_error"]).value
-    asked = best_experiment(rivals, [EXPERIMENTS["diagnostic-b"]], plan)
+    asked = best_experiment(rivals, Asker((EXPERIMENTS["diagnostic-b"],), plan))
     assert asked.experiment is None
     assert asked.note is not None
-    assert "no experiment" in asked.note
-    assert "viscous friction on joint 2" in asked.note
-    assert "back emf error on joint 2" in asked.note
+    words = note_words(asked.note)
+    assert "no experiment" in words
+    assert "viscous friction on joint 2" in words
+    assert "back-EMF error on joint 2" in words
 
 
-def test_without_rivals_what_tells_most_is_asked_for_once(ramp_step: Trace) -> None:
+def test_without_rivals_the_most_informative_experiment_is_asked_for_once(ramp_step: Trace) -> None:
     point = known(ramp_step)
     short = Ramp(amplitude=0.1, duration=0.5)
     slight = OfferedExperiment("slight", "a small ramp", ExperimentSpec(trajectory=short, hold=0.5))
     rich = replace(EXPERIMENTS["diagnostic-d"], general=True)
-    asked = most_information(point, [slight, rich], plan, []).experiment
+    offered = Asker((slight, rich), plan)
+    asked = most_information(point, offered, []).experiment
     assert asked is not None
     assert (asked.name, asked.separates) == ("diagnostic-d", ())
-    assert most_information(point, [slight, rich], plan, [rich.spec]).experiment is None
-    within = most_information(point, [slight, rich], plan, [], budget=5.0).experiment
+    assert asked.information is not None
+    assert asked.information > 0
+    assert most_information(point, offered, [rich.spec]).experiment is None
+    within = most_information(point, replace(offered, budget=5.0), []).experiment
     assert within is not None
     assert within.name == "slight"
     assert within.duration <= 5.0
 
 
-def test_what_the_limits_forbid_is_not_asked_for(friction: tuple[Refitted, ...]) -> None:
+def test_an_experiment_that_the_limits_forbid_is_not_asked_for(friction: tuple[CandidateFit, ...]) -> None:
     def refused(spec: ExperimentSpec) -> NDArray[np.float64]:
         raise SpecError(f"{spec.name}: joint 2 would leave its range")
 
-    asked = best_experiment(friction, [EXPERIMENTS["diagnostic-b"]], refused)
+    asked = best_experiment(friction, Asker((EXPERIMENTS["diagnostic-b"],), refused))
     assert asked.experiment is None
     assert asked.note is not None
 
 
-def test_a_name_with_a_close_second_has_rivals(friction: tuple[Refitted, ...]) -> None:
+def test_a_name_with_a_close_second_has_rivals(friction: tuple[CandidateFit, ...]) -> None:
     best, second = friction
     far = replace(second, evidence=best.evidence - 100.0)
     near = replace(second, evidence=best.evidence - 10.0)
     for other, count in ((far, 0), (near, 2)):
-        ranking = Ranking((best, other), ())
-        assert len(rivals_of(ranking, decide(ranking, THRESHOLDS))) == count
+        ranked = Ranking((best, other), ())
+        assert len(rivals_of(ranked, decide(ranked, THRESHOLDS))) == count

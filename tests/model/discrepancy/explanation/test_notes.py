@@ -1,27 +1,32 @@
-"""What an answer says besides."""
+"""Notes on an answer: their data, and how they read."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import get_args
 
-from model.discrepancy.explanation.notes import (
-    ERRORS_FOLLOW,
-    NOTHING_HELD_OUT,
-    is_warning,
-    on_tolerances,
-    on_unfinished,
-    on_what_is_stated,
-)
+from model.discrepancy.explanation.note_words import WORDS as NOTE_WORDS
+from model.discrepancy.explanation.note_words import note_words
+from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
+from model.discrepancy.explanation.pattern_words import WORDS as PATTERN_WORDS
+from model.discrepancy.grounds import Note, NoteKind, PatternKind
 from model.fitting.unknowns import Unknown
 from tests.model.fitting import imagined
 
 
-def test_a_record_that_did_not_come_to_its_end_is_named() -> None:
+def test_every_kind_of_note_and_pattern_has_its_words() -> None:
+    assert set(NOTE_WORDS) == set(get_args(NoteKind))
+    assert set(PATTERN_WORDS) == set(get_args(PatternKind))
+
+
+def test_a_record_that_ended_early_is_named() -> None:
     whole = imagined.trace(imagined.arm())
     broken = replace(whole, record=whole.record.model_copy(update={"trace_id": "broken", "outcome": "fault"}))
-    (said,) = on_unfinished([whole, broken])
-    assert said.startswith("trace broken was not recorded to its end (fault)")
-    assert f"{whole.time[-1] - whole.time[0]:.1f} s" in said
+    (note,) = on_unfinished([whole, broken])
+    seconds = whole.time[-1] - whole.time[0]
+    assert note.values == {"trace": "broken", "outcome": "fault", "seconds": seconds}
+    assert note_words(note).startswith("trace broken was not recorded to its end (fault)")
+    assert f"{seconds:.1f} s" in note_words(note)
 
 
 def test_numbers_far_from_what_is_stated_are_one_warning_the_furthest_first() -> None:
@@ -30,18 +35,28 @@ def test_numbers_far_from_what_is_stated_are_one_warning_the_furthest_first() ->
     length = Unknown(arm.parameter("link2.length"), start=0.23, low=0.0, expected=0.23, deviation=0.01)
     free = Unknown(arm.parameter("joint1.coulomb_friction.torque"), start=0.0)
     values = {"link1.mass": 0.0, "link2.length": 0.02, "joint1.coulomb_friction.torque": 900.0}
-    (said,) = on_what_is_stated([mass, length, free], values)
-    assert said.startswith(
+    (note,) = on_stated_numbers([mass, length, free], values)
+    assert note.warning
+    assert [number["name"] for number in note.values["numbers"]] == ["link2.length", "link1.mass"]
+    assert note_words(note).startswith(
         "these numbers came out more than 4 of their stated deviations from what is expected: "
-        "link2.length 0.02 m (21 deviations; 0.23 stated), link1.mass 0 kg (6 deviations; 5.5 stated); file and records"
+        "link2.length 0.02 m (21 deviations; 0.23 stated), link1.mass 0 kg (6 deviations; 5.5 stated). File and records"
     )
-    assert is_warning(said)
-    (said,) = on_what_is_stated([mass], values)
-    assert said.startswith("this number came out more than 4 of its stated deviations")
-    assert on_what_is_stated([mass], {"link1.mass": 2.0}) == ()
+    (note,) = on_stated_numbers([mass], values)
+    assert note_words(note).startswith("this number came out more than 4 of its stated deviations")
+    assert on_stated_numbers([mass], {"link1.mass": 2.0}) == ()
 
 
-def test_other_notes_are_no_warnings() -> None:
-    assert on_tolerances(1).count("1 trace,") == 1
-    assert "2 traces," in on_tolerances(2)
-    assert not any(map(is_warning, (NOTHING_HELD_OUT, ERRORS_FOLLOW, on_tolerances(1))))
+def test_traces_are_counted() -> None:
+    one, two = (note_words(Note(kind="tolerances-fitted-first", values={"traces": n})) for n in (1, 2))
+    assert "1 trace," in one
+    assert "2 traces," in two
+
+
+def test_a_note_reads_the_same_after_json() -> None:
+    pairs = Note(kind="not-separable", values={"pairs": [["a", "b", 1.24]], "least": 3.0, "budget": 60.0})
+    again = Note.model_validate_json(pairs.model_dump_json())
+    assert again == pairs
+    assert note_words(again) == (
+        "no experiment within the limits and 60 s separates these by 3 standard deviations: a and b (1.2 at most)"
+    )

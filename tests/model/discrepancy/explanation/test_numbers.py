@@ -1,4 +1,4 @@
-"""Numbers of a reason: units, verbs by their signs, digits that count, and no exponent."""
+"""Numbers of a sentence: units, verbs by their signs, digits that count, and no exponent."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from model.discrepancy.diagnosis import FoundValue
-from model.discrepancy.explanation.numbers import Spoken, from_to, plain
-from model.discrepancy.explanation.observations import lags_after_turns, lags_alike, swings_with_position
+from model.discrepancy.diagnosis import UNWRITTEN, FoundValue, Step, Where
+from model.discrepancy.explanation.pattern_words import pattern_words
+from model.discrepancy.explanation.patterns import lags_after_turns, lags_alike, swings_with_position
+from model.discrepancy.explanation.renderer import step_with_sentences
 from model.discrepancy.explanation.samples import Samples
-from model.discrepancy.inverse_dynamics import reasons as torque_reasons
+from model.discrepancy.grounds import Reason
+from model.discrepancy.numbers import ReadingUnits, from_to, plain
 
-TURNS = Spoken(math.degrees(1.0), "°", "°", "V", "N·m", least=math.radians(0.0062))
-SLIDES = Spoken(1e3, "mm", "mm", "V", "N", turns=False)
-SPEED_SENSOR = Spoken(math.degrees(1.0), "°/s", "°", "V", "N·m")
+TURNS = ReadingUnits(math.degrees(1.0), "°", "°", "V", "N·m", least=math.radians(0.0062))
+SLIDES = ReadingUnits(1e3, "mm", "mm", "V", "N", turns=False)
+SPEED_SENSOR = ReadingUnits(math.degrees(1.0), "°/s", "°", "V", "N·m")
 
 
 @pytest.mark.parametrize(
@@ -58,10 +60,22 @@ def samples(lag: np.ndarray, speed: np.ndarray) -> Samples:
     since = np.array([0.01 * (k - max(t for t in turns if t <= k)) for k in range(len(lag))])
     since[: turns[1] if len(turns) > 1 else None] += 1e4  # long ago
     return Samples(
-        without=-direction * lag, left=zero, time=0.01 * np.arange(len(lag)), asked=np.cumsum(0.01 * speed),
-        speed=speed, acceleration=zero, direction=direction, since_turn=since, moving=np.ones(len(lag), dtype=bool),
-        gravity=zero, drive=zero, error=zero, expected_drive=zero, expected_error=zero, rate=100.0,
-    )  # fmt: skip
+        without=-direction * lag,
+        left=zero,
+        time=0.01 * np.arange(len(lag)),
+        asked=np.cumsum(0.01 * speed),
+        speed=speed,
+        acceleration=zero,
+        direction=direction,
+        since_turn=since,
+        moving=np.ones(len(lag), dtype=bool),
+        gravity=zero,
+        drive=zero,
+        error=zero,
+        expected_drive=zero,
+        expected_error=zero,
+        rate=100.0,
+    )
 
 
 @pytest.mark.parametrize(
@@ -75,25 +89,43 @@ def samples(lag: np.ndarray, speed: np.ndarray) -> Samples:
 )
 def test_what_a_joint_always_does_is_said_only_where_it_does(slow: float, fast: float, said: str) -> None:
     record = samples(np.radians(np.repeat([slow, fast], 100)), np.repeat([0.02, 0.5], 100))
-    seen = lags_alike(record, TURNS, {})
+    seen = lags_alike(record, {})
     assert seen is not None
-    assert seen.text == said
+    assert pattern_words(seen, TURNS) == said
 
 
 def test_a_lead_before_a_turn_is_no_negative_lag() -> None:
     record = samples(np.radians(np.repeat([-0.037, 0.067], 100)), np.repeat([0.5, -0.5], 100))
-    seen = lags_after_turns(record, TURNS, {})
+    seen = lags_after_turns(record, {})
     assert seen is not None
-    assert seen.text.startswith("lags by 0.067° ")
-    assert seen.text.endswith(" s after its reversal and leads by 0.037° before")
+    words = pattern_words(seen, TURNS)
+    assert words.startswith("lags by 0.067° ")
+    assert words.endswith(" s after its reversal and leads by 0.037° before")
 
 
 def test_cycles_are_counted_a_turn_or_a_metre() -> None:
     record = samples(np.sin(np.arange(200.0)), np.full(200, 0.5))
-    said = [swings_with_position(record, say, {"cycles": 200.0}) for say in (TURNS, SLIDES)]
-    texts = [s.text for s in said if s is not None]
-    assert "200 times a turn" in texts[0]
-    assert "31.8 times a metre" in texts[1]
+    seen = swings_with_position(record, {"cycles": 200.0})
+    assert seen is not None
+    assert "200 times a turn" in pattern_words(seen, TURNS)
+    assert "31.8 times a metre" in pattern_words(seen, SLIDES)
+
+
+def torque_reason(effect: str, values: dict[str, FoundValue], removed: float, *, slides: bool) -> str:
+    step = Step(
+        effect=effect,
+        joints=(1,),
+        parameters=values,
+        evidence=50.0,
+        margin=50.0,
+        candidates=(),
+        rmse_fit=(),
+        where=Where(joint=None, phase=None, summary=UNWRITTEN, cells=(), dependences=()),
+        reason=UNWRITTEN,
+        reason_data=Reason(removed=removed, slides=slides),
+        adopted=True,
+    )
+    return step_with_sentences(step).reason
 
 
 def test_a_reason_in_torques_says_what_cycles_are_counted_in() -> None:
@@ -101,18 +133,9 @@ def test_a_reason_in_torques_says_what_cycles_are_counted_in() -> None:
         "joint1.torque_ripple.sine": FoundValue(value=-5.12, low=None, high=None, unit="N"),
         "joint1.torque_ripple.cycles": FoundValue(value=200.0, low=None, high=None, unit="1"),
     }
-    turning = torque_reasons.reason("torque_ripple", (1,), values, 0.99)
+    turning = torque_reason("torque_ripple", values, 0.99, slides=False)
+    assert turning.startswith("Joint 1: the torque goes up and down with the angle, ")
     assert "at a fixed number of cycles a turn (sine −5.12 N, cycles 200 a turn); it takes 99% off" in turning
-    sliding = torque_reasons.reason("torque_ripple", (1,), values, 0.99, slides=True)
+    sliding = torque_reason("torque_ripple", values, 0.99, slides=True)
+    assert sliding.startswith("Joint 1: the force goes up and down with the position, ")
     assert "at a fixed number of cycles a metre (sine −5.12 N, cycles 200 rad/m, 31.8 a metre); it takes" in sliding
-
-
-def test_a_reason_in_torques_takes_the_numbers_of_the_last_fit() -> None:
-    turn, last = (
-        {"joint1.coulomb_friction.torque": FoundValue(value=value, low=None, high=None, unit="N")}
-        for value in (8.4, 8.012)
-    )
-    told = torque_reasons.reason("coulomb_friction", (1,), turn, 0.75, slides=True)
-    assert "at any speed (torque 8.4 N); it" in told
-    retold = torque_reasons.with_sizes(told, (1,), turn, last, slides=True)
-    assert retold == torque_reasons.reason("coulomb_friction", (1,), last, 0.75, slides=True)

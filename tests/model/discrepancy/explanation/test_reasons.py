@@ -8,10 +8,25 @@ import numpy as np
 import pytest
 
 from daq.contracts.effects import effect_names
-from model.discrepancy.diagnosis import AgainstWhat, Candidate, FoundValue, RemainingShape, SignalError, Step, Where
-from model.discrepancy.explanation.numbers import plain
-from model.discrepancy.explanation.reasons import nothing, reason, undecided, unexplained, with_size
-from model.discrepancy.explanation.table import TELLING
+from model.discrepancy.diagnosis import (
+    UNWRITTEN,
+    AgainstWhat,
+    Candidate,
+    Diagnosis,
+    FoundValue,
+    PhaseCell,
+    RemainingShape,
+    SignalError,
+    Step,
+    Where,
+)
+from model.discrepancy.explanation.effect_words import WORDS
+from model.discrepancy.explanation.patterns import PATTERNS
+from model.discrepancy.explanation.reasons import reason
+from model.discrepancy.explanation.renderer import reason_text, step_with_sentences, what_is_left, with_sentences
+from model.discrepancy.grounds import ControllerProof, Reason, Refusal
+from model.discrepancy.numbers import plain
+from model.discrepancy.verdict import worse_held_out
 from model.effects.library import effect
 from model.fitting.records import records_of, resolution
 from model.machine_model.model import Model
@@ -64,8 +79,36 @@ SAYS = {
 """What must be in the sentence, where an effect has one sign of its own."""
 
 NOWHERE = Where(
-    joint=None, phase=None, summary="joint 2, after reversals: 2.1 ADC counts rms", cells=(), dependences=()
+    joint=None, phase=None, summary="Joint 2, after reversals: 2.1 ADC counts rms.", cells=(), dependences=()
 )
+JOINT_2 = NOWHERE.model_copy(update={"joint": 2})
+
+
+def step_with(
+    effect: str,
+    joints: tuple[int, ...],
+    parameters: dict[str, FoundValue],
+    speaks: Reason | None = None,
+    *,
+    evidence: float = 900.0,
+    margin: float = 300.0,
+    where: Where = JOINT_2,
+    adopted: bool = True,
+) -> Step:
+    """A step as the workflow leaves it, before its sentences are made."""
+    return Step(
+        effect=effect,
+        joints=joints,
+        parameters=parameters,
+        evidence=evidence,
+        margin=margin,
+        candidates=(),
+        rmse_fit=(),
+        where=where,
+        reason=UNWRITTEN,
+        reason_data=speaks,
+        adopted=adopted,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -87,9 +130,9 @@ def put_in(arm: Model, name: str, joint: int) -> tuple[Model, tuple[int, ...], d
 
 
 def test_every_effect_of_the_shared_list_has_its_entry() -> None:
-    assert set(TELLING) == set(effect_names())
+    assert set(WORDS) == set(PATTERNS) == set(effect_names())
     assert set(SIZES) == set(effect_names())
-    for name, entry in TELLING.items():
+    for name, entry in WORDS.items():
         assert entry.size is None or entry.size in {p.name for p in effect(name).parameters}
 
 
@@ -97,15 +140,21 @@ def test_every_effect_of_the_shared_list_has_its_entry() -> None:
 def test_a_reason_says_what_the_record_shows(arm: Model, name: str) -> None:
     strange, joints, parameters = put_in(arm, name, 2)
     records = records_of([trace_of(strange)], arm.machine, "position")
-    text = reason(name, joints, parameters, 900.0, 300.0, model=strange, before=arm, records=records)
-    told = re.fullmatch(r"joint (\d) (.*): (.*), which takes its rms error from ([\d.]+) to ([\d.]+) ADC counts", text)
-    assert told is not None, text
-    assert float(told[4]) > float(told[5]), text
-    assert TELLING[name].called in told[3]
+    found = reason(name, joints, parameters, model=strange, before=arm, records=records)
+    assert found.rms is not None
+    assert found.rms.before > found.rms.after
+    text = reason_text(step_with(name, joints, parameters, found))
+    said = re.fullmatch(
+        r"Joint (\d) (.*): (.*), which takes its rms error from [\d.]+ to [\d.]+ ADC counts\.( What shows it is .*)?",
+        text,
+    )
+    assert said is not None, text
+    assert int(said[1]) == found.joint
+    assert WORDS[name].called in said[3]
     if joints:
-        assert told[1] == "2"
+        assert found.joint == 2
     if name in SAYS:
-        assert re.search(SAYS[name], told[2]), text
+        assert re.search(SAYS[name], said[2]), text
 
 
 def test_a_reason_names_the_rival_and_the_other_joints(arm: Model) -> None:
@@ -113,75 +162,73 @@ def test_a_reason_names_the_rival_and_the_other_joints(arm: Model) -> None:
     records = records_of([trace_of(strange)], arm.machine, "position")
     found = {f"joint{j}.coulomb_friction.torque": FoundValue(value=4.0, low=3.8, high=4.2, unit="N·m") for j in (1, 2)}
     rival = Candidate(effect="stiction", joints=(1, 2), evidence=600.0)
-    text = reason(
-        "coulomb_friction", (1, 2), found, 900.0, 300.0, model=strange, before=arm, records=records,
-        runner_up=rival,
-    )  # fmt: skip
+    speaks = reason("coulomb_friction", (1, 2), found, model=strange, before=arm, records=records, rival=rival)
+    text = reason_text(step_with("coulomb_friction", (1, 2), found, speaks))
     assert "(and likewise joint " in text
     assert "Coulomb friction, 4 N·m (3.8 to 4.2)" in text
-    assert text.endswith("; the next best, stiction on joints 1 and 2, has 600 of evidence where this has 900")
+    assert text.endswith("The next best, stiction on joints 1 and 2, has an evidence of 600, and this has 900.")
 
 
-def test_a_rival_that_has_come_to_more_is_said_as_such(arm: Model) -> None:
-    """The fit that was ranked first came to less when it was taken to its end."""
+@pytest.fixture(scope="module")
+def friction(arm: Model) -> tuple[dict[str, FoundValue], Reason]:
+    """Parameters and reason of Coulomb friction on joint 2, with stiction as its rival."""
     records = records_of([trace_of(arm, 8.0)], arm.machine, "position")
     strange = arm.with_effect("coulomb_friction", (2,), {"torque": 1.0})
     found = {"joint2.coulomb_friction.torque": FoundValue(value=1.0, low=0.9, high=1.1, unit="N·m")}
     rival = Candidate(effect="stiction", joints=(2,), evidence=728.0)
-    text = reason(
-        "coulomb_friction", (2,), found, 539.0, -189.0, model=strange, before=arm, records=records, runner_up=rival
-    )
+    return found, reason("coulomb_friction", (2,), found, model=strange, before=arm, records=records, rival=rival)
+
+
+def test_a_rival_that_has_come_to_more_is_said_as_such(friction: tuple[dict[str, FoundValue], Reason]) -> None:
+    """The fit that was ranked first came to less when it was completed."""
+    text = reason_text(step_with("coulomb_friction", (2,), *friction, evidence=539.0, margin=-189.0))
     assert text.endswith(
-        "; taken to its end, its fit has 539 of evidence, less than the 728 of stiction on joint 2: these traces do "
-        "not tell which of the two it is"
+        "Its completed fit has an evidence of 539, less than the 728 of stiction on joint 2: these traces do not tell "
+        "which of the two it is."
     )
 
 
 @pytest.mark.parametrize(
     ("place", "joints", "said"), [(None, (2,), True), (1, (2,), True), (2, (2,), False), (2, (), False)]
 )
-def test_a_place_that_is_not_the_effect_s_is_spoken_of(
-    arm: Model, place: int | None, joints: tuple[int, ...], said: bool
+def test_a_place_that_is_not_the_effect_s_is_mentioned(
+    friction: tuple[dict[str, FoundValue], Reason], place: int | None, joints: tuple[int, ...], said: bool
 ) -> None:
-    records = records_of([trace_of(arm, 8.0)], arm.machine, "position")
-    name = "coulomb_friction" if joints else "payload"
-    strange = arm.with_effect(name, joints, SIZES[name])
     where = NOWHERE.model_copy(update={"joint": place})
-    text = reason(name, joints, {}, 50.0, 20.0, model=strange, before=arm, records=records, where=where)
-    assert text.endswith("; what shows it is the pattern over the whole record, not one place") == said
+    text = reason_text(step_with("coulomb_friction", joints, *friction, where=where))
+    assert text.endswith("What shows it is the pattern over the whole record, not one place.") == said
 
 
-def test_a_reason_takes_the_size_of_the_last_fit() -> None:
-    turn = {
+def test_a_reason_gives_the_size_of_the_last_fit(friction: tuple[dict[str, FoundValue], Reason]) -> None:
+    speaks = friction[1].model_copy(update={"joint": 3, "rival": None})
+    first = {
         f"joint{j}.dead_zone.width": FoundValue(value=v, low=0.724, high=0.77, unit="V")
         for j, v in ((2, 0.747), (3, 0.8))
     }
     last = {
-        f"joint{j}.dead_zone.width": FoundValue(value=v, low=0.6732, high=0.8217, unit="V")
-        for j, v in ((2, 0.7475), (3, 0.9))
+        name: v.model_copy(update={"value": v.value + 0.1, "low": 0.6732, "high": 0.8217}) for name, v in first.items()
     }
-    begin = "joint {} lags by 0.13° whenever it moves: a dead zone of the amplifier, "
-    end = ", which takes its rms error from 3.2 to 0.62 ADC counts"
-    told = begin.format(3) + "0.8 V (0.724 to 0.77)" + end
-    assert with_size(told, "dead_zone", (2, 3), turn, last) == begin.format(3) + "0.9 V (0.673 to 0.822)" + end
-    shapeless = "joint 1 swings by 0.037° at 0.123 Hz: a periodic torque from outside, which takes its rms error"
-    assert with_size(shapeless, "periodic_disturbance", (1,), turn, last) == shapeless
-    load = {"payload.mass": FoundValue(value=1.5, low=None, high=None, unit="kg")}
-    heavier = {"payload.mass": FoundValue(value=1.6, low=1.5, high=1.7, unit="kg")}
-    told = "joint 2 is off by +0.1° throughout: a load other than the model's, 1.5 kg, which takes"
-    assert "other than the model's, 1.6 kg (1.5 to 1.7), which" in with_size(told, "payload", (), load, heavier)
+    step = step_with("dead_zone", (2, 3), first, speaks)
+    assert "a dead zone of the amplifier, 0.8 V (0.724 to 0.77), which" in reason_text(step)
+    fitted = step.model_copy(update={"parameters": last})
+    assert "a dead zone of the amplifier, 0.9 V (0.673 to 0.822), which" in reason_text(fitted)
+    shapeless = step_with("periodic_disturbance", (3,), {}, speaks)
+    assert ": a periodic torque from outside, which" in reason_text(shapeless)
+    load = {"payload.mass": FoundValue(value=1.6, low=1.5, high=1.7, unit="kg")}
+    assert "a load other than the model's, 1.6 kg (1.5 to 1.7), which" in reason_text(
+        step_with("payload", (), load, speaks)
+    )
 
 
-def test_a_rival_without_evidence_and_a_faint_mark_are_said_as_such(arm: Model) -> None:
+def test_a_rival_without_evidence_and_an_error_that_hardly_falls_are_said_as_such(arm: Model) -> None:
     records = records_of([trace_of(arm, 8.0)], arm.machine, "position")
     strange = arm.with_effect("coulomb_friction", (2,), {"torque": 1e-3})
     found = {"joint2.coulomb_friction.torque": FoundValue(value=1e-3, low=0.0, high=0.01, unit="N·m")}
     rival = Candidate(effect="stiction", joints=(2,), evidence=-3.0)
-    text = reason(
-        "coulomb_friction", (2,), found, 30.0, 33.0, model=strange, before=arm, records=records, runner_up=rival
-    )
-    assert "whose mark is faint" in text
-    assert text.endswith("; no other candidate that was fitted has a twentieth of its evidence, 30")
+    speaks = reason("coulomb_friction", (2,), found, model=strange, before=arm, records=records, rival=rival)
+    text = reason_text(step_with("coulomb_friction", (2,), found, speaks, evidence=30.0, margin=33.0))
+    assert "which hardly changes its rms error" in text
+    assert text.endswith("No other fitted candidate has a twentieth of its evidence of 30.")
 
 
 def test_a_caller_that_simulates_better_is_believed(arm: Model) -> None:
@@ -192,58 +239,136 @@ def test_a_caller_that_simulates_better_is_believed(arm: Model) -> None:
     def left(model: Model) -> list[np.ndarray]:
         return [np.full_like(records[0].measured, 0.1 if model is strange else 0.2)]
 
-    text = reason("coulomb_friction", (2,), found, 30.0, 3.0, model=strange, before=arm, records=records, left=left)
+    speaks = reason("coulomb_friction", (2,), found, model=strange, before=arm, records=records, left=left)
+    text = reason_text(step_with("coulomb_friction", (2,), found, speaks))
     factor = 0.2 / resolution(arm.machine.joint(2).sensor)  # type: ignore[arg-type]
     assert f"takes its rms error from {plain(factor)} to {plain(factor / 2)} ADC counts" in text
 
 
-def test_other_answers_have_their_reasons() -> None:
-    group = [
+@pytest.mark.parametrize(
+    ("effect", "said"),
+    [
+        ("wrong_gain", "the recorded power is 1.200 times the gain times the recorded error (40 of 50 samples)"),
+        ("lost_set_points", "the recorded error is not set point − position in 40 samples, so set points were lost"),
+    ],
+)
+def test_what_the_controllers_numbers_prove_is_said_without_a_model(effect: str, said: str) -> None:
+    value = {f"joint2.{effect}.x": FoundValue(value=0.2, low=0.19, high=0.21, unit="1")}
+    where = Where(joint=2, phase=None, summary=UNWRITTEN, cells=(), dependences=())
+    step = step_with(effect, (2,), value, where=where).model_copy(update={"proof": ControllerProof(samples=40, of=50)})
+    written = step_with_sentences(step)
+    assert written.reason == f"Joint 2: {said}; this needs no model of the arm."
+    assert written.where.summary == f"Joint 2: {said}."
+
+
+def answer(arm: Model, **fields: object) -> Diagnosis:
+    """An answer with these fields, and its sentences."""
+    bare = Diagnosis(
+        verdict="unknown-effect",
+        summary=UNWRITTEN,
+        steps=(),
+        where=NOWHERE,
+        model_before=arm,
+        model_after=arm,
+        traces=(),
+        seconds=1.0,
+        robot_seconds=1.0,
+    )
+    return with_sentences(bare.model_copy(update=fields))
+
+
+def test_an_undecided_answer_lists_the_group_with_its_evidence(arm: Model) -> None:
+    group = tuple(
         Candidate(effect=e, joints=(2,), evidence=v) for e, v in (("stiction", 120.0), ("coulomb_friction", 118.0))
-    ]
-    assert "2 of evidence is all that lies between them" in undecided(group, NOWHERE)
-    assert nothing().startswith("nothing significant")
-    step = Step(
-        effect="stiction", joints=(2,), parameters={}, evidence=120.0, margin=40.0, candidates=(), rmse_fit=(),
-        where=NOWHERE, reason="it sticks", adopted=False, rejected_because="the error on the held-out traces rises",
-    )  # fmt: skip
-    assert "stiction on joint 2 explains more of the fitted ones, with 120 of evidence, but the error" in nothing(step)
+    )
+    step = step_with("stiction", (2,), {}).model_copy(update={"group": group})
+    assert answer(arm, verdict="ambiguous", steps=(step,)).summary == (
+        "Joint 2, after reversals: 2.1 ADC counts rms. These explain it, with evidences that differ by no more than 2: "
+        "stiction on joint 2 (120), Coulomb friction on joint 2 (118)."
+    )
+
+
+def test_an_answer_with_nothing_significant_says_what_was_refused(arm: Model) -> None:
+    assert answer(arm, verdict="nothing-significant").summary.startswith("Nothing significant")
+    refusal = Refusal(kind="error-rises", numbers={"rise": 15.0, "deviation": 7.0})
+    step = step_with("stiction", (2,), {}, evidence=120.0, adopted=False).model_copy(update={"refusal": refusal})
+    found = answer(arm, verdict="nothing-significant", steps=(step,))
+    assert found.steps[0].rejected_because == (
+        "the error on the held-out traces rises: its sum of squares by 15 ± 7 variances of a reading"
+    )
+    assert (
+        "stiction on joint 2 explains more of the fitted ones, with an evidence of 120, but the error" in found.summary
+    )
+
+
+def test_several_reasons_and_what_is_left_are_sentences_one_after_the_other(
+    arm: Model, friction: tuple[dict[str, FoundValue], Reason]
+) -> None:
+    step = step_with("coulomb_friction", (2,), *friction)
+    shape = remaining("speed", 0.7, -0.5, 0.1, 0.4, 1.0, 2.5)
+    found = answer(arm, verdict="named", steps=(step, step), remaining=(shape,))
+    told = reason_text(step)
+    assert found.summary == f"{told} {told} Something is left that none of the known effects explains."
+
+
+def test_an_older_answer_keeps_its_text(arm: Model) -> None:
+    step = step_with("stiction", (2,), {}).model_copy(update={"reason": "it sticks"})
+    found = answer(arm, verdict="named", steps=(step,), notes=("one note",))
+    assert (found.steps[0].reason, found.notes, found.where) == ("it sticks", ("one note",), NOWHERE)
 
 
 def remaining(against: AgainstWhat, explained: float, *torques: float | None) -> RemainingShape:
     return RemainingShape(
-        joint=3, against=against, unit="1", torque_unit="N·m", centres=tuple(map(float, range(len(torques)))),
-        torque=torques, deviation=torques, explained=explained,
-    )  # fmt: skip
-
-
-def test_what_is_left_is_told_as_a_shape_only_where_it_is_one() -> None:
-    assert unexplained(NOWHERE, [], (2, 3)).startswith("joints 2, 3: more than noise is left")
-    assert unexplained(NOWHERE, []).endswith(
-        "; what is left has no shape against time, position, speed, direction or drive"
+        joint=3,
+        against=against,
+        unit="1",
+        torque_unit="N·m",
+        centres=tuple(map(float, range(len(torques)))),
+        torque=torques,
+        deviation=torques,
+        explained=explained,
     )
+
+
+def test_what_is_left_is_called_a_shape_only_where_it_is_one() -> None:
+    assert what_is_left([]) == "what is left has no shape against time, position, speed, direction or drive"
     shape = remaining("speed", 0.7, None, -0.5, 0.1, 0.4, 1.0, 2.5)
     few, faint = remaining("time", 0.8, -0.22, 0.03), remaining("drive", 0.08, *shape.torque)
-    assert unexplained(NOWHERE, [few, shape, faint]).endswith(
-        "; a torque at joint 3 of −0.5 to 2.5 N·m that goes with speed explains 70 % of what is left"
+    assert what_is_left([few, shape, faint]) == (
+        "a torque at joint 3 of −0.5 to 2.5 N·m that goes with speed explains 70 % of what is left"
     )
-    assert unexplained(NOWHERE, [faint]).endswith(
-        "; no clear shape: the best, a torque at joint 3 of −0.5 to 2.5 N·m that goes with drive, explains only 8 % of "
+    assert what_is_left([faint]) == (
+        "no clear shape: the best, a torque at joint 3 of −0.5 to 2.5 N·m that goes with drive, explains only 8 % of "
         "what is left"
     )
-    assert unexplained(NOWHERE, [few, faint]).endswith(
+    assert what_is_left([few, faint]).endswith(
         "goes with time, explains 80 % of what is left, but rests on 2 of the 5 bins that a shape needs"
     )
 
 
-def test_a_tolerance_fit_that_held_out_traces_refute_is_warned_of() -> None:
-    def told(*after: float) -> str:
-        held = [SignalError(joint=j + 1, unit="rad", before=2e-3, after=a, floor=1e-3) for j, a in enumerate(after)]
-        return unexplained(NOWHERE, [], held=held)
-
-    warning = (
-        "; the fit of the tolerance parameters does not hold on held-out traces, where the error of joint{} grows: "
+def test_joints_on_which_more_than_noise_is_left_are_named_where_the_map_names_none(arm: Model) -> None:
+    assert answer(arm).summary.startswith("Joint 2, after reversals: 2.1 ADC counts rms. No known effect explains it; ")
+    assert answer(arm, unexplained_joints=(2, 3)).summary.startswith(
+        "Joints 2 and 3: more than noise is left. No known"
     )
-    assert told(1e-3, 4e-3).endswith(warning.format(" 2") + "the model after is not to be used")
-    assert warning.format("s 1 and 2") in told(3e-3, 4e-3)
-    assert told(2e-3, 2.1e-3) == unexplained(NOWHERE, []), "not by a tenth, nor by more than noise may do"
+    cell = PhaseCell(joint=3, start=1.2, end=1.5, phase="hold", mean_square=3.0, significance=5.25)
+    place = NOWHERE.model_copy(update={"cells": (cell,)})
+    assert (
+        "; the clearest place is joint 3 at 1.2 s, by 5.2 standard"
+        in answer(arm, unexplained_joints=(2, 3), where=place).summary
+    )
+
+
+def test_a_tolerance_fit_that_held_out_traces_refute_is_warned_of(arm: Model) -> None:
+    def worse(*after: float) -> tuple[int, ...]:
+        return worse_held_out(
+            [SignalError(joint=j + 1, unit="rad", before=2e-3, after=a, floor=1e-3) for j, a in enumerate(after)]
+        )
+
+    assert worse(1e-3, 4e-3) == (2,)
+    assert worse(3e-3, 4e-3) == (1, 2)
+    assert worse(2e-3, 2.1e-3) == (), "not by a tenth, nor by more than noise may do"
+    assert answer(arm, worse_held_out=(1, 2)).summary.endswith(
+        " The fit of the tolerance parameters does not hold on held-out traces, where the error of joints 1 and 2 "
+        "grows: do not use the model after."
+    )

@@ -155,7 +155,8 @@ def test_an_effect_that_does_not_hold_there_is_refused_and_told(monkeypatch: pyt
     found = diagnose_torques(base_model(rigs.slide_machine()), [rigs.slide_trace(1, {"coulomb": 8.0})])
     assert found.steps[0].effect == "coulomb_friction"
     assert not any(step.adopted for step in found.steps)
-    assert (found.steps[0].rejected_because or "").startswith("on records not fitted to the mean square falls by only")
+    assert found.steps[0].refusal is not None
+    assert found.steps[0].refusal.kind == "falls-too-little"
     assert found.model_after.effects == found.model_before.effects
 
 
@@ -213,4 +214,4 @@ def test_a_real_double_pendulum(lab_data: Path) -> None:
     adopted = [(s.effect, s.joints) for s in found.steps if s.adopted]
     assert adopted[0] == ("coulomb_friction", (1, 2))
     assert relative_torque_error(found.model_after, recorded_motions(runs[4:], found.model_after.machine, 12.0)) < 0.47
-    assert found.notes[0].startswith("torque left unexplained on held-out traces: 7")
+    assert found.notes[0].startswith("Torque left unexplained on held-out traces: 7")

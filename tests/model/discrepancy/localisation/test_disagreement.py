@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
-from model.discrepancy.localisation.disagreement import _beyond, located
+from model.discrepancy.explanation.renderer import where_with_summary
+from model.discrepancy.localisation.disagreement import _beyond, locate
 from model.discrepancy.localisation.phases import CREEP, HOLD, RAMP_START, REVERSAL, STEADY_RAMP, directions, phases_of
+from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.statistics import (
     Correlation,
     binned,
@@ -67,12 +69,12 @@ def test_a_direction_is_kept_through_a_rest(arm: Model, records: tuple[Record, .
     assert [moved[round(t / PERIOD)] for t in (0.2, 1.0, 1.8, 2.4, 3.2)] == [0, 1, 1, -1, -1]
 
 
-def test_noise_is_significant_as_often_as_it_should(arm: Model, records: tuple[Record, ...]) -> None:
+def test_noise_is_called_significant_with_the_stated_probability(arm: Model, records: tuple[Record, ...]) -> None:
     deviations = noise_floor(records, arm.machine, "position")
     named, peaks = 0, []
     for seed in range(30):
         residual = alike(records[0].measured.shape, seed) * deviations
-        found = located(arm, records, [residual], deviations)
+        found = locate(Residuals(arm, records, [residual], deviations))
         named += found.joint is not None
         peaks.append(max(c.significance for c in found.cells))
     assert named <= 3
@@ -84,14 +86,14 @@ def test_noise_is_significant_as_often_as_it_should(arm: Model, records: tuple[R
 def test_a_sensor_a_little_noisier_than_stated_is_no_disagreement(arm: Model, records: tuple[Record, ...]) -> None:
     deviations = noise_floor(records, arm.machine, "position")
     named = [
-        located(arm, records, [1.15 * alike(records[0].measured.shape, seed) * deviations], deviations).joint
+        locate(Residuals(arm, records, [1.15 * alike(records[0].measured.shape, seed) * deviations], deviations)).joint
         for seed in range(10)
     ]
     assert sum(joint is not None for joint in named) <= 2
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
-def test_significance_of_alike_samples_follows_a_gaussian(memory: float) -> None:
+def test_significance_of_correlated_samples_follows_a_gaussian(memory: float) -> None:
     noise = alike((400 * 15, 1), 3, memory)[:, 0]
     correlation = correlation_of([noise], 0.5)
     windows = (noise.reshape(-1, 15) ** 2).mean(axis=1)
@@ -100,15 +102,18 @@ def test_significance_of_alike_samples_follows_a_gaussian(memory: float) -> None
     assert np.mean(beyond > 3.0) < 0.006
 
 
-def test_a_lag_after_reversals_is_found_there(arm: Model, records: tuple[Record, ...]) -> None:
+def test_a_lag_after_reversals_is_located_in_the_reversals(arm: Model, records: tuple[Record, ...]) -> None:
     deviations = noise_floor(records, arm.machine, "position")
     residual = alike(records[0].measured.shape, 1) * deviations
     reversal = phases_of(arm, records[0])[:, 1] == REVERSAL
     residual[:, 1] -= np.where(reversal, 5 * deviations[1] * directions(arm, records[0])[:, 1], 0.0)
-    found = located(arm, records, [residual], deviations)
+    found = locate(Residuals(arm, records, [residual], deviations))
     assert (found.joint, found.phase) == (2, "reversal")
-    assert found.summary.startswith("joint 2, after reversals: ")
-    assert "ADC counts rms against a floor of" in found.summary
+    assert found.worst is not None
+    assert found.worst.ratio > 3.0
+    summary = where_with_summary(found).summary
+    assert summary.startswith("Joint 2, after reversals: ")
+    assert "ADC counts rms against a floor of" in summary
     worst = max(found.cells, key=lambda c: c.significance)
     assert (worst.joint, worst.phase) == (2, "reversal")
     quiet = [c for c in found.cells if c.joint != 2]
@@ -126,22 +131,22 @@ def test_a_dependence_is_the_most_significant_of_its_joint(
     shape = np.sin(3 * (quantity - quantity.mean()) / quantity.std()) if against != "direction" else quantity
     residual = alike(records[0].measured.shape, 2) * deviations
     residual[:, 2] += 3 * deviations[2] * shape
-    own = [d for d in located(arm, records, [residual], deviations).dependences if d.joint == 3]
+    own = [d for d in locate(Residuals(arm, records, [residual], deviations)).dependences if d.joint == 3]
     strongest = max(own, key=lambda d: d.significance).against
     # this record's drive is its speed, so either may be named for the other
     assert strongest == against or {strongest, against} == {"speed", "drive"}
 
 
-def test_nothing_depends_on_anything_in_noise(arm: Model, records: tuple[Record, ...]) -> None:
+def test_noise_shows_no_dependence(arm: Model, records: tuple[Record, ...]) -> None:
     deviations = noise_floor(records, arm.machine, "position")
     beyond = []
     for seed in range(15):
         residual = alike(records[0].measured.shape, seed, 0.8) * deviations
-        beyond += [d.significance for d in located(arm, records, [residual], deviations).dependences]
+        beyond += [d.significance for d in locate(Residuals(arm, records, [residual], deviations)).dependences]
     assert np.mean(np.array(beyond) > 3.0) < 0.03
 
 
-def test_means_in_bins_come_with_the_deviation_of_alike_samples() -> None:
+def test_means_in_bins_have_the_deviation_of_correlated_samples() -> None:
     quantity = np.tile(np.repeat([0.25, 0.75], 50), 10)
     means = [
         binned(alike((1000, 1), s, 0.8)[:, 0], quantity, np.array([0, 0.5, 1.0]), [slice(0, 1000)], 0.3)
@@ -154,9 +159,9 @@ def test_means_in_bins_come_with_the_deviation_of_alike_samples() -> None:
 
 def test_residuals_of_other_records_are_refused(arm: Model, records: tuple[Record, ...]) -> None:
     with pytest.raises(SpecError, match=r"one \(m, n\) array a record"):
-        located(arm, records, [np.zeros((5, 3))], np.ones(3))
+        Residuals(arm, records, [np.zeros((5, 3))], np.ones(3))
     with pytest.raises(SpecError, match="must be positive"):
-        located(arm, records, [np.zeros_like(records[0].measured)], np.zeros(3))
+        Residuals(arm, records, [np.zeros_like(records[0].measured)], np.zeros(3))
 
 
 def test_a_short_window_is_judged_by_its_own_length() -> None:

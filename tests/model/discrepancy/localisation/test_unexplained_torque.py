@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from model.discrepancy.diagnosis import AgainstWhat, RemainingShape
-from model.discrepancy.localisation.clear_shape import CLEAR_SHAPE, clear_shape
+from model.discrepancy.diagnosis import CLEAR_SHAPE, AgainstWhat, RemainingShape, clear_shape
 from model.discrepancy.localisation.phases import asked_motion
-from model.discrepancy.localisation.unexplained_torque import shapes, torque_of
+from model.discrepancy.localisation.residuals import Residuals
+from model.discrepancy.localisation.unexplained_torque import remaining_shapes, torque_of
 from model.fitting.records import Record, noise_floor, records_of
 from model.machine_model.model import Model
-from model.simulation.simulate import Options, simulate
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
 from tests.model.discrepancy.motions import trace_of
 from tests.model.fitting import imagined
 
@@ -34,23 +35,23 @@ def test_a_spring_that_the_model_lacks_comes_out_as_a_torque_against_position(ar
     sprung = arm.with_effect("spring_torque", (JOINT,), {"stiffness": STIFFNESS, "rest": -0.4})
     records = records_of([trace_of(sprung)], arm.machine, "position")
     deviations = noise_floor(records, arm.machine, "position")
-    residual = left(arm, records[0], following)
-    found = shapes(arm, records, [residual], deviations, following=following)
+    residuals = Residuals(arm, records, [left(arm, records[0], following)], deviations)
+    found = remaining_shapes(residuals, feedback_share=following)
     first = found[0]
     assert (first.joint, first.against, first.torque_unit) == (JOINT, "position", "N·m")
     assert first.explained > 0.5
     pairs = [(x, t) for x, t in zip(first.centres, first.torque, strict=True) if t is not None]
     slope = np.polyfit(*np.array(pairs).T, 1)[0]
     assert slope == pytest.approx(-STIFFNESS, rel=0.25)
-    torque = torque_of(arm, records[0], residual, deviations, following=following)[records[0].runs[0], JOINT - 1]
+    torque = torque_of(residuals, feedback_share=following)[0][records[0].runs[0], JOINT - 1]
     true = -STIFFNESS * (asked_motion(arm, records[0])[records[0].runs[0], JOINT - 1] + 0.4)
     assert np.corrcoef(torque, true)[0, 1] > 0.85
 
 
-def test_nothing_remains_of_an_arm_that_is_the_model(arm: Model) -> None:
+def test_no_torque_remains_of_an_arm_that_is_the_model(arm: Model) -> None:
     records = records_of([trace_of(arm)], arm.machine, "position")
     deviations = 1.3 * noise_floor(records, arm.machine, "position")
-    assert shapes(arm, records, [left(arm, records[0])], deviations) == ()
+    assert remaining_shapes(Residuals(arm, records, [left(arm, records[0])], deviations)) == ()
 
 
 @pytest.mark.parametrize(
@@ -74,7 +75,7 @@ def test_a_shape_is_clear_where_it_explains_enough_in_enough_bins(
     assert (clear_shape([shape]) is not None) == clear
 
 
-def test_the_clearest_shape_is_what_explains_most_whatever_the_order() -> None:
+def test_the_clear_shape_is_the_one_that_explains_most_in_any_order() -> None:
     """Torques without a controller are listed by joint."""
     shape = RemainingShape(
         joint=1, against="speed", unit="rad/s", torque_unit="N·m", centres=(0.0,) * 5, torque=(0.1,) * 5,

@@ -11,7 +11,7 @@ from daq.contracts.quantity import Quantity
 from daq.contracts.trace import Trace
 from model.discrepancy.output_error.controller_evidence import (
     check_controller,
-    judged_by_records,
+    settled_by_records,
     with_findings,
     with_used_set_points,
 )
@@ -36,7 +36,7 @@ def with_power(given: Trace, error: NDArray[np.float64], factor: float) -> Trace
     return imagined.changed(given, error=error, power_raw=power)
 
 
-def test_a_sound_controller_shows_nothing(sound: Trace) -> None:
+def test_a_sound_controller_gives_no_finding(sound: Trace) -> None:
     assert check_controller([sound], imagined.machine()) == ()
 
 
@@ -65,7 +65,7 @@ def test_lost_set_points_are_counted(sound: Trace) -> None:
     assert np.allclose(restored.set_point, used)
 
 
-def test_nothing_is_said_without_the_controllers_numbers(sound: Trace) -> None:
+def test_there_is_no_finding_without_the_controllers_numbers(sound: Trace) -> None:
     assert check_controller([imagined.changed(sound, error=None, power_raw=None)], imagined.machine()) == ()
 
 
@@ -104,50 +104,50 @@ def sampled() -> Machine:
     return imagined.machine().model_copy(update={"controller": other})
 
 
-def test_a_record_with_all_numbers_tells_of_gains_and_of_set_points(sound: Trace) -> None:
-    assert judged_by_records([sound], imagined.machine()) == BOTH
-    assert judged_by_records([sound, sound], imagined.machine()) == BOTH
-    assert judged_by_records([], imagined.machine()) == ()
+def test_a_record_with_all_numbers_settles_gains_and_set_points(sound: Trace) -> None:
+    assert settled_by_records([sound], imagined.machine()) == BOTH
+    assert settled_by_records([sound, sound], imagined.machine()) == BOTH
+    assert settled_by_records([], imagined.machine()) == ()
 
 
 @pytest.mark.parametrize("gains", [(2, 1, 0), (2, 0, 3), (2, 1, 3)])
 def test_a_gain_is_not_judged_where_more_than_p_acts(sound: Trace, gains: tuple[int, int, int]) -> None:
     other = with_gains(sound, gains)
-    assert judged_by_records([other], imagined.machine()) == ("lost_set_points",)
-    assert judged_by_records([sound, other], imagined.machine()) == ("lost_set_points",)
+    assert settled_by_records([other], imagined.machine()) == ("lost_set_points",)
+    assert settled_by_records([sound, other], imagined.machine()) == ("lost_set_points",)
     assert check_controller([other], imagined.machine()) == ()
 
 
 def test_a_gain_is_not_judged_by_a_few_samples(sound: Trace) -> None:
     short = shortened(sound, 19)
-    assert "wrong_gain" not in judged_by_records([short], imagined.machine())
-    assert "wrong_gain" in judged_by_records([sound, short], imagined.machine())
+    assert "wrong_gain" not in settled_by_records([short], imagined.machine())
+    assert "wrong_gain" in settled_by_records([sound, short], imagined.machine())
 
 
 def test_a_gain_is_judged_on_every_joint_or_not_at_all(sound: Trace) -> None:
     still = at_rest(sound, 3)
-    assert judged_by_records([still], imagined.machine()) == ("lost_set_points",)
-    assert "wrong_gain" in judged_by_records([still, sound], imagined.machine())
+    assert settled_by_records([still], imagined.machine()) == ("lost_set_points",)
+    assert "wrong_gain" in settled_by_records([still, sound], imagined.machine())
 
 
-def test_nothing_is_judged_by_records_without_the_numbers(sound: Trace) -> None:
-    assert judged_by_records([imagined.changed(sound, error=None)], imagined.machine()) == ()
+def test_records_without_the_controllers_numbers_settle_nothing(sound: Trace) -> None:
+    assert settled_by_records([imagined.changed(sound, error=None)], imagined.machine()) == ()
     no_power = imagined.changed(sound, power_raw=None)
-    assert judged_by_records([no_power], imagined.machine()) == ("lost_set_points",)
-    assert judged_by_records([sound, no_power], imagined.machine()) == ("lost_set_points",)
+    assert settled_by_records([no_power], imagined.machine()) == ("lost_set_points",)
+    assert settled_by_records([sound, no_power], imagined.machine()) == ("lost_set_points",)
 
 
 def test_another_controller_is_not_judged(sound: Trace) -> None:
-    assert judged_by_records([sound], sampled()) == ()
+    assert settled_by_records([sound], sampled()) == ()
     assert check_controller([sound], sampled()) == ()
 
 
-def test_errors_that_are_wrong_without_a_set_point_that_moved_leave_lost_ones_open(sound: Trace) -> None:
+def test_wrong_errors_while_no_set_point_moves_do_not_settle_lost_set_points(sound: Trace) -> None:
     still = at_rest(sound, 2)
     assert still.error is not None
     error = still.error.copy()
     error[:, 1] += 10 * UNIT
-    judged = judged_by_records([with_power(still, error, 1.0)], imagined.machine())
+    judged = settled_by_records([with_power(still, error, 1.0)], imagined.machine())
     assert "lost_set_points" not in judged
     assert not any(f.effect == "lost_set_points" for f in check_controller([still], imagined.machine()))
 
@@ -163,7 +163,7 @@ def test_a_gain_error_that_the_model_states_is_not_found_again(sound: Trace) -> 
     assert check_controller([record], imagined.machine(), better) == ()
 
 
-def test_what_the_model_states_of_a_gain_is_set_right(sound: Trace) -> None:
+def test_a_wrong_gain_error_in_the_model_is_corrected(sound: Trace) -> None:
     assert sound.error is not None
     stated = imagined.arm().with_effect("wrong_gain", (1, 2, 3), {"relative": 0.3})
     found = check_controller([with_power(sound, sound.error, 1.5)], imagined.machine(), stated)

@@ -1,55 +1,61 @@
-"""The first fit, of the tolerance parameters alone, also where a strong effect takes it to the brink of instability."""
+"""The first fit, of the tolerance parameters alone, also where a strong effect takes it to the verge of instability."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from model.discrepancy import workflow
-from model.discrepancy.output_error.observation import Observation, observed
+from model.discrepancy.output_error.diagnose import _fit_tolerances, _given_point
+from model.discrepancy.output_error.observation import Observation, Signals, observe
 from model.discrepancy.output_error.search import Point
+from model.discrepancy.thresholds import FEEDBACK_SHARE
 from tests.model.fitting import imagined
 
-BRINK = "the simulation does not stay finite: the loop is unstable"
+Floats = NDArray[np.float64]
+UNSTABLE = "the simulation does not stay finite: the loop is unstable"
 
 
-def begun() -> tuple[Observation, Point]:
+@dataclass(frozen=True)
+class Unstable(Observation):
+    """An observation whose simulations do not stay finite where `fails` of the feedback share and values says so."""
+
+    fails: Callable[[float, Floats], bool] = lambda _share, _values: False
+
+    def residuals(self, model: Any, unknowns: Any, values: Floats) -> Signals:
+        if self.fails(self.prepared[0].following, values):
+            raise SpecError(UNSTABLE)
+        return super().residuals(model, unknowns, values)
+
+
+def given() -> Point:
     """A record, and the model as it was given."""
-    observation, model, unknowns = observed(imagined.arm(), [imagined.trace(imagined.arm(), seconds=2.0)])
-    return observation, workflow._given(observation, model, unknowns)
+    return _given_point(*observe(imagined.arm(), [imagined.trace(imagined.arm(), seconds=2.0)]))
 
 
-def unstable(monkeypatch: pytest.MonkeyPatch, where: Any) -> None:
-    """No simulation stays finite where `where` of an observation and values says so."""
-    real = workflow.point_at
-
-    def point_at(observation: Observation, model: Any, unknowns: Any, values: Any, *more: Any) -> Point:
-        if where(observation, values):
-            raise SpecError(BRINK)
-        return real(observation, model, unknowns, values, *more)
-
-    monkeypatch.setattr(workflow, "point_at", point_at)
+def unstable(point: Point, fails: Callable[[float, Floats], bool]) -> Point:
+    """The point on a record whose simulations fail there."""
+    own = point.observation
+    return replace(point, observation=Unstable(own.machine, own.records, own.deviations, own.unit, own.prepared, fails))
 
 
-def test_it_goes_on_from_the_model_as_it_was_given_where_closed_loops_led_astray(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    observation, given = begun()
-    unstable(monkeypatch, lambda here, values: here is observation and not np.array_equal(values, given.values))
-    assert workflow._tolerances(observation, given).cost < given.cost
+def test_the_fit_starts_from_the_given_model_where_the_closed_loop_has_led_to_instability() -> None:
+    begun = given()
+    failures = iter([True])  # the first simulation with the full share, from where the closed loop has led
+    led_away = unstable(begun, lambda share, _: share == FEEDBACK_SHARE and next(failures, False))
+    assert _fit_tolerances(led_away).cost < begun.cost
 
 
-def test_it_begins_where_records_are_followed_if_the_closed_loop_is_unstable(monkeypatch: pytest.MonkeyPatch) -> None:
-    observation, given = begun()
-    unstable(monkeypatch, lambda here, _: here is not observation)
-    assert workflow._tolerances(observation, given).cost < given.cost
+def test_the_fit_starts_with_the_record_as_feedback_where_the_closed_loop_is_unstable() -> None:
+    begun = given()
+    assert _fit_tolerances(unstable(begun, lambda share, _: share != FEEDBACK_SHARE)).cost < begun.cost
 
 
-def test_a_model_that_is_unstable_everywhere_is_refused_in_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    observation, given = begun()
-    unstable(monkeypatch, lambda *_: True)
-    with pytest.raises(SpecError, match=BRINK):
-        workflow._tolerances(observation, given)
+def test_a_model_that_is_unstable_everywhere_is_refused_with_one_line() -> None:
+    with pytest.raises(SpecError, match=UNSTABLE):
+        _fit_tolerances(unstable(given(), lambda _share, _values: True))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from model.discrepancy.output_error.holdout import held_out
-from model.discrepancy.output_error.observation import observed
+from model.discrepancy.output_error.holdout import hold_out
+from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.search import Point, point_at
 from model.machine_model.model import Model
 from tests.model.fitting import imagined
@@ -19,14 +19,14 @@ HERTZ, SIZE = 1.7, 4.0
 
 def begun(traces: int, start: float) -> Point:
     """The arm's own model on that many fitted traces, each said to begin `start` rad off."""
-    observation, model, unknowns = observed(imagined.arm(), imagined.traces(imagined.arm(), traces, seconds=3.0))
+    observation, model, unknowns = observe(imagined.arm(), imagined.traces(imagined.arm(), traces, seconds=3.0))
     values = np.array([start if u.name.startswith("initial.") else u.start for u in unknowns])
     return point_at(observation, model, unknowns, values)
 
 
 @pytest.mark.parametrize("fitted", [1, 3])
-def test_the_floor_of_held_out_traces_is_theirs_whatever_number_was_fitted_to(fitted: int) -> None:
-    held = held_out(imagined.arm(), [imagined.trace(imagined.arm(), seconds=3.0, seed=5)])
+def test_the_floor_of_held_out_traces_does_not_depend_on_the_number_of_fitted_ones(fitted: int) -> None:
+    held = hold_out(imagined.arm(), [imagined.trace(imagined.arm(), seconds=3.0, seed=5)])
     assert held is not None
     floor = held.floor(begun(fitted, 0.0))
     assert np.all((floor > 0.1 * COUNT) & (floor < 3 * COUNT))
@@ -41,7 +41,7 @@ def humming(phase: float, size: float = SIZE) -> Model:
 
 def found(model: Model) -> Point:
     """What a fit to a record of that very arm would lead to."""
-    observation, wider, unknowns = observed(model, [imagined.trace(model, seconds=6.0)])
+    observation, wider, unknowns = observe(model, [imagined.trace(model, seconds=6.0)])
     values = np.array([u.start for u in unknowns])
     return point_at(observation, wider, unknowns, values)
 
@@ -50,7 +50,7 @@ def left_on(point: Point, *phases: float, size: float = SIZE) -> list[np.ndarray
     """Root mean squares (n,) of what a point leaves of held-out records that meet the disturbance at those phases, in
     floors of the first."""
     traces = [imagined.trace(humming(p, size), k, seconds=8.0, seed=6) for k, p in enumerate(phases)]
-    held = held_out(imagined.arm(), traces)
+    held = hold_out(imagined.arm(), traces)
     assert held is not None
     floor = held.floor(point)
     shown = zip(held.residuals(point), held.observation.records, strict=True)
@@ -81,7 +81,7 @@ def test_a_held_out_record_of_bent_potentiometers_begins_where_its_readings_do()
     bent = imagined.arm().with_effect("potentiometer_nonlinearity", (1, 2, 3), {"bend_1": 0.011, "bend_3": -0.008})
     point = found(bent)
     for number in range(3):
-        held = held_out(imagined.arm(), [imagined.trace(bent, number, seconds=6.0, seed=6)])
+        held = hold_out(imagined.arm(), [imagined.trace(bent, number, seconds=6.0, seed=6)])
         assert held is not None
         (residual,), (record,) = held.residuals(point), held.observation.records
         left = np.sqrt(np.mean(residual[record.runs[0]] ** 2, axis=0)) / held.floor(point)

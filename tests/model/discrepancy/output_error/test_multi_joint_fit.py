@@ -8,12 +8,12 @@ from functools import cache
 import numpy as np
 
 from daq.contracts.progress import Never
-from model.discrepancy.candidates.library import candidates
-from model.discrepancy.candidates.probing import Probed, probed
-from model.discrepancy.output_error.multi_joint_fit import fitted_together
-from model.discrepancy.output_error.observation import Observation, observed
-from model.discrepancy.output_error.refitting import Judged, Refitted, judge, nearest, refitted
-from model.discrepancy.output_error.search import point_at, settled
+from model.discrepancy.candidates.library import hypotheses
+from model.discrepancy.candidates.probing import Probe, probe
+from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, judge, nearest, refit
+from model.discrepancy.output_error.multi_joint_fit import fit_several_joints
+from model.discrepancy.output_error.observation import observe
+from model.discrepancy.output_error.search import converge, point_at
 from model.discrepancy.thresholds import THRESHOLDS
 from tests.model.fitting import imagined
 
@@ -21,48 +21,48 @@ LOSS = 0.2
 
 
 @cache
-def before(joints: tuple[int, ...]) -> tuple[Observation, Judged, tuple[Probed, ...]]:
+def before(joints: tuple[int, ...]) -> tuple[Fit, tuple[Probe, ...]]:
     """A record of an arm whose gears lose so much on these joints, its tolerance fit, and gear loss probed there."""
     arm = imagined.arm().with_effect("gear_loss", joints, {"loss": LOSS})
-    observation, model, unknowns = observed(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
+    observation, model, unknowns = observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
     given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
-    fitted = judge(observation, settled(observation, given, 4))
-    probes = probed(observation, fitted.point, candidates(fitted.point.model, ("gear_loss",), (1, 2, 3)))
-    return observation, fitted, tuple(probes)
+    fitted = judge(converge(given, 4))
+    probes = probe(fitted.point, hypotheses(fitted.point.model, ("gear_loss",), (1, 2, 3)))
+    return fitted, tuple(probes)
 
 
 @cache
-def fits(joints: tuple[int, ...]) -> tuple[tuple[Refitted, ...], tuple[Refitted, ...]]:
+def fits(joints: tuple[int, ...]) -> tuple[tuple[CandidateFit, ...], tuple[CandidateFit, ...]]:
     """Of gear loss on every joint alone, and on several."""
-    observation, fitted, probes = before(joints)
-    singles = [r for r in (refitted(observation, fitted, p) for p in probes) if r is not None]
-    return tuple(singles), tuple(fitted_together(observation, fitted, singles, probes, THRESHOLDS, Never()))
+    fitted, probes = before(joints)
+    singles = [r for r in (refit(fitted, p) for p in probes) if r is not None]
+    return tuple(singles), tuple(fit_several_joints(fitted, singles, probes, THRESHOLDS, Never()))
 
 
-def test_what_several_joints_have_is_found_on_all_of_them() -> None:
+def test_an_effect_on_three_joints_is_found_on_all_of_them() -> None:
     singles, several = fits((1, 2, 3))
     best = max(several, key=lambda r: r.evidence)
-    assert best.candidate.joints == (1, 2, 3)
+    assert best.hypothesis.joints == (1, 2, 3)
     assert best.evidence > max(r.evidence for r in singles) + THRESHOLDS.significant
     for joint in (1, 2, 3):
-        found = best.judged.point.value(f"joint{joint}.gear_loss.loss")
+        found = best.fit.point.value(f"joint{joint}.gear_loss.loss")
         assert abs(found - LOSS) < 0.25 * LOSS
 
 
-def test_what_one_joint_has_is_found_on_no_other() -> None:
+def test_an_effect_on_one_joint_is_found_on_no_other() -> None:
     singles, several = fits((2,))
-    assert max(singles, key=lambda r: r.evidence).candidate.joints == (2,)
+    assert max(singles, key=lambda r: r.evidence).hypothesis.joints == (2,)
     assert several == ()
 
 
-def test_what_two_joints_have_is_not_found_on_the_third() -> None:
+def test_an_effect_on_two_joints_is_not_found_on_the_third() -> None:
     _, several = fits((1, 3))
-    assert max(several, key=lambda r: r.evidence).candidate.joints == (1, 3)
+    assert max(several, key=lambda r: r.evidence).hypothesis.joints == (1, 3)
 
 
-def test_a_fit_begins_where_more_is_explained() -> None:
-    observation, fitted, probes = before((2,))
-    right = next(p for p in probes if p.candidate.joints == (2,))
+def test_a_fit_begins_from_the_start_that_explains_more() -> None:
+    fitted, probes = before((2,))
+    right = next(p for p in probes if p.hypothesis.joints == (2,))
     wrong = replace(right, start=dict.fromkeys(right.start, 0.9))
-    assert nearest(observation, fitted.point, [wrong, right]) is right
-    assert nearest(observation, fitted.point, [right, wrong]) is right
+    assert nearest(fitted.point, [wrong, right]) is right
+    assert nearest(fitted.point, [right, wrong]) is right

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from model.discrepancy.output_error.noise_model import LEAST_DEVIATION, noise_model
+from model.discrepancy.output_error.noise_model import LEAST_DEVIATION, fit_noise_model
 
 
 def coloured(count: int, pole: float, seed: int) -> np.ndarray:
@@ -17,18 +17,20 @@ def coloured(count: int, pole: float, seed: int) -> np.ndarray:
     return signal
 
 
-def test_colour_costs_nothing_but_size_does() -> None:
+def test_a_coloured_residual_costs_no_more_than_a_white_one_but_a_larger_one_does() -> None:
     white, red = coloured(4000, 0.0, 1), coloured(4000, 0.9, 2)
-    described = noise_model([[white], [red]]).by_joint
+    described = fit_noise_model([[white], [red]]).by_joint
     assert abs(described[0] - described[1]) < 250, "a red residual of the same prediction error is as likely"
-    louder = noise_model([[1.1 * white], [red]]).by_joint
+    louder = fit_noise_model([[1.1 * white], [red]]).by_joint
     assert abs(louder[0] - described[0] - 2 * 4000 * np.log(1.1)) < 20
 
 
 def test_a_description_does_not_jump_where_the_order_is_a_close_choice() -> None:
     """From white to a little red: an order more is paid for by what it brings."""
     white = coloured(2750, 0.0, 6)
-    described = [noise_model([[lfilter([1.0], [1.0, -pole], white)]]).description for pole in np.arange(0, 0.1, 0.001)]
+    described = [
+        fit_noise_model([[lfilter([1.0], [1.0, -pole], white)]]).description for pole in np.arange(0, 0.1, 0.001)
+    ]
     assert np.max(np.abs(np.diff(described))) < 1.0
 
 
@@ -36,24 +38,24 @@ def test_one_bad_reading_proves_nothing() -> None:
     white = coloured(4000, 0.0, 3)
     spoilt = white.copy()
     spoilt[2000] += 20.0
-    assert noise_model([[spoilt]]).description - noise_model([[white]]).description < 60
+    assert fit_noise_model([[spoilt]]).description - fit_noise_model([[white]]).description < 60
 
 
-def test_runs_are_not_joined() -> None:
+def test_separate_runs_are_described_as_well_as_one() -> None:
     white = coloured(4000, 0.0, 4)
     halves = [white[:2000] + 0.0, white[2000:] + 0.0]
-    assert np.isclose(noise_model([halves]).description, noise_model([[white]]).description, atol=15)
+    assert np.isclose(fit_noise_model([halves]).description, fit_noise_model([[white]]).description, atol=15)
 
 
-def test_less_than_rounding_leaves_is_no_likelier() -> None:
+def test_a_residual_below_rounding_gains_no_likelihood() -> None:
     white = coloured(2750, 0.0, 5)
     floor = 2 * 2750 * np.log(LEAST_DEVIATION)
     for scale in (0.7, 0.4, 0.05, 0.0):
-        assert noise_model([[scale * white]]).description == floor
-    assert noise_model([[0.9 * white]]).description > floor
+        assert fit_noise_model([[scale * white]]).description == floor
+    assert fit_noise_model([[0.9 * white]]).description > floor
 
 
 def test_a_rounding_offset_at_rest_is_no_evidence() -> None:
     """A joint at rest whose readings have no noise: half a count to one side, or none."""
     still = np.zeros(2750)
-    assert noise_model([[still + 0.5]]).description == noise_model([[still]]).description
+    assert fit_noise_model([[still + 0.5]]).description == fit_noise_model([[still]]).description

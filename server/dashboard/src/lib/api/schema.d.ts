@@ -1576,6 +1576,16 @@ export interface components {
             moves_real_arm?: boolean;
         };
         /**
+         * ControllerProof
+         * @description The controller's own recorded numbers prove an effect: so many `samples`, `of` those looked at, show it.
+         */
+        ControllerProof: {
+            /** Samples */
+            samples: number;
+            /** Of */
+            of: number;
+        };
+        /**
          * Correlation
          * @description Pearson's correlation with one regressor of one joint. `noise` is what independent signals would show (1σ).
          */
@@ -1787,6 +1797,27 @@ export interface components {
              */
             notes?: string[];
             /**
+             * Notes Data
+             * @default []
+             */
+            notes_data?: components["schemas"]["Note"][];
+            /**
+             * Method
+             * @default output-error
+             * @enum {string}
+             */
+            method?: "output-error" | "inverse-dynamics";
+            /**
+             * Unexplained Joints
+             * @default []
+             */
+            unexplained_joints?: number[];
+            /**
+             * Worse Held Out
+             * @default []
+             */
+            worse_held_out?: number[];
+            /**
              * Models
              * @default []
              */
@@ -1861,8 +1892,29 @@ export interface components {
             adopted: boolean;
             /** Rejected Because */
             rejected_because?: string | null;
+            reason_data?: components["schemas"]["Reason"] | null;
+            proof?: components["schemas"]["ControllerProof"] | null;
+            refusal?: components["schemas"]["Refusal"] | null;
             /** Chance */
             chance: number;
+        };
+        /**
+         * DifferencePlace
+         * @description Where two candidates would differ most on an experiment: `share` of the difference's square is there.
+         *     `other_joint`: it is not the joint of the effect.
+         */
+        DifferencePlace: {
+            /** Joint */
+            joint: number;
+            /**
+             * Phase
+             * @enum {string}
+             */
+            phase: "ramp_start" | "steady_ramp" | "reversal" | "creep" | "hold";
+            /** Share */
+            share: number;
+            /** Other Joint */
+            other_joint: boolean;
         };
         /**
          * Done
@@ -1897,6 +1949,18 @@ export interface components {
         };
         EffectUse: {
             [key: string]: unknown;
+        };
+        /**
+         * ErrorFall
+         * @description Root mean square error of a joint without an effect and with it, in `unit`.
+         */
+        ErrorFall: {
+            /** Before */
+            before: number;
+            /** After */
+            after: number;
+            /** Unit */
+            unit: string;
         };
         /**
          * EventMessage
@@ -2587,6 +2651,8 @@ export interface components {
              * @default
              */
             reason?: string;
+            /** Failure */
+            failure?: ("refused" | "program-fault" | "lost") | null;
             /**
              * Headline
              * @default
@@ -3251,6 +3317,18 @@ export interface components {
             seed?: number;
         };
         /**
+         * NamedEffect
+         * @description An effect, its joints (none: of the whole machine), and its evidence.
+         */
+        NamedEffect: {
+            /** Effect */
+            effect: string;
+            /** Joints */
+            joints: number[];
+            /** Evidence */
+            evidence: number;
+        };
+        /**
          * NextExperiment
          * @description The experiment that best separates what is left, within the arm's limits.
          */
@@ -3266,6 +3344,19 @@ export interface components {
             predicted_separation: number;
             /** Reason */
             reason: string;
+            /**
+             * Description
+             * @default
+             */
+            description?: string;
+            /**
+             * Hardest
+             * @default []
+             */
+            hardest?: string[];
+            differs_at?: components["schemas"]["DifferencePlace"] | null;
+            /** Information */
+            information?: number | null;
         };
         /**
          * NoController
@@ -3277,6 +3368,29 @@ export interface components {
              * @enum {string}
              */
             kind: "none";
+        };
+        /**
+         * Note
+         * @description An assumption or limit of an answer. `warning`: it speaks against the whole answer and is read before it.
+         */
+        Note: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "cutoff" | "drive-timing" | "errors-follow-record" | "no-experiment-left" | "not-looked-for" | "not-separable" | "nothing-held-out" | "positions-of-links" | "resting-left-out" | "stated-numbers-moved" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "unfinished-record";
+            /**
+             * Values
+             * @default {}
+             */
+            values?: {
+                [key: string]: unknown;
+            };
+            /**
+             * Warning
+             * @default false
+             */
+            warning?: boolean;
         };
         /**
          * OutputRequest
@@ -3451,6 +3565,31 @@ export interface components {
             times: number[];
             /** Positions */
             positions: number[][];
+        };
+        /**
+         * Pattern
+         * @description A pattern in the residual of one joint, with the numbers that a person would read off a plot, in SI units.
+         *
+         *     `share`: of the residual's mean square that the pattern takes off.
+         */
+        Pattern: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "bends_with_position" | "drives_otherwise" | "fails_at_high_drive" | "goes_with_position" | "goes_with_weight" | "grows_with_time" | "is_off" | "jolts" | "lags_after_turns" | "lags_alike" | "lags_always" | "lags_one_way" | "lags_under_drive" | "lags_under_load" | "lags_when_slow" | "lags_with_speed" | "late_at_changes" | "stays_off" | "sticks" | "stops_short" | "swings_with_position" | "swings_with_time" | "swings_with_time_and_at_rest";
+            /**
+             * Numbers
+             * @default {}
+             */
+            numbers?: {
+                [key: string]: number;
+            };
+            /**
+             * Share
+             * @default 0
+             */
+            share?: number;
         };
         /**
          * Pause
@@ -3782,6 +3921,58 @@ export interface components {
             duration?: number;
         };
         /**
+         * ReadingUnits
+         * @description Units in which people read the numbers of one joint.
+         *
+         *     factor: from rad (m) to ° (mm). unit: of its residual. place_unit: of its position. least: rad (m), the smallest
+         *     deviation that can be read off a plot; 0 for no limit. turns: whether the joint turns; otherwise it slides.
+         */
+        ReadingUnits: {
+            /** Factor */
+            factor: number;
+            /** Unit */
+            unit: string;
+            /** Place Unit */
+            place_unit: string;
+            /** Drive Unit */
+            drive_unit: string;
+            /** Torque Unit */
+            torque_unit: string;
+            /**
+             * Least
+             * @default 0
+             */
+            least?: number;
+            /**
+             * Turns
+             * @default true
+             */
+            turns?: boolean;
+        };
+        /**
+         * Reason
+         * @description What speaks for the effect of a step, beside what the step itself holds: its parameters, evidence and place.
+         *
+         *     By simulation: the `pattern` that `joint` shows most clearly, in `units`, and the fall of its error, `rms`. By
+         *     balancing torques: `removed`, the share of the mean square that is gone on records not fitted to; `slides` says that
+         *     the effect's joints slide, so that torques are forces. `rival` is the next best that would be another answer.
+         */
+        Reason: {
+            /** Joint */
+            joint?: number | null;
+            pattern?: components["schemas"]["Pattern"] | null;
+            units?: components["schemas"]["ReadingUnits"] | null;
+            rms?: components["schemas"]["ErrorFall"] | null;
+            /** Removed */
+            removed?: number | null;
+            /**
+             * Slides
+             * @default false
+             */
+            slides?: boolean;
+            rival?: components["schemas"]["NamedEffect"] | null;
+        };
+        /**
          * RecordEventMessage
          * @description Something in the record of the experiment that runs: a ramp that begins, a limit, a retry.
          */
@@ -3820,6 +4011,29 @@ export interface components {
             times: number[];
             /** Positions */
             positions: number[][];
+        };
+        /**
+         * Refusal
+         * @description Why an effect was not taken into the model. `joints`: those that it leaves unexplained.
+         */
+        Refusal: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "only-resembles" | "superfluous";
+            /**
+             * Numbers
+             * @default {}
+             */
+            numbers?: {
+                [key: string]: number;
+            };
+            /**
+             * Joints
+             * @default []
+             */
+            joints?: number[];
         };
         /**
          * RefusedMessage
@@ -4950,7 +5164,9 @@ export interface components {
         };
         /**
          * Where
-         * @description Where simulation and measurement disagree, of a step before it: a one-line summary, and the numbers behind it.
+         * @description Where simulation and measurement disagree, for a step before it: a one-line summary, and the numbers behind it.
+         *
+         *     `joint`, `phase`: where they disagree most; None where it is no more than noise, which `worst` then tells.
          */
         Where: {
             /** Joint */
@@ -4968,6 +5184,37 @@ export interface components {
              * @default []
              */
             moving?: components["schemas"]["MovingParameter"][];
+            worst?: components["schemas"]["WorstPlace"] | null;
+        };
+        /**
+         * WorstPlace
+         * @description The joint and phase of motion with the largest residual, `ratio` times its noise. `rms`, `floor`: of the residual
+         *     and of the noise, in `unit`, in that phase or over the `whole_record`.
+         */
+        WorstPlace: {
+            /** Joint */
+            joint: number;
+            /**
+             * Phase
+             * @enum {string}
+             */
+            phase: "ramp_start" | "steady_ramp" | "reversal" | "creep" | "hold";
+            /** Ratio */
+            ratio: number;
+            /** Rms */
+            rms?: number | null;
+            /** Floor */
+            floor?: number | null;
+            /**
+             * Unit
+             * @default
+             */
+            unit?: string;
+            /**
+             * Whole Record
+             * @default false
+             */
+            whole_record?: boolean;
         };
     };
     responses: never;

@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 import type { DiagnosisData, DiagnosisStep, TriedEffect } from '../api/types';
 import { evidenceBars, turnOf, turnWithoutStep } from './evidence';
 import { viewsOf } from './views';
-import { candidateName, effectName, listed, proper, sentence, verdictTitle } from './words';
+import { candidateName, effectName, listed, verdictTitle } from './words';
 
 const tried = (effect: string, joint: number, evidence: number, refitted = true): TriedEffect => ({
   effect,
@@ -90,15 +90,7 @@ describe('words', () => {
     expect(candidateName({ effect: 'input_delay', joints: [1, 3] })).toBe('input delay, joints 1 and 3');
   });
 
-  it('of headlines have their capitals', () => {
-    expect(proper('named: coulomb friction, joint 2; back emf error')).toBe(
-      'named: Coulomb friction, joint 2; back-EMF error',
-    );
-  });
-
-  it('make sentences and lists', () => {
-    expect(sentence('joint 2 lags')).toBe('Joint 2 lags.');
-    expect(sentence('')).toBe('');
+  it('make lists', () => {
     expect(listed(['a', 'b', 'c'])).toBe('a, b and c');
     expect(listed(['a'])).toBe('a');
   });

@@ -49,27 +49,6 @@ export function candidateName(one: Pick<TriedEffect, 'effect' | 'joints'>): stri
   return `${effectName(one.effect)}, joint${several} ${listed(one.joints.map(String))}`;
 }
 
-/** Words of the service's headlines with the capitals that the field gives them. */
-export function proper(text: string): string {
-  return text
-    .replace(/\b(coulomb|stribeck)\b/g, (word) => PROPER[word] ?? word)
-    .replace(/\bback emf\b/g, 'back-EMF')
-    .replace(/\b(load|direction) dependent\b/g, '$1-dependent');
-}
-
-/** A sentence of the service: its first letter a capital one, a full stop at its end, and in words that people use. */
-export function sentence(text: string): string {
-  if (text === '') return '';
-  const begun = capital(plain(text));
-  return /[.!?]$/.test(begun) ? begun : `${begun}.`;
-}
-
-function plain(text: string): string {
-  return proper(text)
-    .replace(/\b(\d+) trace\(s\)/g, (_, count: string) => `${count} trace${count === '1' ? '' : 's'}`)
-    .replace(/\b(\d+) nats more/g, 'more (information gain $1)');
-}
-
 /** `a`, `a and b`, `a, b and c`. */
 export function listed(names: readonly string[], last = 'and'): string {
   if (names.length < 2) return names.join('');

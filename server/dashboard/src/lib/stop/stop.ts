@@ -7,7 +7,7 @@
 
 import { asProblem } from '../api/problem';
 import type { StopResult } from '../api/types';
-import { sentence } from './words';
+import { sentence } from '../format';
 
 /** s after which an answer that has not come is told as none. Requests stay on their way. */
 export const TELL_AFTER = 0.8;

@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import { detailOf, sentence, whyStopped, wordsOf } from './words';
+import { sentence } from '../format';
+import { detailOf, whyStopped, wordsOf } from './words';
 
 const confirmed = { kind: 'confirmed', text: 'stopped, confirmed: frozen at tick 7', seconds: 0.03 } as const;
 const lost = { kind: 'not delivered', text: 'nobody answers' } as const;

@@ -1,5 +1,6 @@
 /** A stop in words: what became of it, whether that still holds, and why an arm is stopped. Pure. */
 
+import { sentence } from '../format';
 import type { ArmNow, Standing } from './standing';
 import type { StopState } from './stop';
 
@@ -58,12 +59,4 @@ export function detailOf(text: string): string {
 /** Why the arm is stopped, behind words that say that it is: "stopped by a signal" becomes "By a signal." */
 export function whyStopped(cause: string): string {
   return sentence(cause.replace(/^(the arm )?(is |was |has been )?stopped\b[\s:,.]*/i, ''));
-}
-
-/** With a capital letter and a full stop; nothing remains nothing. */
-export function sentence(text: string): string {
-  const whole = text.trim();
-  if (whole === '') return '';
-  const first = whole.charAt(0).toUpperCase() + whole.slice(1);
-  return /[.!?]$/.test(first) ? first : `${first}.`;
 }

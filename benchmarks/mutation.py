@@ -1,0 +1,344 @@
+"""Finds faults that no test notices: makes small ones in the code, and runs the tests of the same folder against each.
+
+    python -m benchmarks mutation daq/link firmware_protocol --sample 100 --seed 1 --processes 2
+
+Each path is a folder or a file. Each mutant (see `mutants`) is tried in a temporary copy of the tree. The tests are
+those of the folder of `tests` that mirrors the module's (`tests/daq/link` for `daq/link`; where there is none, the
+folder above), and of these the files that reach the module through imports. The quickest file runs first, and the
+first failure ends the run. Tests are left out if they are marked slow, take longer than --longest seconds, or need a
+browser, a real arm or measured traces. A mutant also counts as killed when the tests take longer than three times
+their time and 20 s (240 s for the model, which has to compile).
+
+The output is each survivor with file, line and change, and the share killed of each path. A survivor asks for a test.
+One that no test could notice is entered in equivalent_mutants.toml with the reason, and is then left out.
+The exit code is 1 where less than 90 % of a path's mutants are killed.
+
+--sample N    as many mutants of each path, drawn with --seed (all of them without it)
+--list        print the mutants and run nothing
+--line N      only those that begin at this line; for one file
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache
+from itertools import count
+from pathlib import Path
+from queue import SimpleQueue
+from random import Random
+from xml.etree import ElementTree
+
+import grimp
+
+from benchmarks.mutants import Mutant, mutants_of
+
+ROOT = Path(__file__).parents[1]
+EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
+PACKAGES = ("firmware_protocol", "daq", "daq_cli", "server", "model", "mock_controller")
+TEST_FOLDERS = {"firmware_protocol": "protocol", "mock_controller": "mock"}
+"""Packages whose folder of tests has another name."""
+
+LEFT_OUT = "not slow and not browser and not hardware and not lab_data"
+TARGET = 0.9
+"""Least share of mutants that the tests of a folder should kill."""
+GRACE_S = 20.0
+"""Time that a mutant has beyond three times what the unchanged tests take; the start of pytest varies by seconds."""
+COMPILING_S = 240.0
+"""The same for a mutant of the model, whose compiled functions have to be compiled anew."""
+BASELINE_LIMIT_S = 900.0
+"""Time limit of the unchanged tests."""
+_TIMES = count(1_000_000_000, 10)
+"""Modification times, all different, since Python recognises current bytecode by its source's time and size."""
+
+
+@dataclass(frozen=True)
+class Tests:
+    """What is run against the mutants of a module, and how long that takes when nothing is wrong."""
+
+    files: tuple[str, ...]
+    deselected: tuple[str, ...]
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How one mutant ended: `killed`, `timed out` (killed as well), `survived`, or `no tests`."""
+
+    mutant: Mutant
+    ending: str
+
+    @property
+    def lives(self) -> bool:
+        """Whether no test noticed it."""
+        return self.ending in ("survived", "no tests")
+
+
+class MutationError(Exception):
+    """The tests cannot be held against mutants; the message says why."""
+
+
+# ---- which mutants
+
+
+def equivalents(file: Path = EQUIVALENT) -> dict[tuple[str, str, str, str], str]:
+    """The reason for each mutant that no test could notice, by its identity."""
+    entries = tomllib.loads(file.read_text("utf-8")).get("mutant", [])
+    return {(each["file"], each["function"], each["was"], each["now"]): each["reason"] for each in entries}
+
+
+def mutants_below(path: str, root: Path = ROOT) -> list[Mutant]:
+    """All mutants of a file or a folder (relative to the root), without the equivalent ones."""
+    place = root / path
+    files = [place] if place.is_file() else sorted(place.rglob("*.py"))
+    if not files:
+        raise MutationError(f"{path}: there is no Python file")
+    known = equivalents()
+    found = (mutant for file in files for mutant in mutants_of(file.read_bytes(), file.relative_to(root).as_posix()))
+    return [mutant for mutant in found if mutant.identity not in known]
+
+
+# ---- which tests
+
+
+@cache
+def _import_graph() -> grimp.ImportGraph:
+    return grimp.build_graph(*PACKAGES, cache_dir=None)
+
+
+def mirrored_folder(file: str, root: Path = ROOT) -> Path:
+    """The folder of tests for a module: the same path below `tests`, or the nearest folder above that exists."""
+    first, *rest = Path(file).parent.parts
+    folder = root / "tests" / TEST_FOLDERS.get(first, first) / Path(*rest)
+    while not folder.is_dir():
+        folder = folder.parent
+    return folder
+
+
+def _imported(file: Path, root: Path) -> set[str]:
+    """Modules of this repository that a file of tests imports, itself or through helpers below `tests`."""
+    seen: set[Path] = set()
+    modules: set[str] = set()
+    waiting = [file]
+    while waiting:
+        current = waiting.pop()
+        if current in seen:
+            continue
+        seen.add(current)
+        for name in _import_names(current):
+            helper = root.joinpath(*name.split(".")).with_suffix(".py")
+            if not name.startswith("tests."):
+                modules.add(name)
+            elif helper.is_file():
+                waiting.append(helper)
+    return modules & _import_graph().modules
+
+
+def _import_names(file: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(file.read_bytes())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+@cache
+def reaching(file: str, root: Path = ROOT) -> tuple[str, ...]:
+    """Test files of the mirrored folder that reach the module.
+
+    Preferred are those that do so within the module's own package; then any; then the whole folder, whose tests may
+    reach it through a process.
+    """
+    module = file.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
+    package = module.rpartition(".")[0]
+    above = _import_graph().find_downstream_modules(module) | {module}
+    nearby = {other for other in above if other == package or other.startswith(f"{package}.")}
+    files = sorted(mirrored_folder(file, root).rglob("test_*.py"))
+    imports = {test: _imported(test, root) for test in files}
+    for wanted in (nearby, above):
+        chosen = [test for test in files if imports[test] & wanted]
+        if chosen:
+            return tuple(test.relative_to(root).as_posix() for test in chosen)
+    return tuple(test.relative_to(root).as_posix() for test in files)
+
+
+# ---- running them
+
+
+def copy_of_tree(target: Path) -> None:
+    """The files that git tracks or would track, and the built page where there is one."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+    )
+    for name in listed.stdout.decode().split("\0"):
+        if name and (ROOT / name).is_file():
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, target / name)
+    page = Path("server", "dashboard", "dist")
+    if (ROOT / page).is_dir():
+        shutil.copytree(ROOT / page, target / page, dirs_exist_ok=True)
+
+
+def run_tests(tree: Path, arguments: Iterable[str], limit_s: float) -> int | None:
+    """pytest's exit code for the tests of a copy; None when they took too long, and everything they began was ended."""
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", LEFT_OUT, *arguments]
+    environment = os.environ | {"PYTHONPATH": str(tree), "CI": "", "NUMBA_CACHE_DIR": str(tree / ".compiled")}
+    with subprocess.Popen(
+        command, cwd=tree, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    ) as process:
+        try:
+            return process.wait(limit_s)
+        except subprocess.TimeoutExpired:
+            return None
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+
+
+def measured(tree: Path, files: tuple[str, ...], longest_s: float) -> Tests:
+    """Runs the unchanged tests: the files in the order of their times, without the tests that take too long.
+
+    Where a test takes too long all are run again, since the first run may have spent the time on compiling.
+    Raises MutationError when one fails.
+    """
+    first = _measured_once(tree, files, longest_s)
+    return _measured_once(tree, files, longest_s) if first.deselected else first
+
+
+def _measured_once(tree: Path, files: tuple[str, ...], longest_s: float) -> Tests:
+    report = tree / "mutation-baseline.xml"
+    code = run_tests(tree, [f"--junitxml={report}", "-o", "junit_family=xunit1", *files], BASELINE_LIMIT_S)
+    if code == 5:  # pytest: there was no test
+        return Tests((), (), 0.0)
+    if code != 0:
+        raise MutationError(f"the tests fail without any fault (exit code {code}): {' '.join(files)}")
+    times = dict.fromkeys(files, 0.0)
+    deselected = []
+    for case in ElementTree.parse(report).iter("testcase"):
+        file, seconds = case.get("file", ""), float(case.get("time", 0.0))
+        if seconds > longest_s:
+            deselected.append(f"{file}::{case.get('name')}")
+        else:
+            times[file] = times.get(file, 0.0) + seconds
+    return Tests(tuple(sorted(times, key=times.__getitem__)), tuple(deselected), sum(times.values()))
+
+
+def outcome(tree: Path, mutant: Mutant, tests: Tests) -> Outcome:
+    """Runs the tests of a copy against one mutant, and puts the file back."""
+    if not tests.files:
+        return Outcome(mutant, "no tests")
+    file = tree / mutant.file
+    unchanged, changed_at = file.read_bytes(), file.stat().st_mtime_ns
+    _write(file, mutant.applied(unchanged), next(_TIMES) * 10**9)
+    try:
+        arguments = [*tests.files, *(f"--deselect={name}" for name in tests.deselected)]
+        grace = COMPILING_S if mutant.file.startswith("model/") else GRACE_S
+        code = run_tests(tree, arguments, 3.0 * tests.seconds + grace)
+    finally:
+        _write(file, unchanged, changed_at)
+    return Outcome(mutant, {None: "timed out", 0: "survived", 5: "no tests"}.get(code, "killed"))
+
+
+def _write(file: Path, content: bytes, changed_at_ns: int) -> None:
+    file.write_bytes(content)
+    os.utime(file, ns=(changed_at_ns, changed_at_ns))
+
+
+def run_all(mutants: list[Mutant], processes: int, longest_s: float) -> list[Outcome]:
+    """Tries mutants in as many copies of the tree as there may be processes, and prints each survivor at once."""
+    with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
+        trees: SimpleQueue[Path] = SimpleQueue()
+        for number in range(processes):
+            tree = Path(folder, str(number))
+            copy_of_tree(tree)
+            trees.put(tree)
+
+        @contextmanager
+        def a_tree() -> Iterator[Path]:
+            tree = trees.get()
+            try:
+                yield tree
+            finally:
+                trees.put(tree)
+
+        def measure(files: tuple[str, ...]) -> Tests:
+            with a_tree() as tree:
+                return measured(tree, files, longest_s)
+
+        def attempt(mutant: Mutant) -> Outcome:
+            with a_tree() as tree:
+                ended = outcome(tree, mutant, tests[reaching(mutant.file)])
+            if ended.lives:
+                print(f"{ended.ending}: {mutant}", flush=True)
+            return ended
+
+        sets_of_files = list(dict.fromkeys(reaching(mutant.file) for mutant in mutants))
+        with ThreadPoolExecutor(processes) as pool:
+            tests = dict(zip(sets_of_files, pool.map(measure, sets_of_files), strict=True))
+            return list(pool.map(attempt, mutants))
+
+
+# ---- the command
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("paths", nargs="+", metavar="PATH")
+    parser.add_argument("--sample", type=int, metavar="N")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--processes", type=int, default=1, metavar="N")
+    parser.add_argument("--longest", type=float, default=5.0, metavar="SECONDS")
+    parser.add_argument("--line", type=int, metavar="N")
+    parser.add_argument("--list", action="store_true")
+    return parser.parse_args()
+
+
+def main() -> int:
+    """The exit code: 0 when enough mutants of every path were killed."""
+    options = _arguments()
+    random = Random(options.seed)
+    chosen: dict[str, list[Mutant]] = {}
+    try:
+        for path in options.paths:
+            mutants = [m for m in mutants_below(path.rstrip("/")) if options.line in (None, m.line)]
+            fewer = options.sample is not None and options.sample < len(mutants)
+            chosen[path] = random.sample(mutants, options.sample) if fewer else mutants
+        if options.list:
+            for mutants in chosen.values():
+                print(*mutants, sep="\n")
+            return 0
+        begun = time.monotonic()
+        every = [mutant for mutants in chosen.values() for mutant in mutants]
+        ended = {each.mutant: each for each in run_all(every, options.processes, options.longest)}
+    except MutationError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    print(f"\n{len(every)} mutants in {time.monotonic() - begun:.0f} s")
+    enough = True
+    for path, mutants in chosen.items():
+        killed = sum(not ended[mutant].lives for mutant in mutants)
+        timed_out = sum(ended[mutant].ending == "timed out" for mutant in mutants)
+        share = killed / len(mutants) if mutants else 1.0
+        enough &= share >= TARGET
+        print(f"{path:<24} {killed} of {len(mutants)} killed ({share:.0%}), {timed_out} of them by the time limit")
+    return 0 if enough else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

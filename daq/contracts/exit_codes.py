@@ -1,0 +1,21 @@
+"""What a process of this project ends with: one table for every program (docs/command-line.md explains each)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+COMPLETE: Final = 0
+PROGRAM_FAULT: Final = 1
+WRONG_INPUT: Final = 2
+NOT_REACHED: Final = 3
+"""The robot or the service was not reached, or did not confirm what it was asked."""
+REFUSED: Final = 4
+"""Refused for safety; nothing moved."""
+FAULT: Final = 5
+"""The run ended in a fault, or data are not to be trusted."""
+STOPPED: Final = 6
+INTERRUPTED: Final = 130
+"""What shells report for a process that Ctrl-C has ended."""
+
+OF_OUTCOME: Final[dict[str, int]] = {"complete": COMPLETE, "fault": FAULT, "interrupted": FAULT, "stopped": STOPPED}
+"""Exit code by the outcome of a run that left a trace."""

@@ -1,0 +1,169 @@
+"""`daq teach`: the four ways of teaching that the original controller had (section 6.4), without its limit of 60 s."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from daq.contracts.errors import SpecError
+from daq_cli.app import completion
+from daq_cli.app.consent import Consent
+from daq_cli.app.context import JsonOption, YesOption
+from daq_cli.app.quantities import parse_angle, parse_per_joint_angles
+from daq_cli.commands.teach import edit, programs
+from daq_cli.robot.access import robot_of
+
+LONGEST_LEAD = 3600.0
+"""Longest lead in s, because somebody has to hold the arm."""
+
+app = typer.Typer(
+    add_completion=False,
+    help="Jog the arm, lead it by the nose, make steps, and play back. Needs a configured robot, or --port.",
+    no_args_is_help=True,
+)
+app.add_typer(programs.app, name="programs")
+app.add_typer(edit.app, name="edit")
+
+
+@app.command()
+def jog(
+    context: typer.Context,
+    speed: Annotated[str, typer.Option(help="Speed to begin with, up to 20 degrees/s.")] = "10",
+    program: Annotated[
+        Path | None, typer.Option(help="File for the postures that are kept with `p` (a program, .json).")
+    ] = None,
+    yes: YesOption = False,
+) -> None:
+    """Drive joints with the keys, as the teach pendant did; a joint moves only while its key repeats."""
+    from daq.teaching.program import Absolute, Program, require_program_file, save_program
+    from daq_cli.robot.pendant import Pendant, StatusLine, require_jog_speed
+
+    robot = robot_of(context)
+    machine = robot.machine
+    if program is not None:
+        require_program_file(program)
+    pendant = Pendant(machine, require_jog_speed(parse_angle(speed, "speed")))
+    kept: list[Absolute] = []
+    line = StatusLine()
+
+    def keep(angles: Mapping[int, float]) -> None:
+        kept.append(Absolute(angles=dict(angles)))
+        line.tell(f"posture {len(kept)} kept")
+
+    try:
+        robot.teaching(Consent(yes)).jog(pendant, keep, line)
+    finally:
+        line.close()
+        if program is not None and kept:
+            save_program(Program(name=program.stem, machine=machine.name, instructions=tuple(kept)), program)
+            print(program)
+
+
+@app.command()
+def step(
+    context: typer.Context,
+    to: Annotated[str | None, typer.Option(help="Absolute angles, such as 1=180,2=45 (degrees).")] = None,
+    by: Annotated[str | None, typer.Option(help="Relative angles, such as 2=-5 (degrees).")] = None,
+    speed: Annotated[str, typer.Option(help="Speed of the fastest joint in degrees/s.")] = "14",
+    yes: YesOption = False,
+) -> None:
+    """Make one off-line step, to absolute angles or by relative ones; all joints arrive together."""
+    from pydantic import ValidationError
+
+    from daq.teaching.program import Absolute, Instruction, Program, Relative
+
+    if (to is None) == (by is None):
+        raise SpecError("step: give either --to or --by")
+    angles = parse_per_joint_angles(to or by or "", "step")
+    if not isinstance(angles, dict):
+        raise SpecError(f"step {to or by!r}: write joint=angle pairs like 1=180,2=45")
+    robot = robot_of(context)
+    kind: type[Absolute | Relative] = Relative if to is None else Absolute
+    try:
+        instruction: Instruction = kind(angles=angles, speed=parse_angle(speed, "speed"))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise SpecError(f"step: {where} = {first['input']:.5g} rad or rad/s: {first['msg']}") from error
+    program = Program(name="step", machine=robot.machine.name, instructions=(instruction,))
+    print(robot.teaching(Consent(yes)).perform(program))
+
+
+@app.command("program")
+def run_file(
+    context: typer.Context,
+    file: Annotated[
+        Path, typer.Argument(help="A taught program (.json or .toml), or the name of one that a service keeps.")
+    ],
+    yes: YesOption = False,
+) -> None:
+    """Carry out a taught program: steps, paths, waits, process signals."""
+    robot = robot_of(context)
+    program = robot.program(file)
+    print(robot.teaching(Consent(yes)).perform(program))
+
+
+@app.command()
+def lead(
+    context: typer.Context,
+    output: Annotated[Path, typer.Option("--output", "-o", help="File for the recorded path (.json).")],
+    joints: Annotated[
+        str, typer.Option(help="Joints to be led: 1-3, 1,3 or 2.", autocompletion=completion.joints)
+    ] = "1-3",
+    seconds: Annotated[
+        float | None, typer.Option(help="Length of the recording in s (default: until Enter is pressed).")
+    ] = None,
+    yes: YesOption = False,
+) -> None:
+    """Record a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive and may sink."""
+    import sys
+
+    from daq.contracts.experiment import parse_joints
+    from daq.teaching import RecordedPath
+    from daq.teaching.recording import save_path
+
+    if seconds is not None and not 0 < seconds <= LONGEST_LEAD:
+        raise SpecError(f"lead: --seconds {seconds:g}: allowed are above 0 to {LONGEST_LEAD:g}")
+    if seconds is None and not sys.stdin.isatty():
+        raise SpecError("lead: give --seconds, or a terminal in which Enter ends it")
+    if not output.name or output.is_dir():
+        raise SpecError(f"lead: {str(output)!r}: is no name for a file; nothing was begun")
+    if not output.absolute().parent.is_dir():
+        raise SpecError(f"lead: {output}: its folder does not exist; nothing was begun")
+    led = parse_joints(joints)
+
+    def keep(path: RecordedPath) -> None:
+        save_path(path, output)
+        print(f"{output}: {path.duration:.2f} s on joints {', '.join(map(str, path.joints))}")
+
+    robot_of(context).teaching(Consent(yes)).lead(led, seconds, keep)
+
+
+@app.command()
+def play(
+    context: typer.Context,
+    file: Annotated[Path, typer.Argument(help="A path recorded by `daq teach lead`.")],
+    rate: Annotated[float, typer.Option(help="Speed of the path, as a multiple of that at which it was led.")] = 1.0,
+    folder: Annotated[Path | None, typer.Option(help="Folder for the trace (default: the configured one).")] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only check and show the motion; connect to nothing.")
+    ] = False,
+    yes: YesOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Play a recorded path: checked, watched and recorded like any experiment."""
+    from pydantic import ValidationError
+
+    from daq.contracts.documents import read_text
+    from daq.teaching import RecordedPath, playback
+    from daq_cli.robot.experiment import RunOptions, carry_out
+
+    try:
+        path = RecordedPath.model_validate_json(read_text(file, f"path {file}"))
+    except ValidationError as error:
+        raise SpecError(f"path {file}: {error.errors()[0]['msg']}") from error
+    spec = playback(path, rate, "playback")
+    carry_out(robot_of(context), spec, RunOptions(folder, dry_run, yes, json))

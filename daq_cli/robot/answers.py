@@ -1,0 +1,48 @@
+"""What a robot answers to a command, whether this computer or a service has its port."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from daq.contracts.errors import SafetyError
+
+if TYPE_CHECKING:
+    from daq.contracts.experiment import Gain
+    from daq.contracts.status import StatusReport
+
+
+@dataclass(frozen=True)
+class RobotView:
+    """One look at the robot: all that is known of it, and its state in one line."""
+
+    report: StatusReport
+    headline: str
+    gains: Mapping[int, Gain] = field(default_factory=dict)
+    """P, I and D by joint; may be empty where no joint is limp."""
+
+
+@dataclass(frozen=True)
+class ResetDone:
+    """What a reset has done, in one line; and, from a board at this computer, which joints nothing holds."""
+
+    text: str
+    limp: str = ""
+
+
+@dataclass(frozen=True)
+class ImportedTrace:
+    """An imported trace: its number, its file, and one line on where it is."""
+
+    trace: str
+    file: str
+    text: str
+
+
+class AcquisitionFailedError(SafetyError):
+    """An acquisition that left no trace; it has the exit code that was reported."""
+
+    def __init__(self, message: str, exit_code: int) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code  # type: ignore[misc]

@@ -1,0 +1,106 @@
+"""An experiment from the command line: its preview, its run, and its result."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from daq.contracts import exit_codes
+from daq.contracts.errors import SafetyError
+from daq_cli.app.consent import Consent
+from daq_cli.app.context import print_json
+from daq_cli.robot.answers import AcquisitionFailedError
+
+if TYPE_CHECKING:
+    from daq.acquisition.messages import Finished
+    from daq.contracts.experiment import ExperimentSpec
+    from daq.contracts.machine import Machine
+    from daq_cli.robot.access import RobotAccess
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How to carry out an experiment: the options shared by every command that runs one."""
+
+    folder: Path | None
+    dry_run: bool
+    yes: bool
+    json: bool
+
+
+def read_spec(path: Path) -> ExperimentSpec:
+    """The experiment that a .json or .toml file describes. Raises SpecError with one line."""
+    from daq.contracts.documents import read_document
+    from daq.contracts.experiment import parse_spec
+
+    what = f"experiment {path}"
+    return parse_spec(read_document(path, what), what)
+
+
+def carry_out(robot: RobotAccess, spec: ExperimentSpec, options: RunOptions) -> None:
+    """Runs `spec` as the options say, prints the result, and ends with its exit code unless it is complete."""
+    if options.dry_run:
+        preview(spec, robot.machine, options.json)
+        return
+    folder = options.folder or robot.call.trace_folder
+    finished = robot.acquire(spec, robot.machine, folder, Consent(options.yes))
+    if options.json:
+        print_json(finished.model_dump(mode="json"))
+    else:
+        print_result(finished)
+    if finished.outcome != "complete":
+        raise typer.Exit(exit_codes.OF_OUTCOME[finished.outcome])
+
+
+def acquire_complete(
+    robot: RobotAccess, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent
+) -> Finished:
+    """Runs `spec` for a use that needs the whole record. Raises AcquisitionFailedError for an incomplete one, too."""
+    finished = robot.acquire(spec, machine, folder, consent)
+    if finished.outcome != "complete":
+        why = f"{finished.outcome}: {finished.reason}" if finished.reason else finished.outcome
+        code = exit_codes.OF_OUTCOME[finished.outcome]
+        raise AcquisitionFailedError(f"{why}; the run is not complete, so its trace is not used", code)
+    return finished
+
+
+def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
+    """Prints the planned motion and the limits that it violates. Raises SafetyError when it violates any."""
+    from daq.safety import check_plan, unchecked
+    from daq.trajectories import plan, start_angles
+
+    motion = plan(spec, machine, start_angles(spec, machine))
+    shown = motion.preview()
+    violations = check_plan(motion, machine, machine.limits)
+    if as_json:
+        print_json({"preview": shown.as_data(), "violations": [str(v) for v in violations]})
+    else:
+        every = f"every {shown.period * 1e3:g} ms"
+        print(f"{spec.trajectory.kind}: {shown.duration:.2f} s, {shown.set_points} set points {every}")
+        for joint in shown.joints:
+            if joint.moves:
+                angles = [math.degrees(a) for a in (joint.start, joint.end, joint.lowest, joint.highest)]
+                print(
+                    f"  joint {joint.joint}: {angles[0]:.2f}° → {angles[1]:.2f}°, between {angles[2]:.2f}° and "
+                    f"{angles[3]:.2f}°, at most {math.degrees(joint.top_speed):.1f}°/s"
+                )
+        for line in unchecked(machine, machine.limits):
+            print(f"  {line}")
+    if violations:
+        raise SafetyError(f"refused: {'; '.join(map(str, violations))}")
+    if not as_json:
+        print("  nothing speaks against it; nothing was sent")
+
+
+def print_result(finished: Finished) -> None:
+    """Prints the result of a run for people."""
+    counters = finished.counters
+    why = f" — {finished.reason}" if finished.reason else ""
+    print(f"{finished.outcome}: {finished.samples} samples, {finished.missing} missing{why}")
+    shown = ("retries", "damaged", "torn", "missed_set_points", "restarts")
+    print("link: " + ", ".join(f"{name.replace('_', ' ')} {counters.get(name, 0):.0f}" for name in shown))
+    print(f"trace: {finished.trace}")

@@ -1,0 +1,276 @@
+"""The robot at this computer's port, which is opened for the moment of a question or for the time of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from daq.contracts import exit_codes
+from daq.contracts.errors import DaqError, ReachError, SafetyError, SpecError, TraceError
+from daq_cli.app.consent import Consent
+from daq_cli.app.context import Invocation
+from daq_cli.robot.answers import ImportedTrace, ResetDone, RobotView
+
+if TYPE_CHECKING:
+    from daq.acquisition.messages import Finished
+    from daq.acquisition.stop_socket import StopAnswer
+    from daq.client import Robot
+    from daq.contracts.experiment import ExperimentSpec, Gain
+    from daq.contracts.machine import Machine
+    from daq.contracts.service.robot import ProcessState
+    from daq.contracts.status import StatusReport
+    from daq.driver import Controller
+    from daq.teaching.program import Program
+    from daq.traces.catalogue import TraceSummary
+    from daq_cli.robot.pendant import Teaching
+
+SIGNALS = 8
+"""Number of process inputs, and of outputs."""
+
+
+class NotFrozenError(DaqError):
+    """The board has not confirmed that it took the measured posture as its set points."""
+
+    exit_code = exit_codes.NOT_REACHED
+
+
+@dataclass
+class LocalRobot:
+    """`RobotAccess` at a port of this computer."""
+
+    call: Invocation
+
+    @cached_property
+    def machine(self) -> Machine:
+        """The configured machine. Raises SpecError."""
+        return self.call.settings.machine()
+
+    @contextmanager
+    def _connected(self) -> Iterator[Controller]:
+        """The configured controller, greeted; closed afterwards. Nothing is sent that could move it.
+
+        Raises ReachError when no robot is configured: a new mock would have no state worth showing.
+        """
+        if self.call.port_option is None and self.call.settings.robot.port is None:
+            raise ReachError("no robot is configured: give --port, or set robot.port in daq.toml (`daq config show`)")
+        with self._controller() as controller:
+            yield controller
+
+    def _controller(self) -> Controller:
+        from daq.config.robot_files import load_memory_map
+        from daq.driver import Controller
+
+        return Controller.connect(self.call.port, load_memory_map(self.call.settings.robot.memory_map))
+
+    def require_reached(self) -> None:
+        """Greets the robot and lets it go again; of a mock, this shows that it starts with its options."""
+        with self._controller():
+            pass
+
+    def view(self) -> RobotView:
+        """The state that the board reports now."""
+        from daq.contracts.limp import limp_joints
+
+        machine = self.machine
+        with self._connected() as controller:
+            board, gains = controller.status(), controller.gains()
+            report = _report(self.call, machine, controller, limp_joints(gains))
+        state = ", ".join(flag.name.lower().replace("_", " ") for flag in board.flags if flag.name) or "no flags"
+        kind = "mock" if controller.identity.simulated else "REAL ARM"
+        missed = f"{board.missed} set points missed since power-up"
+        return RobotView(report, f"{kind}, tick {board.tick}, {state}; {missed}; link {board.link}", gains)
+
+    def gains(self) -> Mapping[int, Gain]:
+        """Reads the board."""
+        with self._connected() as controller:
+            return controller.gains()
+
+    def set_gains(self, wanted: Mapping[int, Gain], consent: Consent, written: Callable[[int, Gain], None]) -> str:
+        """Raises SafetyError, and writes nothing, for a joint off its set point, which would jump there."""
+        from daq.contracts.limp import limp_line, require_no_jump
+
+        with self._connected() as controller:
+            consent.require(self.call.port, simulated=controller.identity.simulated)
+            readings = controller.next_snapshot().joints
+            require_no_jump({joint: reading.error for joint, reading in readings}, wanted)
+            for joint, gain in wanted.items():
+                controller.set_gains(joint, *gain)
+                written(joint, gain)
+            return limp_line(controller.gains())
+
+    def process(self) -> ProcessState:
+        """Reads the board."""
+        with self._connected() as controller:
+            return _process(controller)
+
+    def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+        """Switches and reads back. Raises SafetyError as `_switchable` does."""
+        with self._switchable(while_stopped, consent) as controller:
+            controller.write_outputs(1 << output, on << output)
+            return _process(controller)
+
+    def set_gripper(self, *, closed: bool, while_stopped: bool, consent: Consent) -> ProcessState:
+        """Switches and reads back. Raises SafetyError as `_switchable` does."""
+        with self._switchable(while_stopped, consent) as controller:
+            controller.set_gripper(closed=closed)
+            return _process(controller)
+
+    @contextmanager
+    def _switchable(self, while_stopped: bool, consent: Consent) -> Iterator[Controller]:
+        """The controller of an arm that may be switched now.
+
+        Raises SafetyError without the operator's word on a real arm, and for one that has been stopped, also while the
+        operator was asked: nobody holds the port meanwhile, so that a stop gets through.
+        """
+        with self._connected() as controller:
+            _require_switchable(controller, while_stopped)
+            simulated = controller.identity.simulated
+            if simulated or consent.given:
+                yield controller
+                return
+        consent.require(self.call.port, simulated=simulated)
+        with self._connected() as controller:
+            _require_switchable(controller, while_stopped)
+            yield controller
+
+    def stop(self, reached: set[str]) -> list[StopAnswer]:
+        """Stops the robot at the configured port."""
+        from daq_cli.robot.local_stop import stop_configured
+
+        return stop_configured(self.call, reached)
+
+    def reset(self, *, here: bool) -> ResetDone:
+        """Ends the stop that the board is in. Raises NotFrozenError."""
+        from daq.contracts.limp import limp_line
+        from firmware_protocol.commands import StatusFlag
+
+        with self._connected() as controller:
+            status = controller.status()
+            frozen, stop = StatusFlag.FROZEN in status.flags, status.stop  # ends this stop, and none that comes later
+            if here:
+                # A second stop would change nothing: the board measures the posture when a stop begins.
+                controller.release(stop)
+                stopped = controller.stop()
+                if not stopped.acknowledged:
+                    raise NotFrozenError(f"reset --here: {stopped.problem}; the set points are not known to be here")
+                stop = controller.status().stop
+            controller.release(stop)
+            limp = limp_line(controller.gains())
+        if not frozen and not here:
+            return ResetDone("was not stopped", limp)
+        holds = "takes set points again" if limp else "the arm holds its posture and takes set points again"
+        now = "; the set points are the posture measured now" if here else ""
+        return ResetDone(f"released: {holds}{now}", limp)
+
+    def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: Consent) -> Finished:
+        """Runs the experiment in an acquisition process of its own."""
+        from daq_cli.robot.local_run import acquire_locally
+
+        return acquire_locally(self.call, spec, machine, folder, consent)
+
+    def list_traces(self, folder: Path | None) -> tuple[Sequence[TraceSummary], str]:
+        """The traces of the folder; none where there is no such folder."""
+        from daq.traces.catalogue import list_traces
+
+        place = folder or self.call.trace_folder
+        return list_traces(place, self.call.trace_limits) if place.is_dir() else (), str(place)
+
+    def find_trace(self, folder: Path, wanted: str) -> Path:
+        """Raises TraceError."""
+        from daq.traces.catalogue import find_trace
+
+        return find_trace(folder, wanted, self.call.trace_limits)
+
+    def import_trace(self, file: Path, folder: Path | None) -> ImportedTrace:
+        """Writes the trace into the folder. Raises SpecError, TraceError."""
+        from daq.traces.csv_table import import_csv
+        from daq.traces.naming import trace_path
+        from daq.traces.store import write_trace
+
+        place = folder or self.call.trace_folder
+        found = import_csv(file, self.call.trace_limits)
+        try:
+            place.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise TraceError(f"{place}: cannot be made: {error.strerror}") from error
+        made = write_trace(found, trace_path(place, found.record))
+        return ImportedTrace(found.record.trace_id, str(made), str(made))
+
+    def program(self, name: Path) -> Program:
+        """A program in a file. Raises SpecError."""
+        from daq.teaching.program import load_program
+
+        return load_program(name)
+
+    def teaching(self, consent: Consent) -> Teaching:
+        """Teaching with the port held by this process."""
+        from daq_cli.robot.local_teaching import LocalTeaching
+
+        return LocalTeaching(self.call, self.machine, consent)
+
+    def service(self, what: str) -> AbstractContextManager[Robot]:
+        """Raises SpecError: there is no service."""
+        raise SpecError(f"{what}: only a service has this: `daq --server http://host:8300 {what} …`, or set DAQ_SERVER")
+
+    def require_local(self, why: str) -> None:
+        """Refuses nothing."""
+
+
+def _require_switchable(controller: Controller, while_stopped: bool) -> None:
+    from firmware_protocol.commands import StatusFlag
+
+    if StatusFlag.FROZEN in controller.status().flags and not while_stopped:
+        raise SafetyError("the arm has been stopped: `daq reset` first, or --while-stopped; nothing was switched")
+
+
+def _process(controller: Controller) -> ProcessState:
+    """The signals that the board reads back, in the form of a service."""
+    from daq.contracts.service.robot import ProcessState
+
+    found = controller.process()
+    inputs, outputs = (tuple(bool(bits >> k & 1) for k in range(SIGNALS)) for bits in (found.inputs, found.outputs))
+    return ProcessState(inputs=inputs, outputs=outputs, gripper="closed" if found.gripper else "open")
+
+
+def _report(call: Invocation, machine: Machine, controller: Controller, limp: list[int]) -> StatusReport:
+    """The state of the board, in the form of a service's status."""
+    from daq.contracts.service.robot import LinkStatus, RobotIdentity, Sample
+    from daq.contracts.status import StatusReport
+    from daq.runner.rows import RowMaker
+    from firmware_protocol.commands import StatusFlag
+
+    snapshot, now = controller.next_snapshot(), datetime.now(UTC)
+    joints = tuple(joint for joint, _ in snapshot.joints)
+    row = RowMaker(machine, joints, controller.period_s).row(snapshot)
+    identity, frozen = controller.identity, StatusFlag.FROZEN in snapshot.flags
+    return StatusReport(
+        robot=call.settings.robot.name,
+        machine=machine.name,
+        port=call.port,
+        connection="connected",
+        identity=RobotIdentity(
+            simulated=identity.simulated, protocol=identity.version, period=identity.period_s, boots=identity.boots
+        ),
+        arm="stopped" if frozen else "idle",
+        activity="none",
+        limp=tuple(limp),
+        sample=Sample(
+            tick=row.tick,
+            host_time=row.host_time,
+            utc=now.timestamp(),
+            age=0.0,
+            frozen=frozen,
+            joints=joints,
+            set_point=row.set_point,
+            position=row.position,
+            error=row.error,
+            drive=row.drive,
+        ),
+        link=LinkStatus(state=controller.status().link, counters=controller.counters.numbers(), age=0.0),
+        utc=now,
+    )

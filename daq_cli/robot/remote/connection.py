@@ -1,0 +1,61 @@
+"""The connection to the service that the command line names, and the control of its robot."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from daq_cli.app.consent import Consent
+from daq_cli.app.context import Invocation, console
+
+if TYPE_CHECKING:
+    from daq.client import HeldControl, Robot
+    from daq.contracts.service.robot import RobotStatus
+
+TOKEN_VARIABLE = "DAQ_TOKEN"
+
+
+@contextmanager
+def remote_robot(call: Invocation) -> Iterator[Robot]:
+    """The client of the robot of `call.server`. Raises SpecError, ServiceError, ServiceNotReachedError."""
+    from daq.client import Client
+
+    assert call.server is not None
+    with Client(call.server, os.environ.get(TOKEN_VARIABLE) or None) as client:
+        yield client.robot()
+
+
+def connected_status(robot: Robot) -> RobotStatus:
+    """The robot's status, after the service has connected to it. Raises ServiceError when it cannot."""
+    status = robot.status()
+    return status if status.identity is not None else robot.connect()
+
+
+def require_consent(status: RobotStatus, consent: Consent) -> bool:
+    """Whether the robot is a real arm; the operator is asked about one. Raises SafetyError without their word."""
+    real = status.identity is not None and not status.identity.simulated
+    consent.require(f"{status.robot} at the server ({status.port})", simulated=not real)
+    return real
+
+
+@contextmanager
+def controlled(call: Invocation, consent: Consent) -> Iterator[tuple[Robot, HeldControl]]:
+    """The robot and its control, given back afterwards. On a real arm the operator is asked.
+
+    Raises ServiceError, SafetyError.
+    """
+    with remote_robot(call) as robot:
+        status = connected_status(robot)
+        real = require_consent(status, consent)
+        with robot.control(moves_real_arm=real) as control:
+            yield robot, control
+        _say_if_paused(call, robot, status.queue.paused)
+
+
+def _say_if_paused(call: Invocation, robot: Robot, paused_before: bool) -> None:
+    """Waiting experiments do not begin when the control is given back: a person has to resume the queue."""
+    queue = robot.queue.status()
+    if queue.paused and not paused_before:
+        console().print(f"the queue is paused: {queue.reason}: `daq --server {call.server} queue resume`")

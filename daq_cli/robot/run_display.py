@@ -1,0 +1,50 @@
+"""A run on the terminal while it goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from daq_cli.app.context import console
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from daq.contracts.experiment import ExperimentSpec
+
+
+class RunDisplay:
+    """A progress bar, and a line for each event above it."""
+
+    def __init__(self, bar: Progress, kind: str, quiet: frozenset[str]) -> None:
+        self._bar = bar
+        self._quiet = quiet
+        self._task = bar.add_task(kind, total=1.0, text="connecting")
+
+    def progress(self, fraction: float, text: str) -> None:
+        """Shows how far the run is."""
+        from rich.markup import escape
+
+        self._bar.update(self._task, completed=fraction, text=escape(text))
+
+    def event(self, kind: str, time: float, message: str) -> None:
+        """Shows an event of the trace; `time` is in s from the start of the record."""
+        from rich.markup import escape
+
+        if kind not in self._quiet:
+            line = escape(f"{kind.replace('_', ' ')}: {message}")
+            self._bar.console.print(f"[dim]{time:8.2f} s[/dim]  {line}", soft_wrap=True, markup=True)
+
+
+@contextmanager
+def run_display(spec: ExperimentSpec) -> Iterator[RunDisplay]:
+    """Shows a run within the block; the bar vanishes at its end, and is absent where no terminal shows it."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    kind = spec.trajectory.kind
+    # A sequence has dozens of marks; they are in the trace.
+    marks = {"note", "ramp_start", "ramp_end", "reversal"} if kind == "sequence" else set()
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[text]}"), TimeElapsedColumn())
+    with Progress(*columns, console=console(), transient=True, disable=not console().is_terminal) as bar:
+        yield RunDisplay(bar, kind, frozenset({"start", "end"} | marks))

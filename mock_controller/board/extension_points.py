@@ -1,0 +1,49 @@
+"""Protocols by which a modification changes the board: its constants, sensors, converters and set points."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+from mock_controller.board.parameters import BoardParameters
+from mock_controller.modification import Modification
+
+
+@runtime_checkable
+class KnowsBoard(Modification, Protocol):
+    """Is told the board's constants, once, before the first reading."""
+
+    def know_board(self, parameters: BoardParameters) -> None: ...
+
+
+@runtime_checkable
+class ChangesSensor(Modification, Protocol):
+    """Angle that one joint's potentiometer shows for the joint's true angle. Asked every control period."""
+
+    joint: int
+
+    def sensed_angle(self, angle: float) -> float: ...
+
+
+@runtime_checkable
+class ChangesReading(Modification, Protocol):
+    """Reading (ADC counts, not yet rounded) of one joint's converter. Asked every control period."""
+
+    joint: int
+
+    def reading(self, counts: float) -> float: ...
+
+
+@runtime_checkable
+class ChangesBoard(Modification, Protocol):
+    """Other constants of the board: timing, gains, scales. Applied once, before the board exists."""
+
+    def change_board(self, parameters: BoardParameters) -> BoardParameters: ...
+
+
+@runtime_checkable
+class ChangesSetPoint(Modification, Protocol):
+    """Set point (ADC counts) that one joint's controller works with. Asked every control period."""
+
+    joint: int
+
+    def set_point(self, counts: int, tick: int) -> int: ...

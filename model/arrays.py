@@ -1,0 +1,13 @@
+"""Names for the types of arrays, with the shape said where they are used."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+"""An array of real numbers."""
+Array = NDArray[Any]
+"""An array in compiled code: real numbers, or dual numbers (complex128)."""

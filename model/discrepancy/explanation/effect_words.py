@@ -1,0 +1,112 @@
+"""The words for each effect: its name in a sentence, its size, and what it looks like in torques."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from daq.contracts.effects import effect_names
+from model.discrepancy.diagnosis import FoundValue
+from model.effects.library import effect as effect_of
+
+
+@dataclass(frozen=True)
+class EffectWords:
+    """What an effect is called, and the last name of the parameter that is its size, if there is one."""
+
+    called: str
+    size: str | None
+
+
+WORDS: dict[str, EffectWords] = {
+    "viscous_friction": EffectWords("viscous friction", "coefficient"),
+    "coulomb_friction": EffectWords("Coulomb friction", "torque"),
+    "load_dependent_friction": EffectWords("load-dependent friction", "arm"),
+    "stribeck_friction": EffectWords("Stribeck friction", "torque"),
+    "stiction": EffectWords("stiction", "breakaway"),
+    "direction_dependent_friction": EffectWords("friction that depends on the direction", "difference"),
+    "back_emf_error": EffectWords("a back-EMF constant off its data sheet", "relative"),
+    "resistance_drift": EffectWords("a winding that warms", "heating"),
+    "motor_inductance": EffectWords("motor inductance", "inductance"),
+    "dead_zone": EffectWords("a dead zone of the amplifier", "width"),
+    "supply_limit": EffectWords("a supply limit below the nominal one", "voltage"),
+    "torque_ripple": EffectWords("torque ripple", None),
+    "gear_loss": EffectWords("a loss in the gear", "loss"),
+    "backlash": EffectWords("backlash", "gap"),
+    "joint_compliance": EffectWords("a compliant joint", "compliance"),
+    "payload": EffectWords("a load other than the model's", "mass"),
+    "link_mass": EffectWords("a link of another mass", "added"),
+    "centre_of_mass": EffectWords("a centre of mass elsewhere", "shift"),
+    "base_tilt": EffectWords("a base that is not level", None),
+    "spring_torque": EffectWords("a spring or cable that pulls", "stiffness"),
+    "periodic_disturbance": EffectWords("a periodic torque from outside", None),
+    "potentiometer_gain": EffectWords("a wrong scale of the potentiometer", "relative"),
+    "potentiometer_offset": EffectWords("a shifted potentiometer", "offset"),
+    "potentiometer_nonlinearity": EffectWords("a potentiometer that bends", None),
+    "input_delay": EffectWords("a delay of the drive", "time"),
+    "wrong_gain": EffectWords("a controller gain other than assumed", "relative"),
+    "lost_set_points": EffectWords("lost set points", "share"),
+}
+"""Every effect of the shared list."""
+
+IN_TORQUES = {
+    "viscous_friction": "a {torque} against the motion grows in proportion to speed",
+    "coulomb_friction": "a constant {torque} opposes motion and changes sign with its direction, at any speed",
+    "load_dependent_friction": "a {torque} opposes motion in proportion to the weight on the joint",
+    "stribeck_friction": "a {torque} against slow motion fades as the joint gets faster",
+    "stiction": "more {torque} is needed to set the joint in motion than to keep it moving",
+    "direction_dependent_friction": "motion one way takes more {torque} than the other way",
+    "back_emf_error": "the drive lacks {torque} in proportion to speed, as with a larger back-EMF",
+    "resistance_drift": "the drive gives less {torque} the longer and harder it has worked",
+    "motor_inductance": "{torque} follows the drive with a lag that dies out exponentially",
+    "dead_zone": "a constant part of the drive has no effect, whether the drive is large or small",
+    "supply_limit": "above a certain drive the {torque} does not rise any more",
+    "torque_ripple": "the {torque} goes up and down with the {angle}, at a fixed number of cycles a {turn}",
+    "gear_loss": "a share of the driving {torque} is missing whenever the motor drives, and comes back when it brakes",
+    "backlash": "{torque} is missing or in excess each time the load on the gear changes sides",
+    "joint_compliance": "{torque} is missing in proportion to how its own rate changes: the rotor winds up a spring",
+    "payload": "{torque}s are missing as with a mass at the end of the arm, on all joints that carry it",
+    "link_mass": "{torque}s are missing as with mass spread along this link",
+    "centre_of_mass": "{torque}s are missing as with mass further out along this link",
+    "base_tilt": "{torque}s are missing as with gravity from another direction",
+    "spring_torque": "a {torque} grows with the {angle} from a rest position",
+    "periodic_disturbance": "a {torque} repeats at a fixed frequency whatever the joint does",
+    "potentiometer_gain": "{torque}s fit when all {angle}s are read on another scale",
+    "potentiometer_offset": "{torque}s fit when all {angle}s are shifted",
+    "potentiometer_nonlinearity": "{torque}s fit when the {angle}'s reading is bent over its range",
+    "input_delay": "{torque} follows the drive with a constant delay",
+}
+"""What each effect looks like in a balance of torques, with the words of `TURNING` or `SLIDING`."""
+TURNING = {"torque": "torque", "angle": "angle", "turn": "turn"}
+SLIDING = {"torque": "force", "angle": "position", "turn": "metre"}
+"""Words for joints that turn, and for joints that slide."""
+
+
+def words_of(effect: str) -> EffectWords:
+    """The entry of an effect; of the user's own effects, its identifier in words."""
+    if effect in WORDS:
+        return WORDS[effect]
+    called = effect.replace("_", " ")
+    return EffectWords(called if effect in effect_names() else f"{called} (an effect of the user's own)", None)
+
+
+def size_of(effect: str, parameters: Mapping[str, FoundValue], joint: int = 0) -> FoundValue | None:
+    """The parameter that is the size of an effect: that of a joint, where several have one."""
+    size = words_of(effect).size
+    sizes = {n: v for n, v in parameters.items() if n.rpartition(".")[2] == size}
+    own = [v for n, v in sizes.items() if of_joint(n, joint)] or list(sizes.values())
+    return own[0] if own else None
+
+
+def of_joint(name: str, joint: int) -> bool:
+    """Whether a parameter belongs to a joint, alone or with others."""
+    first = name.partition(".")[0]
+    return first == f"joint{joint}" or (first.startswith("joints") and str(joint) in first[6:].split("+"))
+
+
+def shape_in_torques(effect: str, *, slides: bool) -> str:
+    """What an effect looks like in a balance of torques; of the user's own effects, the equation."""
+    if effect in IN_TORQUES:
+        return IN_TORQUES[effect].format(**(SLIDING if slides else TURNING))
+    known = effect_names()
+    return known[effect].line if effect in known else effect_of(effect).physics

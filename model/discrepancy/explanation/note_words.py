@@ -1,0 +1,136 @@
+"""Notes in words. A part of the renderer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from model.discrepancy.grounds import Note, NoteKind
+from model.effects.names import effect_name
+
+Values = Mapping[str, Any]
+
+
+def note_words(note: Note) -> str:
+    """The note as a clause."""
+    return WORDS[note.kind](note.values)
+
+
+def _cutoff(v: Values) -> str:
+    return f"torques are compared below {v['cutoff']:g} Hz; faster effects are not seen"
+
+
+def _drive_timing(v: Values) -> str:
+    times = ", ".join(f"{1e3 * t:.2g} ms" for t in v["delays"])
+    return (
+        f"the drive acts {times} after its sample, less than the {1e3 * v['period']:.2g} ms between samples: this is "
+        "taken as the way in which the drive is held between samples, not as an effect"
+    )
+
+
+def _errors_follow_record(v: Values) -> str:
+    return (
+        "errors, their floor and the map are of a simulation whose controller is given the simulated reading moved "
+        f"{v['share']:g} of the way to the recorded one; reasons give sizes of the closed loop alone"
+    )
+
+
+def _no_experiment_left(v: Values) -> str:
+    return f"no experiment within the limits{_within(v)} is left that could tell {' from '.join(v['candidates'])}"
+
+
+def _not_looked_for(v: Values) -> str:
+    return "not looked for: " + "; ".join(f"{effect_name(name)} {why}" for name, why in v["effects"].items())
+
+
+def _not_separable(v: Values) -> str:
+    pairs = "; ".join(f"{one} and {other} ({most:.1f} at most)" for one, other, most in v["pairs"])
+    return f"no experiment within the limits{_within(v)} separates these by {v['least']:g} standard deviations: {pairs}"
+
+
+def _nothing_held_out(_: Values) -> str:
+    return "no held-out trace was given: nothing here has been shown on data it was not fitted to"
+
+
+def _positions_of_links(_: Values) -> str:
+    return "positions are taken to be those of the links, behind the transmission"
+
+
+def _resting_left_out(_: Values) -> str:
+    return "samples at which a joint rests are left out: friction holds it with whatever torque that takes"
+
+
+def _stated_numbers_moved(v: Values) -> str:
+    numbers = v["numbers"]
+    listed = ", ".join(
+        f"{n['name']} {_with_unit(n['value'], n['unit'])} ({n['deviations']:.0f} deviations; "
+        f"{n['expected']:.4g} stated)"
+        for n in numbers
+    )
+    subject, own = ("this number", "its") if len(numbers) == 1 else ("these numbers", "their")
+    return (
+        f"{subject} came out more than {v['limit']:g} of {own} stated deviations from what is expected: {listed}. File "
+        "and records may not be of the same machine (units, signs, the direction of gravity?), or an effect is missing "
+        "that was not found"
+    )
+
+
+def _taken_out_again(v: Values) -> str:
+    return f"{effect_name(v['effect'])}, step {v['step']}, was taken out again: a later effect explains it"
+
+
+def _tolerances_fitted_first(v: Values) -> str:
+    traces = "1 trace" if v["traces"] == 1 else f"{v['traces']} traces"
+    return (
+        "numbers that may be a little off on a sound machine (tolerance parameters) were fitted first, to "
+        f"{traces}, within what the machine file states"
+    )
+
+
+def _tolerance_source(v: Values) -> str:
+    match v["source"]:
+        case "stated":
+            return "parameters may be off by what the machine file states"
+        case "fitted-before":
+            return f"the machine file states no deviations; fitted bodies are taken to be known to {v['share']:.0%}"
+        case _:
+            return "the machine file states no deviations; masses, centres and inertias are free"
+
+
+def _torque_left(v: Values) -> str:
+    records = "held-out traces" if v["held_out"] else "the traces fitted to"
+    return f"torque left unexplained on {records}: {v['before']:.1%} of the recorded before, {v['after']:.1%} after"
+
+
+def _unfinished_record(v: Values) -> str:
+    return (
+        f"trace {v['trace']} was not recorded to its end ({v['outcome']}); the {v['seconds']:.1f} s that there are "
+        "were used"
+    )
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
+
+
+def _within(v: Values) -> str:
+    return "" if v["budget"] is None else f" and {v['budget']:.0f} s"
+
+
+WORDS: dict[NoteKind, Callable[[Values], str]] = {
+    "cutoff": _cutoff,
+    "drive-timing": _drive_timing,
+    "errors-follow-record": _errors_follow_record,
+    "no-experiment-left": _no_experiment_left,
+    "not-looked-for": _not_looked_for,
+    "not-separable": _not_separable,
+    "nothing-held-out": _nothing_held_out,
+    "positions-of-links": _positions_of_links,
+    "resting-left-out": _resting_left_out,
+    "stated-numbers-moved": _stated_numbers_moved,
+    "taken-out-again": _taken_out_again,
+    "tolerances-fitted-first": _tolerances_fitted_first,
+    "tolerance-source": _tolerance_source,
+    "torque-left": _torque_left,
+    "unfinished-record": _unfinished_record,
+}

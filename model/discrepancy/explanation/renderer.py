@@ -1,0 +1,343 @@
+"""Makes the sentences of an answer from its data: the last step of a diagnosis, and the only place that words it.
+
+Whoever wants to know something of an answer reads its data; sentences are for people and are not read back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from daq.contracts.errors import SpecError
+from model.discrepancy.diagnosis import (
+    CLEAR_SHAPE,
+    FEWEST_BINS,
+    UNWRITTEN,
+    Candidate,
+    Diagnosis,
+    DifferencePlace,
+    FoundValue,
+    NextExperiment,
+    Phase,
+    RemainingShape,
+    Step,
+    Where,
+    clear_shape,
+    in_order,
+)
+from model.discrepancy.explanation.effect_words import shape_in_torques, size_of, words_of
+from model.discrepancy.explanation.note_words import note_words
+from model.discrepancy.explanation.pattern_words import pattern_words
+from model.discrepancy.grounds import NamedEffect, Reason, Refusal
+from model.discrepancy.numbers import from_to, plain
+from model.effects.names import capitalised, effect_on, joints_in_words
+
+NOTICEABLE = 0.98
+"""Ratio of the errors with and without an effect, above which the effect hardly changes the error."""
+ALL = 0.95
+"""Share of the evidence; with a margin above it, the next best candidate has next to no evidence."""
+PHASES: Mapping[Phase, str] = {
+    "ramp_start": "as motion starts",
+    "steady_ramp": "in steady motion",
+    "reversal": "after reversals",
+    "creep": "in slow motion",
+    "hold": "at rest",
+}
+
+
+def with_sentences(answer: Diagnosis) -> Diagnosis:
+    """The answer with its sentences. What has no data, as in older answers, keeps the text that it has."""
+    asked = answer.next_experiment
+    written = answer.model_copy(
+        update={
+            "steps": tuple(map(step_with_sentences, answer.steps)),
+            "where": None if answer.where is None else where_with_summary(answer.where),
+            "next_experiment": None if asked is None else _experiment_with_reason(asked),
+            "notes": tuple(sentence(note_words(n)) for n in answer.notes_data) or answer.notes,
+        }
+    )
+    return written.model_copy(update={"summary": summary(written)})
+
+
+def step_with_sentences(step: Step) -> Step:
+    """The step with its reason, its place, and why it was refused."""
+    update: dict[str, object] = {"where": where_with_summary(step.where)}
+    if step.proof is not None:
+        update["where"] = step.where.model_copy(update={"summary": sentence(_proof(step))})
+    if step.proof is not None or step.reason_data is not None:
+        update["reason"] = reason_text(step)
+    if step.refusal is not None:
+        update["rejected_because"] = refusal_words(step.refusal)
+    return step.model_copy(update=update)
+
+
+def where_with_summary(where: Where) -> Where:
+    """The place with its summary."""
+    if where.worst is None and where.summary != UNWRITTEN:
+        return where
+    return where.model_copy(update={"summary": sentence(_place(where))})
+
+
+def sentence(words: str) -> str:
+    """A clause as a sentence."""
+    return f"{capitalised(words)}."
+
+
+def reason_text(step: Step) -> str:
+    """What speaks for the effect of a step, in one to three sentences, with the numbers of the step as it is now."""
+    if step.proof is not None:
+        return sentence(f"{_proof(step)}; this needs no model of the arm")
+    reason = step.reason_data
+    if reason is None:
+        return step.reason
+    if reason.pattern is None or reason.units is None:
+        return sentence(_torque_reason(step, reason))
+    others = [j for j in step.joints if j != reason.joint]
+    alike = f" (and likewise {joints_in_words(others)})" if others else ""
+    called = words_of(step.effect or "").called + _size(step.effect or "", step.parameters, reason.joint or 0)
+    seen = f"joint {reason.joint} {pattern_words(reason.pattern, reason.units)}{alike}"
+    sentences = [sentence(f"{seen}: {called}{_taken_off(reason)}")]
+    if reason.rival is not None:
+        sentences.append(sentence(_beaten(reason.rival, step)))
+    if step.where.joint is None or (step.joints and step.where.joint not in step.joints):
+        sentences.append("What shows it is the pattern over the whole record, not one place.")
+    return " ".join(sentences)
+
+
+def refusal_words(refusal: Refusal) -> str:
+    """Why an effect was not taken into the model, as a clause."""
+    n = refusal.numbers
+    match refusal.kind:
+        case "diverges":
+            return "with it, the simulation of the held-out traces does not stay finite"
+        case "error-grows":
+            return f"the error on the held-out traces grows, by {n['share']:.0%} of what is beyond noise there"
+        case "error-rises":
+            return (
+                f"the error on the held-out traces rises: its sum of squares by {n['rise']:.0f} ± {n['deviation']:.0f} "
+                "variances of a reading"
+            )
+        case "falls-too-little":
+            return f"on records not fitted to, the mean square falls by only {n['share']:.1%}"
+        case "only-resembles":
+            return (
+                "it only resembles what is missing: with all that was found, "
+                f"{joints_in_words(refusal.joints)} still {'disagrees' if len(refusal.joints) == 1 else 'disagree'} "
+                "beyond noise"
+            )
+        case "superfluous":
+            return "a later effect explains what it explained"
+
+
+def summary(answer: Diagnosis) -> str:
+    """The answer in a few sentences, from its verdict, its steps and what is left."""
+    adopted = [s for s in answer.steps if s.adopted]
+    match answer.verdict:
+        case "nothing-significant":
+            return _nothing(next((s for s in answer.steps if not s.adopted), None))
+        case "unknown-effect":
+            return _unknown(answer)
+        case "named" | "ambiguous":
+            parts = [_undecided(s.group, s.where) if s.group else reason_text(s) for s in adopted]
+            rest = ["Something is left that none of the known effects explains."] if answer.remaining else []
+            return " ".join([*parts, *rest])
+
+
+def shape_words(shape: RemainingShape) -> str:
+    """A torque that is left, and what it goes with."""
+    torques = [t for t in shape.torque if t is not None]
+    return (
+        f"a torque at joint {shape.joint} of {plain(min(torques))} to {plain(max(torques))} {shape.torque_unit} that "
+        f"goes with {shape.against}"
+    )
+
+
+def what_is_left(remaining: Sequence[RemainingShape]) -> str:
+    """What the torque that is left goes with, and whether that is clear enough to invent an effect. A clause."""
+    if not remaining:
+        return "what is left has no shape against time, position, speed, direction or drive"
+    clear = clear_shape(remaining)
+    best = remaining[0] if clear is None else clear
+    share = f"{100 * best.explained:.0f} % of what is left"
+    if clear is not None:
+        return f"{shape_words(best)} explains {share}"
+    if best.explained < CLEAR_SHAPE:
+        return f"no clear shape: the best, {shape_words(best)}, explains only {share}"
+    few = f"rests on {best.filled_bins} of the {FEWEST_BINS} bins that a shape needs"
+    return f"no clear shape: the best, {shape_words(best)}, explains {share}, but {few}"
+
+
+def best_tried(candidates: Sequence[Candidate], needed: float) -> str:
+    """How near the best of the candidates, none of which was added, has come to the evidence that is needed."""
+    fitted, probed = in_order(candidates)
+    best = (fitted or probed)[0]
+    name = effect_on(best.effect, best.joints)
+    count = "The only candidate" if len(candidates) == 1 else f"The best of {len(candidates)} candidates"
+    if not fitted:
+        return (
+            f"None of the candidates promised enough to be fitted. {count}, {name}, promises an evidence of "
+            f"{best.evidence:.0f}; an effect is named from {needed:g}."
+        )
+    told = f"{count}, {name}, has an evidence of {best.evidence:.0f}"
+    if best.evidence >= needed:
+        return f"{told}. It is above the {needed:g} from which an effect is named, but takes off no more than noise."
+    return f"{told}; an effect is named from {needed:g}."
+
+
+def _nothing(rejected: Step | None) -> str:
+    """Why no effect is named. `rejected`: a step that was refused on records not fitted to."""
+    if rejected is None or rejected.effect is None:
+        return "Nothing significant: the model explains the traces within noise and stated tolerances."
+    because = rejected.rejected_because or "records not fitted to do not confirm it"
+    return (
+        f"Nothing that records not fitted to confirm: {_called(rejected.effect, rejected.joints)} explains more of the "
+        f"fitted ones, with an evidence of {rejected.evidence:.0f}, but {because}."
+    )
+
+
+def _undecided(group: Sequence[Candidate], where: Where) -> str:
+    """Why several effects are named: they explain the same, within what their evidence can tell apart."""
+    if len(group) < 2:
+        raise SpecError(f"{len(group)} candidates cannot be undecided between; at least 2 are needed")
+    named = ", ".join(f"{_called(c.effect, c.joints)} ({c.evidence:.0f})" for c in group)
+    apart = max(c.evidence for c in group) - min(c.evidence for c in group)
+    return f"{where.summary} These explain it, with evidences that differ by no more than {apart:.0f}: {named}."
+
+
+def _unknown(answer: Diagnosis) -> str:
+    """Why none of the known effects is named, and what a torque that would explain it goes with."""
+    where, joints = answer.where, answer.unexplained_joints
+    places = [] if where is None else [_left_on(joints, where) if joints and where.joint is None else where.summary]
+    parts = [*places, sentence(f"no known effect explains it; {what_is_left(answer.remaining)}")]
+    if answer.worse_held_out:
+        parts.append(
+            "The fit of the tolerance parameters does not hold on held-out traces, where the error of "
+            f"{joints_in_words(answer.worse_held_out)} grows: do not use the model after."
+        )
+    return " ".join(parts)
+
+
+def _left_on(joints: Sequence[int], where: Where) -> str:
+    """What is left on joints whose residual is too large, where the map names no joint."""
+    named = f"{joints_in_words(joints)}: more than noise is left"
+    clearest = max((c for c in where.cells if c.joint in joints), key=lambda c: c.significance, default=None)
+    if clearest is None:
+        return sentence(named)
+    return sentence(
+        f"{named}; the clearest place is joint {clearest.joint} at {clearest.start:.1f} s, "
+        f"by {clearest.significance:.1f} standard deviations"
+    )
+
+
+def _place(where: Where) -> str:
+    """Where simulation and measurement disagree most, as a clause."""
+    worst = where.worst
+    if worst is None:
+        return "no joint moves"
+    phase = PHASES[worst.phase]
+    if where.joint is None or worst.rms is None:
+        return (
+            f"no joint is off by more than noise; the largest residual is that of joint {worst.joint}, "
+            f"{worst.ratio:.2f} times its noise {phase}"
+        )
+    if worst.whole_record or worst.floor is None:
+        times = plain(worst.ratio)
+        return f"joint {worst.joint}, mostly {phase}: {plain(worst.rms, 3)} {worst.unit} rms, {times} times its noise"
+    return f"joint {worst.joint}, {phase}: {worst.rms:.2g} {worst.unit} rms against a floor of {worst.floor:.2g}"
+
+
+def _proof(step: Step) -> str:
+    """What the controller's own recorded numbers prove, as a clause."""
+    assert step.proof is not None
+    joint, samples, of = step.joints[0], step.proof.samples, step.proof.of
+    if step.effect == "wrong_gain":
+        ratio = 1 + next(iter(step.parameters.values())).value
+        share = f"{samples} of {of} samples"
+        return f"joint {joint}: the recorded power is {ratio:.3f} times the gain times the recorded error ({share})"
+    return (
+        f"joint {joint}: the recorded error is not set point − position in {samples} samples, so set points were lost"
+    )
+
+
+def _torque_reason(step: Step, reason: Reason) -> str:
+    """What speaks for an effect in a balance of torques."""
+    place = f"{joints_in_words(step.joints)}: " if step.joints else ""
+    seen = shape_in_torques(step.effect or "", slides=reason.slides)
+    several = len(step.joints) > 1
+    sizes = ", ".join(_torque_size(n, v, several=several, slides=reason.slides) for n, v in step.parameters.items())
+    if reason.removed is None:
+        return f"{place}{seen} ({sizes})"
+    return f"{place}{seen} ({sizes}); it takes {reason.removed:.0%} off the mean square on records not fitted to"
+
+
+def _torque_size(name: str, value: FoundValue, *, several: bool, slides: bool) -> str:
+    group, last = name.partition(".")[0], name.rpartition(".")[2]
+    on = f" of {group}" if several and "joint" in group else ""
+    unit = "" if value.unit == "1" else f" {value.unit}"
+    if last == "cycles":  # rad of phase per rad (m): cycles a turn, or 2π times those a metre
+        unit = f" rad/m, {plain(value.value / (2 * math.pi), 3)} a metre" if slides else " a turn"
+    return f"{last}{on} {plain(value.value, 3)}{unit}"
+
+
+def _taken_off(reason: Reason) -> str:
+    if reason.rms is None:
+        return ""
+    before, after, unit = reason.rms.before, reason.rms.after, reason.rms.unit
+    if after > NOTICEABLE * before:
+        return f", which hardly changes its rms error: it stays near {plain(after)} {unit}"
+    first, last = from_to(before, after)
+    return f", which takes its rms error from {first} to {last} {unit}"
+
+
+def _beaten(rival: NamedEffect, step: Step) -> str:
+    """How far the next best candidate is behind."""
+    if step.margin >= ALL * step.evidence:
+        return f"no other fitted candidate has a twentieth of its evidence of {step.evidence:.0f}"
+    name = _called(rival.effect, rival.joints)
+    if rival.evidence > step.evidence:  # it was ranked first, but came to less when its fit was taken to its end
+        return (
+            f"its completed fit has an evidence of {step.evidence:.0f}, less than the {rival.evidence:.0f} of {name}: "
+            "these traces do not tell which of the two it is"
+        )
+    return f"the next best, {name}, has an evidence of {rival.evidence:.0f}, and this has {step.evidence:.0f}"
+
+
+def _size(effect: str, parameters: Mapping[str, FoundValue], joint: int) -> str:
+    """“, 0.93° (0.90 to 0.96)”, or nothing where the effect has no single size."""
+    value = size_of(effect, parameters, joint)
+    if value is None:
+        return ""
+    factor, unit = {"rad": (math.degrees(1.0), "°"), "1": (100.0, " %"), "s": (1e3, " ms"), "H": (1e3, " mH")}.get(
+        value.unit, (1.0, f" {value.unit}")
+    )
+    interval = ""
+    if value.low is not None and value.high is not None:
+        interval = f" ({plain(value.low * factor, 3)} to {plain(value.high * factor, 3)})"
+    return f", {plain(value.value * factor, 3)}{unit}{interval}"
+
+
+def _called(effect: str, joints: Sequence[int]) -> str:
+    called = words_of(effect).called
+    return f"{called} on {joints_in_words(joints)}" if joints else called
+
+
+def _experiment_with_reason(asked: NextExperiment) -> NextExperiment:
+    if asked.information is not None:
+        words = (
+            f"{asked.description}: it excites what these traces do not, and would add {asked.information:.0f} nats of "
+            "information on the arm's parameters"
+        )
+    elif asked.differs_at is not None:
+        first, second = asked.hardest
+        words = (
+            f"{asked.description}: {first} and {second} would differ by {asked.predicted_separation:.1f} standard "
+            f"deviations with the other parameters refitted, {_most_of_it(asked.differs_at)}"
+        )
+    else:
+        return asked
+    return asked.model_copy(update={"reason": sentence(words)})
+
+
+def _most_of_it(at: DifferencePlace) -> str:
+    joint = f"on joint {at.joint} " if at.other_joint else ""
+    return f"{100 * at.share:.0f} % of it {joint}{PHASES[at.phase]}"

@@ -1,0 +1,53 @@
+"""What a model leaves of records: the subject of every question about where it disagrees."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError
+from model.fitting.records import Record
+from model.machine_model.model import Model
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Residuals of a model's simulation, record by record.
+
+    Args:
+        signals: (m, n) measured − simulated per record, in the unit of the measurement.
+        deviations: (n,) standard deviation of such a residual when nothing is wrong.
+
+    Raises:
+        SpecError: for residuals that do not belong to the records, or deviations that are not positive.
+    """
+
+    model: Model
+    records: Sequence[Record]
+    signals: Sequence[Floats]
+    deviations: Floats
+
+    def __post_init__(self) -> None:
+        if len(self.records) != len(self.signals):
+            raise SpecError(
+                f"{len(self.signals)} residuals for {len(self.records)} records: one (m, n) array a record is needed"
+            )
+        for record, residual in zip(self.records, self.signals, strict=True):
+            if residual.shape != record.measured.shape:
+                raise SpecError(
+                    f"residual of {record.name} has shape {residual.shape}: one (m, n) array a record is needed, here "
+                    f"{record.measured.shape}"
+                )
+        if not (np.isfinite(self.deviations).all() and (self.deviations > 0).all()):
+            raise SpecError(f"deviations of the noise {self.deviations}: must be positive numbers")
+
+    def of_joint(self, column: int) -> Floats:
+        """The compared samples of one joint (index from 0), all records in a row."""
+        return np.concatenate(
+            [s[run, column] for s, record in zip(self.signals, self.records, strict=True) for run in record.runs]
+        )

@@ -1,0 +1,276 @@
+"""A candidate fitted together with all tolerance parameters, and its evidence.
+
+Evidence is the fall of −2 ln posterior, each model with a noise model of its own, less what the candidate's freedom
+costs: ln n for every free parameter (BIC), and for a tone 2 ln of the number of frequencies that were tried.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError
+from model.discrepancy.candidates.library import TONES, Hypothesis
+from model.discrepancy.candidates.probing import Probe
+from model.discrepancy.candidates.tones import tones_tried
+from model.discrepancy.output_error.noise_model import AutoregressiveNoise, fit_noise_model
+from model.discrepancy.output_error.observation import Observation
+from model.discrepancy.output_error.search import Point, converge, descend, point_at
+from model.fitting.unknowns import Unknown
+
+Floats = NDArray[np.float64]
+
+STEPS = 8
+"""Steps of a search for a candidate's fit."""
+POLISHING = 4
+"""Steps of the searches that take a fit to its end."""
+LOST = 1.1
+"""Fits that end above this multiple of the baseline cost are discarded as not converged."""
+AGAIN = 3
+"""Searches of a restarted fit, at most: the best candidate is taken to its end later."""
+BETTER = 3.0
+"""Fall of the cost from which a fit counts as better; less is another place on the same flat ground."""
+STRANGE = 1.15
+"""Misfit from which a fit has not explained the record, perhaps because it ended in a wrong place: it is restarted."""
+STRAINED = 4.0
+"""Deviation from a prior's mean, in its standard deviations, from which a fit is restarted as well."""
+SHAPE_PRIOR = 3.0
+"""Prior width of a parameter that only shapes an effect, in its expected deviations: it keeps the parameter from
+running away where the effect is too small to show its shape."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A point with the noise model of its residual."""
+
+    point: Point
+    noise: AutoregressiveNoise
+
+    @property
+    def description(self) -> float:
+        """−2 ln posterior, up to a constant."""
+        return self.noise.description + self.point.prior
+
+
+@dataclass(frozen=True)
+class CandidateFit:
+    """A candidate, fitted: the probe that it began from, the fit that it led to, and its evidence."""
+
+    probe: Probe
+    fit: Fit
+    evidence: float
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        """What was fitted."""
+        return self.probe.hypothesis
+
+    @property
+    def misfit(self) -> float:
+        """Mean square of the weighted residual."""
+        return self.fit.point.misfit
+
+
+def same_answer(one: CandidateFit, better: CandidateFit) -> bool:
+    """Whether a candidate says the same of the machine as one that is ranked above it."""
+    return says_no_more(one.hypothesis.name, one.hypothesis.joints, better.hypothesis.name, better.hypothesis.joints)
+
+
+def says_no_more(
+    effect: str | None, joints: Sequence[int], of_better: str | None, joints_of_better: Sequence[int]
+) -> bool:
+    """Whether an effect says the same of the machine as one ranked above it, or only some of it: it is the same effect
+    on fewer joints, or on more, which then brought nothing."""
+    own, others = set(joints), set(joints_of_better)
+    return effect == of_better and (own <= others or own > others)
+
+
+def judge(point: Point) -> Fit:
+    """The point with the noise model of its own residual."""
+    return Fit(point, fit_noise_model(point.observation.by_joint(point.weighted)))
+
+
+def refit(before: Fit, probe: Probe, goal: float | None = None) -> CandidateFit | None:
+    """The candidate fitted from where its probe points to.
+
+    Where that leads nowhere, it is fitted from the expected numbers: a strong effect may have driven the tolerance
+    parameters far off. With a `goal`, the cost at which it would be a rival of a candidate that has explained the
+    record, only the first way is tried, and only as long as the goal is within reach. None where no simulation stays
+    finite, or all end far above the cost without the effect.
+    """
+    found: list[Point] = []
+    lost = LOST * before.point.cost
+    ways = (_nearby, partial(_from_expected, goal=lost)) if goal is None else (partial(_nearby, goal=goal),)
+    for fit in ways:
+        try:
+            point = fit(before.point, probe)
+        except SpecError:
+            continue  # on the verge of instability, as where a delay is missing
+        if point is not None:
+            found.append(point)
+            if point.cost < before.point.cost:
+                break
+    best = min(found, key=lambda p: p.cost, default=None)
+    return None if best is None or best.cost > lost else with_evidence(before, probe, best)
+
+
+def nearest(before: Point, begun: Sequence[Probe]) -> Probe:
+    """Of several starts of a fit of the same effect, the one that explains most. Raises SpecError."""
+
+    def cost(probe: Probe) -> float:
+        point = _start(before, probe)
+        return point.cost if point.is_finite else math.inf
+
+    return begun[0] if len(begun) == 1 else min(begun, key=cost)
+
+
+def _nearby(before: Point, probe: Probe, goal: float = math.inf) -> Point | None:
+    """A fit from where the probe points to."""
+    point = _start(before, probe)
+    changing = _indices(point.unknowns, [p.name for p in probe.hypothesis.free])
+    return descend(point, STEPS, changing, goal) if point.is_finite else None
+
+
+def _from_expected(before: Point, probe: Probe, goal: float) -> Point | None:
+    """A fit from the expected values of all that has a prior, and the best of the candidate's trials there.
+
+    It is fitted in closed loop first. None where it explains less there than the baseline does; given up when it would
+    not come to a cost of `goal`.
+    """
+    closed_loop = before.observation.with_feedback_share(0.0)
+    best: Point | None = None
+    for trial in probe.hypothesis.trials:
+        start = replace(probe, start=trial, moved=np.zeros_like(probe.moved))
+        tried = _start(before, start, closed_loop, expected=True)
+        if tried.is_finite and (best is None or tried.cost < best.cost):
+            best = tried
+    if best is None:
+        return None
+    near = converge(best, STEPS, most=1)
+    if near.cost > before.on(closed_loop, before.tangents).cost:
+        return None
+    return converge(near.on(before.observation, near.tangents), STEPS, AGAIN, goal)
+
+
+def polish(before: Fit, found: CandidateFit) -> CandidateFit:
+    """The fit continued with new derivatives by everything on the candidate's joints: a strong effect changes what the
+    tolerance parameters do there."""
+    point = found.fit.point
+    joints = found.hypothesis.joints or point.model.machine.modelled_joints
+    near = [k for k, u in enumerate(point.unknowns) if not u.joints or set(u.joints) & set(joints)]
+    free = _indices(point.unknowns, [p.name for p in found.hypothesis.free])
+    try:
+        point = descend(point.with_new_tangents(near), POLISHING, free)
+    except SpecError:
+        return found
+    better = with_evidence(before, found.probe, point)
+    return better if better.fit.point.cost < found.fit.point.cost else found
+
+
+def restart(before: Fit, found: CandidateFit, goal: float = math.inf) -> CandidateFit:
+    """The fit, or a better one from the expected numbers, where it leaves the record unexplained or needs an unlikely
+    number: a descent from where a strong effect has driven the tolerance parameters may end in another minimum.
+
+    Given up when it would not come to a cost of `goal`.
+    """
+    if found.misfit < STRANGE and _strain(found.fit.point) < STRAINED:
+        return found
+    try:
+        point = _from_expected(before.point, found.probe, min(goal, found.fit.point.cost))
+    except SpecError:
+        return found
+    if point is None or not point.cost < found.fit.point.cost - BETTER:
+        return found
+    return with_evidence(before, found.probe, point)
+
+
+def diverged_from_prior(point: Point) -> bool:
+    """Whether a strong effect has driven the tolerance parameters to unlikely numbers, and still shows."""
+    return point.misfit >= STRANGE and _strain(point) >= STRAINED
+
+
+def _strain(point: Point) -> float:
+    """The largest deviation from a prior's mean, in its standard deviations."""
+    return float(np.max(np.abs(point.values - point.expected) * np.sqrt(point.precision), initial=0.0))
+
+
+def finish(before: Fit, found: CandidateFit) -> CandidateFit:
+    """The fit taken to its end, all derivatives computed there."""
+    try:
+        point = converge(found.fit.point, POLISHING)
+    except SpecError:
+        return found
+    better = with_evidence(before, found.probe, point)
+    return better if better.fit.point.cost < found.fit.point.cost else found
+
+
+def improved_baseline(before: Fit, found: CandidateFit) -> Fit | None:
+    """A better fit without the candidate, from the values that the candidate's fit has found for all other unknowns.
+
+    Such a fall of the cost is not the candidate's: the search before it had not come to its end. None where there is no
+    better fit.
+    """
+    point = before.point
+    values = np.array([found.fit.point.value(u.name) for u in point.unknowns])
+    try:
+        tried = point.moved_to(values)
+        if not tried.cost < point.cost - BETTER:
+            return None
+        better = judge(converge(tried, STEPS))
+    except SpecError:
+        return None
+    return better if better.point.cost < point.cost - BETTER else None
+
+
+def _start(before: Point, probe: Probe, observation: Observation | None = None, *, expected: bool = False) -> Point:
+    """The point with the candidate's parameters among the unknowns, at the values of the probe.
+
+    Args:
+        observation: another one than the point's. expected: all that has a prior is at its mean.
+    """
+    hypothesis = probe.hypothesis
+    names = {p.name for p in hypothesis.free}
+    kept = [k for k, u in enumerate(before.unknowns) if u.name not in names]
+    unknowns = [before.unknowns[k] for k in kept]
+    there = before.values + probe.moved
+    values = [float(np.clip(there[k], before.unknowns[k].low, before.unknowns[k].high)) for k in kept]
+    for p in hypothesis.free:
+        low, high = hypothesis.bounds.get(p.name, (p.low, p.high))
+        low, high = max(low, p.low), min(high, p.high)
+        start = float(np.clip(probe.start.get(p.name, p.value), low, high))
+        shape = p.null is None
+        deviation = SHAPE_PRIOR * p.deviation if shape and p.deviation else None
+        unknowns.append(Unknown(p, start, low, high, start if shape else 0.0, deviation))
+        values.append(start)
+    if expected:
+        values = [u.expected if u.deviation is not None else v for u, v in zip(unknowns, values, strict=True)]
+    tangents = np.concatenate([before.tangents[kept], np.zeros((len(hypothesis.free), before.tangents.shape[1]))])
+    model, there = hypothesis.model, np.array(values)
+    return point_at(observation or before.observation, model, unknowns, there, tangents)
+
+
+def with_evidence(before: Fit, probe: Probe, point: Point) -> CandidateFit:
+    """The evidence for the candidate of a probe, from the point that its fit has led to."""
+    after = judge(point)
+    fall = before.description - after.description
+    if point.cost > before.point.cost:  # not converged: with more freedom, the cost cannot rise
+        fall = min(fall, before.point.cost - point.cost)
+    return CandidateFit(probe, after, fall - price_of(point.observation, probe.hypothesis))
+
+
+def price_of(observation: Observation, hypothesis: Hypothesis) -> float:
+    """What a candidate's freedom costs in evidence."""
+    count = len(hypothesis.free)
+    if hypothesis.name not in TONES:
+        return count * math.log(observation.samples)
+    of_frequency = 2 * math.log(tones_tried(observation, hypothesis))
+    return of_frequency + (count - 1) * math.log(observation.samples)
+
+
+def _indices(unknowns: Sequence[Unknown], names: Sequence[str]) -> list[int]:
+    return [k for k, u in enumerate(unknowns) if u.name in names]

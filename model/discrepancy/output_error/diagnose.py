@@ -1,0 +1,279 @@
+"""A diagnosis by output error: locate, try, add and show what an effect brings, until nothing significant is left."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from daq.contracts.errors import SpecError
+from daq.contracts.progress import Cancel, Progress
+from daq.contracts.trace import Trace
+from model.discrepancy.candidates.decision import Added, decide
+from model.discrepancy.candidates.estimates import listed, only_probed
+from model.discrepancy.candidates.probing import Probe
+from model.discrepancy.candidates.ranking import Ranking, rank
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, Step, Where
+from model.discrepancy.experiment_design.next_experiment import Asked, Asker, rivals_of
+from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
+from model.discrepancy.explanation.renderer import with_sentences
+from model.discrepancy.grounds import Note
+from model.discrepancy.localisation.statistics import chance_significance
+from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, improved_baseline, judge
+from model.discrepancy.output_error.case import Case, build_case, errors_of_fit
+from model.discrepancy.output_error.controller_evidence import (
+    check_controller,
+    proved_step,
+    settled_by_records,
+    with_findings,
+    with_used_set_points,
+)
+from model.discrepancy.output_error.holdout import hold_out
+from model.discrepancy.output_error.last_fit import update_to_last_fit
+from model.discrepancy.output_error.observation import Observation, observe
+from model.discrepancy.output_error.search import Point, converge, descend, point_at
+from model.discrepancy.output_error.step import LAST_STEPS, make_step
+from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
+from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn, worse_held_out
+from model.fitting.unknowns import Unknown
+from model.machine_model.model import Lineage, Model
+
+CHANCES = 3
+"""Candidates of one ranking that held-out traces may refuse before the search ends."""
+NEARER = (0.0, 0.5)
+"""Feedback shares of the fits that come before the first one with the full share."""
+FIRST_STEPS = 6
+"""Steps of a search in these fits, before derivatives are computed anew."""
+
+
+def diagnose_by_simulation(
+    model: Model,
+    traces: Sequence[Trace],
+    holdout: Sequence[Trace],
+    options: DiagnosisOptions,
+    progress: Progress,
+    cancel: Cancel,
+    ask: Asker | None,
+) -> Diagnosis:
+    """The answer to traces with set points from a machine with a controller, as `workflow.diagnose` describes."""
+    begun = time.perf_counter()
+    progress(0.0, "checking the controller's own numbers")
+    findings = check_controller(traces, model.machine, model)
+    excluded = settled_by_records(traces, model.machine)
+    if any(f.effect == "lost_set_points" for f in findings):  # the set points that were used are known to the count
+        traces, holdout = (tuple(map(with_used_set_points, some)) for some in (traces, holdout))
+    progress(0.02, "fitting the tolerance parameters")
+    known = with_findings(model, findings)
+    given = _given_point(*observe(known, traces))
+    fitted = judge(_fit_tolerances(given))
+    case = build_case(fitted.point, traces, hold_out(known, holdout), options, excluded)
+    search = _add_effects(case, _Search(first=fitted, current=fitted), progress, cancel)
+    progress(0.95, "writing the answer")
+    proved = tuple(proved_step(given.observation, f) for f in findings)
+    answer = _answer(case, model, given, search, proved, ask, tuple(holdout))
+    progress(1.0, "done")
+    return answer.model_copy(update={"seconds": time.perf_counter() - begun})
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The state of the search for missing effects.
+
+    first: the fit before any effect was added. current: the fit now. steps: one for every ranking with something to
+    say. before: the fit that each of them began from. rivals: candidates close to the last added effect. probes: all so
+    far. tried: the last ranking, where nothing was added. ended: whether the search is over.
+    """
+
+    first: Fit
+    current: Fit
+    steps: tuple[Step, ...] = ()
+    before: tuple[Fit, ...] = ()
+    rivals: tuple[CandidateFit, ...] = ()
+    probes: tuple[Probe, ...] = ()
+    tried: Ranking | None = None
+    ended: bool = False
+
+    @property
+    def added(self) -> list[Added]:
+        """The effects in the current fit."""
+        return [Added(s.effect, s.joints, s.evidence) for s in self.steps if s.adopted]
+
+
+def _given_point(observation: Observation, model: Model, unknowns: Sequence[Unknown]) -> Point:
+    """The model as it was given; its derivatives are left at zero. Wrong gains, which the controller's own numbers
+    prove, stay as they are."""
+    free = tuple(u for u in unknowns if u.parameter.effect != "wrong_gain")
+    values = np.array([u.start for u in free])
+    return point_at(observation, model, free, values, np.zeros((len(free), observation.samples)))
+
+
+def _fit_tolerances(given: Point) -> Point:
+    """The tolerance parameters fitted to the end, because their remaining error would look like an effect.
+
+    The closed loop is fitted first, which is robust far from the solution. If that leads to instability, as a strong
+    effect can, the fit starts again from the given model.
+    """
+    near = given
+    for share in NEARER:
+        near = _fit_with_feedback(near, given.observation.with_feedback_share(share)) or near
+    begun = _fit_with_feedback(near, given.observation) or _fit_with_feedback(given, given.observation)
+    if begun is None:
+        raise SpecError("the simulation does not stay finite: the loop is unstable")
+    return converge(begun, LAST_STEPS)
+
+
+def _fit_with_feedback(point: Point, observation: Observation) -> Point | None:
+    """Where a search from a point's values leads on an observation; None where no simulation there stays finite."""
+    try:
+        begun = point.on(observation)
+        return descend(begun, FIRST_STEPS) if begun.is_finite else None
+    except SpecError:
+        return None
+
+
+def _add_effects(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> _Search:
+    """Steps until nothing significant is left, what is left cannot be named, or the most steps are done."""
+    width = 0.8 / case.options.most_steps
+    for number in range(case.options.most_steps):
+
+        def tell(done: float, text: str, begin: float = 0.1 + number * width) -> None:
+            progress(begin + width * done, text)
+
+        search = _add_effect(case, search, tell, cancel)
+        if search.ended:
+            break
+    return search
+
+
+def _add_effect(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> _Search:
+    """The search after one more ranking: with the best candidate that held-out traces do not refuse, if any."""
+    ranking, current = _rank(case, search, progress, cancel)
+    search = replace(search, current=current, probes=(*search.probes, *ranking.probed), tried=ranking)
+    if not search.added:
+        search = replace(search, first=current)
+    for _ in range(CHANCES):
+        decision = decide(ranking, case.thresholds, search.added)
+        step, following = make_step(case, current, ranking, decision)
+        if step is None:
+            break
+        search = replace(search, steps=(*search.steps, step), before=(*search.before, current))
+        if step.adopted:
+            rivals = rivals_of(ranking, decision)
+            return replace(search, current=following, rivals=rivals, tried=None, ended=bool(step.group))
+        ranking = replace(ranking, fitted=tuple(f for f in ranking.fitted if f is not decision.best))
+    return replace(search, ended=True)
+
+
+def _rank(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> tuple[Ranking, Fit]:
+    """The candidates, and the fit that they are compared with: the current one, or a better one that they have led
+    to."""
+    ranking = rank(case, search.current, progress, cancel, search.probes)
+    better = improved_baseline(search.current, ranking.fitted[0]) if ranking.fitted else None
+    if better is None:
+        return ranking, search.current
+    return rank(case, better, progress, cancel), better
+
+
+def _answer(
+    case: Case,
+    model: Model,
+    given: Point,
+    found: _Search,
+    proved: tuple[Step, ...],
+    ask: Asker | None,
+    holdout: tuple[Trace, ...],
+) -> Diagnosis:
+    """The answer that a search has come to, after what is withdrawn of it. It does not know the time that it took."""
+    looked = None if found.added else case.where(found.current.point)
+    left = _unexplained_joints(case, found, looked)
+    answered = verdict((*proved, *found.steps), unexplained=bool(left))
+    if answered == "unknown-effect":
+        found = _withdraw(found, left)
+    current, steps = update_to_last_fit(found.current, found.steps)
+    found, end = replace(found, current=current, steps=steps), current.point
+    where = case.where(end, moving=False) if looked is None else looked  # nothing was added: it is the same point
+    remaining = case.remaining(end) if answered == "unknown-effect" else ()
+    asked = Asked(None) if ask is None else ask.after(answered, end, found.rivals, case.traces)
+    notes = (
+        *on_stated_numbers(_stated(end), end.by_name),
+        Note(kind="tolerances-fitted-first", values={"traces": len(case.traces)}),
+        Note(kind="errors-follow-record", values={"share": FEEDBACK_SHARE_FOR_ERRORS}),
+        *on_unfinished((*case.traces, *holdout)),
+        *(() if holdout else (Note(kind="nothing-held-out"),)),
+        *(() if asked.note is None else (asked.note,)),
+    )
+    held = case.held_errors(*case.held_residuals(given, end))
+    unknown = answered == "unknown-effect"
+    answer = Diagnosis(
+        verdict=answered,
+        summary=UNWRITTEN,
+        method="output-error",
+        unexplained_joints=left if unknown else (),
+        worse_held_out=worse_held_out(held) if unknown else (),
+        steps=(*proved, *found.steps),
+        where=where,
+        candidates=_candidates(found),
+        remaining=remaining,
+        model_before=model,
+        model_after=_with_lineage(model, end, case.names),
+        traces=case.names,
+        holdout=tuple(t.record.trace_id for t in holdout),
+        rmse_fit=case.fitted_errors(given, end),
+        rmse_holdout=held,
+        significant=case.thresholds.significant,
+        seconds=0.0,
+        robot_seconds=float(sum(t.time[-1] - t.time[0] for t in case.traces)),
+        notes_data=notes,
+        next_experiment=asked.experiment,
+    )
+    return with_sentences(answer)
+
+
+def _unexplained_joints(case: Case, found: _Search, where: Where | None) -> tuple[int, ...]:
+    """Joints with an unexplained error on fitted or held-out traces. where: the map of the current point, while no
+    effect has been added."""
+    before, after, named = found.first.point, found.current.point, where is None
+    if named:
+        case = case.with_floors_of(after)
+    held_errors = case.held_errors(*case.held_residuals(before, after))
+    joints = len(case.floor)
+    judged = 0 if case.held is None else case.held.observation.samples
+    counts = case.scoring.samples // joints, judged // joints
+    left = unexplained(case.fitted_errors(before, after), held_errors, case.thresholds, named=named, samples=counts)
+    if where is None:
+        return left
+    closer = unexplained(errors_of_fit(after), (), case.thresholds, named=False, samples=counts)
+    line = chance_significance(len(where.cells), case.thresholds.place)
+    places = [c.joint for c in where.cells if c.significance >= line]
+    return tuple(sorted({*left, *closer, *places}))
+
+
+def _withdraw(found: _Search, left: Sequence[int]) -> _Search:
+    """The search before its first step on a joint that stays unexplained."""
+    wrong = first_to_withdraw(found.steps, left)
+    if wrong is None:
+        return found
+    steps = (*found.steps[:wrong], *(withdrawn(s, left) for s in found.steps[wrong:]))
+    return replace(found, current=found.before[wrong], steps=steps, tried=None)  # it was tried against another point
+
+
+def _candidates(found: _Search) -> tuple[Candidate, ...]:
+    """The last ranking, where nothing was added: fitted candidates by evidence, then those that were only probed."""
+    tried, observation = found.tried, found.current.point.observation
+    return () if tried is None else (*map(listed, tried.fitted), *only_probed(tried, observation))
+
+
+def _stated(point: Point) -> list[Unknown]:
+    """The numbers of the machine itself that a fit may change: no effect's, and no initial posture."""
+    known = point.model.by_name
+    return [u for u in point.unknowns if u.name in known and known[u.name].effect is None]
+
+
+def _with_lineage(model: Model, point: Point, names: tuple[str, ...]) -> Model:
+    """The model of the last fit, and where it comes from."""
+    fit = {"misfit": point.misfit, "fitted": [u.name for u in point.unknowns if u.name in point.model.by_name]}
+    lineage = Lineage(parent=model.identity, traces=names, fit=fit, note="diagnosis")
+    return point.fitted_model.with_lineage(lineage)

@@ -1,0 +1,40 @@
+"""Names of effects and their joints as the field writes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+_PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck", "emf": "EMF"}
+_HYPHENATED = {"back_emf": "back-EMF", "load_dependent": "load-dependent", "direction_dependent": "direction-dependent"}
+
+
+def effect_name(effect: str) -> str:
+    """Coulomb friction, back-EMF error, dead zone."""
+    for identifier, name in _HYPHENATED.items():
+        effect = effect.replace(identifier, name)
+    return " ".join(_PROPER.get(word, word) for word in effect.split("_"))
+
+
+def effect_on(effect: str, joints: Sequence[int]) -> str:
+    """An effect in a sentence: Coulomb friction on joint 2. Of the whole machine, the effect alone."""
+    return f"{effect_name(effect)} on {joints_in_words(joints)}" if joints else effect_name(effect)
+
+
+def placed(effect: str, joints: Sequence[int]) -> str:
+    """An effect in a list: Coulomb friction, joint 2. Of the whole machine, the effect alone."""
+    if not joints:
+        return effect_name(effect)
+    return f"{effect_name(effect)}, joint{'s' if len(joints) > 1 else ''} {'+'.join(map(str, joints))}"
+
+
+def joints_in_words(joints: Sequence[int]) -> str:
+    """joint 2; joints 1 and 2; joints 1, 2 and 3."""
+    names = [str(j) for j in joints]
+    if len(names) == 1:
+        return f"joint {names[0]}"
+    return f"joints {', '.join(names[:-1])} and {names[-1]}"
+
+
+def capitalised(text: str) -> str:
+    """The text with a capital first letter, the rest as it is."""
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,210 @@
+"""The identifiability report: a verdict on every parameter, and the combinations that the data cannot determine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from model.arrays import Floats
+from model.fitting.covariance import inverse
+from model.fitting.directions import NEGLIGIBLE, Direction, undetermined
+from model.fitting.unknowns import Unknown
+
+Verdict = Literal["known", "combination", "unknown"]
+
+KNOWN_SHARE = 0.5
+"""The data alone must narrow a parameter to this share of its natural size for it to be known."""
+LARGEST_DEVIATION = 30.0
+"""Natural sizes; a deviation above it is not a number that means anything, since the model is not linear so far."""
+STRONG_CORRELATION = 0.95
+"""Parameters whose estimates are correlated beyond this belong to one group."""
+WEAKEST_PRIOR = 1e3
+"""Natural sizes; so wide a prior keeps the arithmetic finite where the data say nothing, and decides nothing."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ParameterVerdict(_Part):
+    """What the data say about one parameter.
+
+    `data_deviation` is what the data alone give, all other parameters being free too, `alone` if all others were
+    known exactly; both in the parameter's unit, None where they say nothing. `expected_deviation` is the prior's.
+    """
+
+    name: str
+    unit: str
+    verdict: Verdict
+    reason: str
+    data_deviation: float | None
+    alone: float | None
+    expected_deviation: float | None
+
+
+class Member(_Part):
+    """A parameter's part in a combination: its change relative to its own value (or, at zero, in its unit)."""
+
+    name: str
+    change: float
+    relative: bool
+
+
+class Combination(_Part):
+    """Changes that leave the records as they are, within the noise."""
+
+    text: str
+    members: tuple[Member, ...]
+    torque_scale: bool
+    deviation: float | None
+    """With which the data alone know it, in natural sizes of its largest member; None where they say nothing."""
+
+
+class IdentifiabilityReport(_Part):
+    """What the data of a fit determine, and what they do not."""
+
+    parameters: tuple[ParameterVerdict, ...]
+    undetermined: tuple[Combination, ...]
+    correlated: tuple[tuple[str, ...], ...]
+    """Groups of parameters whose estimates move together (correlation above 0.95, data and priors together)."""
+    torque_scale_free: bool
+
+    def verdict(self, name: str) -> ParameterVerdict:
+        """Of one parameter. Raises KeyError when it was not among the unknowns."""
+        return {p.name: p for p in self.parameters}[name]
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Names of the parameters that the data determine."""
+        return tuple(p.name for p in self.parameters if p.verdict == "known")
+
+
+def judged(jacobian: Floats, values: Floats, unknowns: Sequence[Unknown]) -> IdentifiabilityReport:
+    """The report for a whitened Jacobian (m, p) of the data alone at `values` (p,).
+
+    Nuisances take part with their prior, since they stand for what is known of sensor and start; they get no verdict.
+    Other priors take no part in the verdicts: what is only expected is not known.
+    """
+    natural = np.array([u.scale for u in unknowns])
+    nuisance = np.array([u.nuisance for u in unknowns])
+    claimed = np.array([u.nuisance and u.deviation is not None for u in unknowns])
+    scaled = jacobian * natural
+    information = scaled.T @ scaled + np.diag(np.where(claimed, 1.0, WEAKEST_PRIOR**-2))
+    marginal = np.sqrt(np.diag(inverse(information)))
+    alone = np.linalg.norm(scaled, axis=0)
+    reduced, kept = _without_nuisances(scaled, nuisance, claimed), np.flatnonzero(~nuisance).tolist()
+    own = [unknowns[k] for k in kept]
+    directions = undetermined(reduced / natural[kept], values[kept], natural[kept], [u.torque for u in own])
+    combinations = tuple(_combination(d, own, values[kept]) for d in directions)
+    verdicts = tuple(_verdict(unknowns[k], marginal[k], alone[k], combinations) for k in kept)
+    prior = np.array([1.0 if u.deviation is not None else WEAKEST_PRIOR**-2 for u in unknowns])
+    both = inverse(scaled.T @ scaled + np.diag(prior))
+    return IdentifiabilityReport(
+        parameters=verdicts,
+        undetermined=combinations,
+        torque_scale_free=any(d.torque_scale for d in directions),
+        correlated=_groups(both[np.ix_(kept, kept)], [u.name for u in own]),
+    )
+
+
+def _without_nuisances(scaled: Floats, nuisance: NDArray[np.bool_], claimed: NDArray[np.bool_]) -> Floats:
+    """A square root of the information about the other parameters, nuisances (with their priors) marginalised."""
+    other = scaled[:, ~nuisance]
+    information = other.T @ other
+    if nuisance.any():
+        n = scaled[:, nuisance]
+        inner = n.T @ n + np.diag(np.where(claimed[nuisance], 1.0, WEAKEST_PRIOR**-2))
+        cross = n.T @ other
+        information = information - cross.T @ np.linalg.solve(inner, cross)
+    eigenvalues, vectors = np.linalg.eigh(0.5 * (information + information.T))
+    return np.asarray(np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T)
+
+
+def _verdict(
+    unknown: Unknown, marginal: float, sensitivity: float, combinations: Sequence[Combination]
+) -> ParameterVerdict:
+    alone = 1.0 / sensitivity if sensitivity > 1.0 / WEAKEST_PRIOR else None
+    size = "expected deviation" if unknown.deviation is not None else "value"
+    inside = [c for c in combinations if any(m.name == unknown.name for m in c.members)]
+    verdict: Verdict
+    if marginal <= KNOWN_SHARE:
+        verdict, reason = "known", f"the data alone give it to {marginal:.2g} of its {size}"
+    elif alone is not None and alone <= KNOWN_SHARE:
+        verdict = "combination"
+        reason = f"alone it would be known to {alone:.2g} of its {size}, but others can stand in for it" + (
+            f": {inside[0].text}" if inside else ""
+        )
+    else:
+        verdict = "unknown"
+        reason = f"its {size} changes these records by {sensitivity:.2g} standard deviations of the noise"
+        if alone is None:
+            reason = "it does not change these records at all"
+    return ParameterVerdict(
+        name=unknown.name,
+        unit=unknown.unit,
+        verdict=verdict,
+        reason=reason,
+        data_deviation=marginal * unknown.scale if marginal < LARGEST_DEVIATION else None,
+        alone=None if alone is None else alone * unknown.scale,
+        expected_deviation=unknown.deviation,
+    )
+
+
+def _combination(direction: Direction, unknowns: Sequence[Unknown], values: Floats) -> Combination:
+    members = []
+    for share, unknown, value in zip(direction.members, unknowns, values, strict=True):
+        if direction.torque_scale:
+            if unknown.torque and value != 0.0:
+                members.append(Member(name=unknown.name, change=float(unknown.torque), relative=True))
+        elif abs(share) >= NEGLIGIBLE:
+            change, relative = share * unknown.scale, value != 0.0
+            members.append(Member(name=unknown.name, change=change / value if relative else change, relative=relative))
+    members = _smallest_readable(members)
+    return Combination(
+        text=_text(members, direction.torque_scale, unknowns),
+        members=tuple(members),
+        torque_scale=direction.torque_scale,
+        deviation=direction.deviation if np.isfinite(direction.deviation) else None,
+    )
+
+
+def _smallest_readable(members: list[Member]) -> list[Member]:
+    """Scaled so that the largest relative change is 1 (a hundred per cent)."""
+    largest = max((abs(m.change) for m in members if m.relative), default=0.0)
+    if largest == 0.0:
+        return members
+    return [m.model_copy(update={"change": m.change / largest}) for m in members]
+
+
+def _text(members: Sequence[Member], torque_scale: bool, unknowns: Sequence[Unknown]) -> str:
+    if torque_scale:
+        names = ", ".join(m.name for m in members)
+        return f"the scale of torque: {names} may all be larger or smaller by the same factor"
+    units = {u.name: u.unit for u in unknowns}
+    if len(members) == 1:
+        return f"{members[0].name} alone"
+    parts = [
+        f"{m.name} {m.change:+.2g} %" if m.relative else f"{m.name} {0.01 * m.change:+.2g} {units[m.name]}"
+        for m in members
+    ]
+    return "together " + ", ".join(parts)
+
+
+def _groups(covariance: Floats, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
+    deviations = np.sqrt(np.diag(covariance))
+    linked = np.abs(covariance / np.outer(deviations, deviations)) > STRONG_CORRELATION
+    left, groups = set(range(len(names))), []
+    while left:
+        group, edge = set(), {left.pop()}
+        while edge:
+            k = edge.pop()
+            group.add(k)
+            edge |= {int(j) for j in np.flatnonzero(linked[k])} - group
+        left -= group
+        if len(group) > 1:
+            groups.append(tuple(names[k] for k in sorted(group)))
+    return tuple(sorted(groups))

@@ -1,0 +1,118 @@
+"""What a simulation is asked for, and a record in the units that compiled code reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError, TraceError
+from daq.contracts.machine import BoardPid, NoController, SampledPid
+from model import layout as at
+from model.arrays import Floats
+from model.machine_model.model import Model
+from model.machine_model.nominal import is_rod_arm
+from model.simulation.inputs import RunInputs
+
+POSTURE_UNITS = 1000
+"""Number of posture units over the range of a sensor, as the board counts them."""
+LONGEST_STEP = 1e-3
+"""Longest step of integration, s: readings are right to some 0.005 counts, contacts apart (docs/modelling.md has each
+effect)."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to simulate.
+
+    Args:
+        loop: `closed`: the model's controller follows the recorded set points; `open`: the recorded drive is applied.
+        quantise: round readings and power as the board does. Without, both are left as they are.
+        step: longest step of integration, s.
+        noise: (k, n) added to the readings before rounding, in counts of the sensor; None for none.
+        following: share of the difference between recorded and simulated reading that the simulated controller is
+            given, where a reading was recorded. At 0 it reads the model alone: an output error in closed loop. At 1 it
+            reads the record, noise and all: the recorded drive moves the model, and nothing brings it back.
+        initial: (n, 2) position (rad) and speed (rad/s) at the start; None: as estimated from the record.
+        general: use the recursive dynamics even where there is a closed form.
+    """
+
+    loop: Literal["closed", "open"] = "closed"
+    quantise: bool = True
+    step: float = LONGEST_STEP
+    noise: Floats | None = None
+    following: float = 0.0
+    initial: Floats | None = None
+    general: bool = False
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """One record in the units that compiled code reads (`RecordArrays`)."""
+
+    set_points: Floats
+    recorded: Floats
+    noise: Floats
+    readings: Floats
+    following: float
+    initial: Floats
+    first_drive: Floats
+    gains: Floats
+    settings: NDArray[np.int64]
+    period: float
+
+
+def prepare(model: Model, inputs: RunInputs, options: Options) -> Prepared:
+    """Inputs of a run as compiled code reads them.
+
+    Raises TraceError when the record lacks what moves the model in this loop, SpecError for other joints or noise.
+    """
+    machine = model.machine
+    if inputs.joints != machine.modelled_joints:
+        raise SpecError(f"inputs are for joints {inputs.joints}, the model moves joints {machine.modelled_joints}")
+    settings = np.zeros(at.SETTINGS, dtype=np.int64)
+    controller = machine.controller
+    if options.loop == "closed" and not isinstance(controller, NoController) and not inputs.has_set_points:
+        raise TraceError(f"trace {inputs.name}: has no set points; simulate it in open loop from its drive")
+    if options.loop == "open" and not inputs.has_drive:
+        raise TraceError(f"trace {inputs.name}: has no drive, which a simulation in open loop needs")
+    settings[at.QUANTISE] = int(options.quantise)
+    settings[at.PUBLISHED_LOADS] = int(is_rod_arm(machine))
+    set_points = inputs.set_points
+    if options.loop == "closed" and isinstance(controller, BoardPid):
+        settings[at.CONTROLLER] = at.BOARD_PID
+        set_points = _counts(model, set_points)
+    elif options.loop == "closed" and isinstance(controller, SampledPid):
+        settings[at.CONTROLLER] = at.SAMPLED_PID if controller.velocity_gains is None else at.CASCADE
+    elif options.loop == "closed" and not isinstance(controller, NoController):
+        raise SpecError(f"controller {controller.kind!r} cannot be simulated")
+    noise = inputs.noise if options.noise is None else np.ascontiguousarray(options.noise)
+    initial = inputs.initial if options.initial is None else np.ascontiguousarray(options.initial)
+    if noise.shape != set_points.shape:
+        raise SpecError(f"noise has shape {noise.shape}; {set_points.shape} is needed")
+    return Prepared(
+        set_points=set_points,
+        recorded=inputs.drive,
+        noise=noise,
+        readings=inputs.readings,
+        following=options.following,
+        initial=initial,
+        first_drive=inputs.first_drive,
+        gains=inputs.gains,
+        settings=settings,
+        period=inputs.period,
+    )
+
+
+def _counts(model: Model, set_points: Floats) -> Floats:
+    """Set points in ADC counts as the board takes them: rounded to posture units, then to counts (half up)."""
+    counts = np.empty_like(set_points)
+    for k, joint in enumerate(model.machine.modelled_joints):
+        own = model.machine.calibration(joint)
+        posture = np.floor((set_points[:, k] - own.angle_at_zero_rad) / own.rad_per_posture_unit + 0.5)
+        sensor = model.machine.joint(joint).sensor
+        bits = 12 if sensor is None else sensor.bits
+        counts[:, k] = np.floor(posture * 2**bits / POSTURE_UNITS + 0.5)
+    return counts

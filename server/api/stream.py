@@ -1,0 +1,162 @@
+"""One WebSocket from its first message to its last."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from contextlib import suppress
+
+from fastapi import WebSocket, WebSocketDisconnect
+from fastapi.concurrency import run_in_threadpool
+from pydantic import ValidationError
+
+from daq.contracts.errors import DaqError
+from daq.contracts.service.live import JogCommand, LiveRequest, RefusedMessage, ThinnedMessage
+from server.access.caller import Caller
+from server.access.limits import Bucket
+from server.live.hub import Client
+from server.live.outbox import Outbox
+from server.problems import ProblemError, field_of
+from server.services import RobotServices
+
+BASE_RATE = 50
+WAITING_MESSAGES = 64
+"""Messages of a client that may wait to be carried out: what holds a key sends ten a second (an assumption)."""
+MESSAGES_A_SECOND, MESSAGES_AT_ONCE = 100.0, 500.0
+"""Messages of a client in the long run, and in one go; one that sends more is sent away."""
+NOT_ALLOWED = 1008
+TOO_SLOW = 1013
+"""Close code: try again later."""
+GOING_AWAY = 1001
+LOOK_EVERY = 1.0
+"""s between two looks at whether a client that takes nothing is to be dropped."""
+ADVICE = "docs/service.md tells what this socket takes"
+log = logging.getLogger("server.live")
+Heard = tuple[str | None, float]
+"""A message's text, None where it is bytes, and when it arrived (s, monotonic)."""
+
+
+async def stream(socket: WebSocket, rig: RobotServices, caller: Caller) -> None:
+    """Serves one client until it goes, or is dropped."""
+    await socket.accept()
+    client = Client(Outbox(rig.robot.clock.monotonic()), caller.name)
+    rig.hub.join(client)
+    heard: asyncio.Queue[Heard] = asyncio.Queue(WAITING_MESSAGES)
+    dropping = asyncio.create_task(_drop_if_hopeless(rig, client))
+    tasks = [
+        dropping,
+        asyncio.create_task(_send(socket, rig, client)),
+        asyncio.create_task(_receive(socket, rig, client, heard)),
+        asyncio.create_task(_carry_out(rig, client, caller, heard)),
+    ]
+    try:
+        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            error = task.exception()
+            if error is not None and not isinstance(error, WebSocketDisconnect):
+                raise error
+    finally:
+        rig.hub.leave(client)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+    if dropping in done:
+        rig.hub.dropped += 1
+        log.warning("live client %s took nothing for too long and was dropped", client.name)
+        # Whoever reads nothing would not take the close either: the server ends the connection when this returns.
+        with suppress(TimeoutError, WebSocketDisconnect):
+            async with asyncio.timeout(LOOK_EVERY):
+                await socket.close(TOO_SLOW, "this client read too slowly")
+
+
+async def _send(socket: WebSocket, rig: RobotServices, client: Client) -> None:
+    clock = rig.robot.clock
+    while True:
+        await client.something.wait()
+        client.something.clear()
+        messages = client.outbox.take(clock.monotonic())
+        if not messages:
+            continue
+        if client.outbox.left_out:
+            messages.append(ThinnedMessage(left_out=client.outbox.left_out).model_dump_json())
+            client.outbox.left_out = 0
+        head = f'{{"now":{clock.monotonic():.4f},"utc":{clock.utc().timestamp():.4f},"messages":['
+        await socket.send_text(head + ",".join(messages) + "]}")
+
+
+async def _receive(socket: WebSocket, rig: RobotServices, client: Client, heard: asyncio.Queue[Heard]) -> None:
+    """Waits for nothing but the client: the moment of a message is that of its arrival, whatever the one before it
+    waits for."""
+    clock = rig.robot.clock
+    room = Bucket(MESSAGES_A_SECOND, MESSAGES_AT_ONCE, MESSAGES_AT_ONCE, clock.monotonic())
+    while True:
+        message = await socket.receive()
+        if message["type"] == "websocket.disconnect":
+            return
+        if room.take(clock.monotonic()) > 0:
+            log.warning("live client %s sends too many messages and was sent away", client.name)
+            await socket.close(NOT_ALLOWED, f"more than {MESSAGES_A_SECOND:g} messages a second")
+            return
+        try:
+            heard.put_nowait((message.get("text"), rig.robot.clock.monotonic()))
+        except asyncio.QueueFull:
+            _refuse(rig, client, f"{WAITING_MESSAGES} messages wait already: this one is left out", "send fewer")
+
+
+async def _carry_out(rig: RobotServices, client: Client, caller: Caller, heard: asyncio.Queue[Heard]) -> None:
+    while True:
+        text, said = await heard.get()
+        if text is None:
+            _refuse(rig, client, "a message is text, not bytes", ADVICE)
+            continue
+        try:
+            await _take(LiveRequest.model_validate_json(text), rig, client, caller, said)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = field_of(first["loc"]) if first["loc"] else "message"
+            _refuse(rig, client, f"{where}: {first['msg']}", ADVICE)
+        except ProblemError as error:
+            _refuse(rig, client, error.detail, error.advice)
+        except DaqError as error:
+            _refuse(rig, client, str(error), "")
+
+
+async def _take(request: LiveRequest, rig: RobotServices, client: Client, caller: Caller, said: float) -> None:
+    now = rig.robot.clock.monotonic()
+    if request.rate is not None:
+        client.every = BASE_RATE // request.rate
+    fresh = set(request.subscribe) - client.topics
+    client.topics = (client.topics | set(request.subscribe)) - set(request.unsubscribe)
+    for message in rig.hub.shown(fresh & client.topics):
+        client.outbox.put(message, now)
+    if request.history is not None:
+        async with rig.hub.looking_back:
+            past = await run_in_threadpool(_past, rig, now - request.history, request.points)
+        client.outbox.put(past, now)
+    if client.outbox:
+        client.something.set()
+    if request.jog is not None:
+        await run_in_threadpool(_jog, request.jog, rig, caller, said)
+
+
+def _past(rig: RobotServices, begin: float, points: int) -> str:
+    return rig.hub.history.since(begin, points).model_dump_json()
+
+
+def _jog(command: JogCommand, rig: RobotServices, caller: Caller, said: float) -> None:
+    if not caller.may_operate:
+        raise ProblemError(403, "operator-needed", f"{caller.name} may look only", "ask for the role operator")
+    rig.require_motion(command.lease)
+    rig.teaching.jog(dict(command.velocities), said)
+
+
+def _refuse(rig: RobotServices, client: Client, detail: str, advice: str) -> None:
+    message = RefusedMessage(detail=detail, advice=advice)
+    client.outbox.put(message.model_dump_json(), rig.robot.clock.monotonic())
+    client.something.set()
+
+
+async def _drop_if_hopeless(rig: RobotServices, client: Client) -> None:
+    """Returns when the client is to be dropped."""
+    while not client.outbox.is_hopeless(rig.robot.clock.monotonic()):
+        await asyncio.sleep(LOOK_EVERY)

@@ -1,0 +1,48 @@
+"""What the end of a run means for its experiment, and for the queue. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from daq.contracts.trace import Outcome
+from server.experiments.states import Event
+from server.owner.messages import Answer
+
+EXIT_REFUSED = (2, 4)
+EXIT_NOT_REACHED = 3
+EXIT_STOPPED = 6
+_OF_OUTCOME: dict[Outcome, Event] = {
+    "complete": Event.COMPLETED,
+    "stopped": Event.STOPPED,
+    "fault": Event.FAULT,
+    "interrupted": Event.LOST,
+}
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How an experiment ended. `holds_queue`: a person looks at the arm before the next one runs.
+
+    untaken: its trace could not be taken into the catalogue
+    """
+
+    event: Event
+    reason: str
+    outcome: Outcome | None = None
+    untaken: bool = False
+
+    @property
+    def holds_queue(self) -> bool:
+        """All but a plan carried out, its trace being known, and a plan refused before anything moved."""
+        return self.untaken or self.event not in (Event.COMPLETED, Event.REFUSED)
+
+
+def ending_of(answer: Answer) -> Ending:
+    """From the owner's answer."""
+    if answer.finished is not None:
+        return Ending(_OF_OUTCOME[answer.finished.outcome], answer.finished.reason, answer.finished.outcome)
+    if answer.exit_code in EXIT_REFUSED:
+        return Ending(Event.REFUSED, answer.problem)
+    if answer.exit_code == EXIT_NOT_REACHED:
+        return Ending(Event.LOST, answer.problem)
+    return Ending(Event.STOPPED if answer.exit_code == EXIT_STOPPED else Event.FAULT, answer.problem)

@@ -1,0 +1,322 @@
+"""The jobs of one robot: queued, computed in the worker processes of their lanes, followed, cancelled, kept."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import multiprocessing
+import os
+import shutil
+import signal
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from sqlalchemy.exc import OperationalError
+
+from daq.contracts.machine import Machine
+from daq.contracts.service.jobs import MACHINE, DiagnoseRequest, FitRequest, Job, JobRequest
+from server.catalogue.catalogue import Catalogue
+from server.clock import Clock
+from server.experiments.states import Event
+from server.jobs.lanes import LANES, SHORT_LANE_WORKERS, Lane, lane_of, with_what_it_waits_for
+from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
+from server.jobs.models import Models
+from server.jobs.work import Ended, Task, carry_out
+from server.jobs.yielding import begin_worker
+from server.problems import ProblemError, conflict, not_found
+from server.store.jobs import JobStore, models_of, traces_of
+
+LOOK_EVERY = 0.5
+"""s between two looks at how far the jobs are."""
+MOST_TOLD = 50
+"""Waiting jobs that are told anew when one before them has begun or ended."""
+log = logging.getLogger("server.jobs")
+
+
+def worker_processes(count: int) -> Executor:
+    """The executor of one computer. Spawned, not forked: this process has threads."""
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(count, mp_context=context, initializer=begin_worker)
+
+
+@dataclass(frozen=True)
+class JobContext:
+    """What the desk works with. `changed` is told of every job that has changed; it must not wait. `at_once`: workers
+    of the long lane."""
+
+    robot: str
+    machine: Machine
+    folder: Path
+    jobs: JobStore
+    catalogue: Catalogue
+    models: Models
+    clock: Clock
+    changed: Callable[[Job], None]
+    at_once: int
+    make_executor: Callable[[int], Executor] = worker_processes
+
+
+class JobService:
+    """Gives jobs to an executor, and follows them. Safe to use from any thread."""
+
+    def __init__(self, context: JobContext) -> None:
+        self._context = context
+        self._wake = threading.Event()
+        self._closing = False
+        self._executors: dict[Lane, Executor] = {}
+        self._running: dict[str, tuple[Job, Future[Ended]]] = {}
+        self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
+        context.jobs.settle_after_restart(context.robot, context.clock.utc())
+
+    def start(self) -> None:
+        """Begins to compute what waits: a job moves nothing."""
+        self._thread.start()
+
+    def submit(self, request: JobRequest, by: str, key: str | None) -> tuple[Job, bool]:
+        """Takes a job in. Raises a 404 for a trace or model that is not there, a 409 for a key used otherwise."""
+        context = self._context
+        before = context.jobs.made_before(context.robot, request, key)
+        if before is not None:  # whatever has become of its traces and models since
+            return before, False
+        task = Task(
+            request=request,
+            machine=context.machine,
+            traces={number: context.catalogue.path_of(number) for number in traces_of(request)},
+            models={number: context.models.path_of(number) for number in models_of(request) if number != MACHINE},
+            names={number: context.models.name_of(number) for number in models_of(request)},
+            limits=context.catalogue.limits,
+        )
+
+        def prepare(identity: str) -> None:
+            folder = self._folder(identity)
+            folder.mkdir(parents=True)
+            try:
+                Mailbox(folder).write(REQUEST, task.model_dump(mode="json"))
+            except OSError:  # no room: nothing of it stays
+                shutil.rmtree(folder, ignore_errors=True)
+                raise
+
+        job, new = context.jobs.submit(context.robot, request, context.clock.utc(), by, key, prepare)
+        if new:
+            self._tell(job)
+            self._wake.set()
+        return job, new
+
+    def cancel(self, identity: str, by: str) -> Job:
+        """Takes back what waits; asks what runs to end. Raises a 404, and a 409 for what has ended."""
+        context = self._context
+        try:
+            job = context.jobs.change(
+                context.robot, identity, Event.CANCELLED, context.clock.utc(), f"cancelled by {by}"
+            )
+        except ProblemError:  # it does not wait, or not any more
+            job = context.jobs.get(context.robot, identity)
+            if job.state != "running":
+                raise
+            Mailbox(self._folder(identity)).cancel()
+            return self.with_progress(job)
+        self._tell(job)
+        return job
+
+    def remove(self, identity: str) -> None:
+        """Takes an ended job and its results away; a model that it made stays. Raises a 404, 409."""
+        self._context.jobs.remove(self._context.robot, identity)
+        shutil.rmtree(self._folder(identity), ignore_errors=True)
+
+    def result_file(self, identity: str, name: str) -> Path:
+        """The result (`RESULT`) or report (`REPORT`) of a job. Raises a 404, and a 409 while there is none."""
+        job = self._context.jobs.get(self._context.robot, identity)
+        if job.state != "done":
+            line = f"job {identity} is {job.state}{': ' if job.reason else ''}{job.reason}"
+            raise conflict("job-state", line, "only a job that is done has a result")
+        path = self._folder(identity) / name
+        if not path.is_file():
+            raise not_found(f"{name} of job {identity} any more", "run it again")
+        return path
+
+    def with_progress(self, job: Job) -> Job:
+        """With its progress while it runs, and with what it waits behind while it waits."""
+        return self.with_progress_all((job,))[0]
+
+    def with_progress_all(self, jobs: Iterable[Job]) -> tuple[Job, ...]:
+        """The same for several, with one look at what waits."""
+        jobs = tuple(jobs)
+        waiting = self._context.jobs.waiting(self._context.robot) if any(job.state == "queued" for job in jobs) else []
+        running = [job for job, _future in list(self._running.values())]
+        return tuple(
+            with_what_it_waits_for(job, running, waiting) if job.state == "queued" else self._with_progress(job)
+            for job in jobs
+        )
+
+    def _with_progress(self, job: Job) -> Job:
+        if job.state != "running":
+            return job
+        reported = self._reported(job.id)
+        if reported is None:
+            return job.model_copy(update={"progress": 0.0, "progress_text": "starting"})
+        return job.model_copy(update={"progress": reported.fraction, "progress_text": reported.text})
+
+    def close(self, patience: float) -> None:
+        """Ends what runs: it is interrupted. What waits goes on waiting."""
+        self._closing = True
+        self._wake.set()
+        if self._thread.is_alive():
+            self._thread.join(patience)
+        for identity in list(self._running):
+            reported = self._reported(identity)
+            if reported is not None:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(reported.process, signal.SIGTERM)
+        for executor in self._executors.values():
+            executor.shutdown(wait=False, cancel_futures=True)
+        self._executors.clear()
+
+    def _folder(self, identity: str) -> Path:
+        return self._context.folder / identity
+
+    def _reported(self, identity: str) -> Reported | None:
+        try:
+            return Mailbox(self._folder(identity)).reported()
+        except (OSError, ValueError, KeyError):
+            return None
+
+    def _tell(self, job: Job) -> None:
+        self._context.changed(self.with_progress(job))
+
+    def _follow(self) -> None:
+        told: dict[str, Reported] = {}
+        while not self._closing:
+            self._wake.clear()
+            failed = False
+            try:
+                if self._collect() | self._begin():
+                    self._tell_waiting()
+                self._tell_progress(told)
+            except Exception:
+                # A disk that is full, a database that is locked: the next look may go better.
+                log.exception("jobs")
+                failed = True
+            self._wake.wait(LOOK_EVERY if self._running or failed else None)
+
+    def _begin(self) -> bool:
+        """Gives what waits to the free workers of its lane. Whether anything has begun."""
+        context = self._context
+        places = {"short": SHORT_LANE_WORKERS, "long": context.at_once}
+        free = {lane: places[lane] - self._at_work(lane) for lane in LANES}
+        has_begun = False
+        for job in context.jobs.waiting(context.robot):
+            lane = lane_of(job.request)
+            if free[lane] <= 0:
+                continue
+            try:  # its state first: what is cancelled before that is never computed
+                begun = context.jobs.change(context.robot, job.id, Event.TAKEN, context.clock.utc())
+            except ProblemError:  # cancelled in this moment
+                continue
+            future = self._handed_over(job.id, lane, places[lane])
+            self._running[job.id] = begun, future
+            if not future.done():
+                free[lane] -= 1
+            has_begun = True
+            self._tell(begun)
+            future.add_done_callback(lambda _future: self._wake.set())
+        return has_begun
+
+    def _at_work(self, lane: Lane) -> int:
+        running = list(self._running.values())
+        return sum(lane_of(job.request) == lane and not future.done() for job, future in running)
+
+    def _handed_over(self, identity: str, lane: Lane, workers: int) -> Future[Ended]:
+        """The job in the executor of its lane; in a new one where the end of a worker has broken the one there was."""
+        for _ in range(2):
+            executor = self._executors.get(lane)
+            if executor is None:
+                executor = self._executors[lane] = self._context.make_executor(workers)
+            try:
+                return executor.submit(carry_out, self._folder(identity))
+            except BrokenExecutor:
+                del self._executors[lane]
+            except Exception as error:
+                log.exception("job %s: no worker takes it", identity)
+                return _failed(error)
+        return _failed(BrokenExecutor())
+
+    def _collect(self) -> bool:
+        """Ends what has been computed. One whose end cannot be written holds up no other. Whether any has ended."""
+        has_ended = False
+        for identity, (job, future) in list(self._running.items()):
+            if not future.done():
+                continue
+            try:
+                self._end(identity, lane_of(job.request), future)
+            except (OSError, OperationalError) as error:
+                # A disk that is full, a database that is locked: the next look may go better.
+                log.warning("job %s: its end is not written yet: %s", identity, error)
+                continue
+            except Exception:
+                log.exception("job %s: its end cannot be written", identity)
+            del self._running[identity]
+            has_ended = True
+        return has_ended
+
+    def _end(self, identity: str, lane: Lane, future: Future[Ended]) -> None:
+        context = self._context
+        event, reason, model, headline = Event.COMPLETED, "", None, ""
+        try:
+            ended = future.result()
+        except BrokenExecutor:
+            self._executors.pop(lane, None)
+            event, reason = Event.LOST, "its worker process ended: it was killed, or ran out of memory"
+        except Exception as error:
+            log.exception("job %s", identity)
+            event, reason = Event.FAULT, _fault(error)
+        else:
+            if ended.cancelled:
+                event, reason = Event.STOPPED, "cancelled while it ran"
+            elif ended.problem:
+                event, reason = Event.REFUSED, ended.problem
+            else:
+                try:
+                    model = None if ended.model is None else self._keep_model(identity)
+                    headline = ended.headline
+                except (OSError, OperationalError):
+                    raise
+                except Exception as error:
+                    log.exception("job %s: its model", identity)
+                    event, reason = Event.FAULT, _fault(error)
+        self._tell(context.jobs.change(context.robot, identity, event, context.clock.utc(), reason, model, headline))
+        (self._folder(identity) / MODEL).unlink(missing_ok=True)  # not sooner: its end may have to be written again
+
+    def _keep_model(self, identity: str) -> str:
+        context = self._context
+        job = context.jobs.get(context.robot, identity)
+        name = job.request.name if isinstance(job.request, FitRequest | DiagnoseRequest) else None
+        path = self._folder(identity) / MODEL
+        return context.models.take_in(path, name or f"{job.request.kind} {identity}", job.submitted_by, identity)
+
+    def _tell_waiting(self) -> None:
+        """What they wait behind has changed."""
+        for job in self.with_progress_all(self._context.jobs.waiting(self._context.robot)[:MOST_TOLD]):
+            self._context.changed(job)
+
+    def _tell_progress(self, told: dict[str, Reported]) -> None:
+        for identity in list(self._running):
+            reported = self._reported(identity)
+            if reported is not None and told.get(identity) != reported:
+                told[identity] = reported
+                self._tell(self._context.jobs.get(self._context.robot, identity))
+
+
+def _failed(error: Exception) -> Future[Ended]:
+    future: Future[Ended] = Future()
+    future.set_exception(error)
+    return future
+
+
+def _fault(error: Exception) -> str:
+    return f"program fault: {type(error).__name__}: {error}"
+
+
+__all__ = ["REPORT", "RESULT", "JobContext", "JobService", "worker_processes"]

@@ -1,0 +1,433 @@
+"""The queue of one robot: takes experiments in, lets them run one at a time, and waits for a person where it must."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+
+from daq.contracts.errors import DaqError
+from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState
+from daq.contracts.service.queue import QueueStatus
+from server.experiments.endings import Ending, ending_of
+from server.experiments.order import next_due
+from server.experiments.states import Event, IllegalEventError, advance
+from server.owner.messages import Answer, ArmReport, HaltRun, RunExperiment
+from server.problems import ProblemError, conflict
+from server.queue.attendance import Attendance
+from server.queue.context import QueueContext
+from server.queue.due_runs import DueRuns
+from server.queue.notices import Notices, Seen
+from server.queue.readiness import Circumstances, what_is_missing, why_held
+from server.store.queues import QueueState
+
+LOOK_EVERY = 1.0
+"""s between two looks for what has become due: the wall clock may be set meanwhile."""
+log = logging.getLogger("server.queue")
+
+
+@dataclass
+class Running:
+    """The experiment that runs now."""
+
+    id: str
+    progress: float = 0.0
+    text: str = ""
+    cancelled_by: str | None = None
+    answer: Future[Answer] | None = None
+
+
+@dataclass(frozen=True)
+class Ended:
+    """An experiment whose end is to be written."""
+
+    id: str
+    ending: Ending
+    at: datetime
+
+
+class QueueService:
+    """One queue with its worker thread."""
+
+    def __init__(self, context: QueueContext) -> None:
+        self._context = context
+        self._lock = threading.RLock()
+        self._changed = threading.Event()
+        self._closing = False
+        self._consented: int | None = None
+        """The connection, as `Seen` counts them, that a person's word to move a real arm was given for."""
+        self._attendance = Attendance(context.clock)
+        self._running: Running | None = None
+        self._waiting_for = ""
+        self.notices = Notices()
+        """Why the queue is to be held, which nobody has answered for yet. Call `wake` after adding to them."""
+        self._written = True
+        """Whether the database knows the state."""
+        self._ended: Ended | None = None
+        """What ran last, where the database could not be told of its end: nothing else begins until it is."""
+        self._runs = DueRuns(context)
+        self._state = self._state_at_start()
+        self._runs.leave_out_missed()
+        self._worker = threading.Thread(target=self._work, name="queue", daemon=True)
+
+    def start(self) -> None:
+        """Begins to take experiments."""
+        self._worker.start()
+
+    @property
+    def running(self) -> Running | None:
+        """The experiment that runs now."""
+        return self._running
+
+    def submit(self, request: ExperimentRequest, by: str, key: str | None) -> tuple[Experiment, bool]:
+        """Takes an experiment in; False where the same key did before. Raises a 409 for a key used otherwise."""
+        experiment, new = self._context.experiments.submit(
+            self._context.robot.name, request, self._context.clock.utc(), by, key
+        )
+        if new:
+            self._context.record_event("experiment", "queued", actor=by, experiment=experiment.id)
+            self.wake()
+        return experiment, new
+
+    def cancel(self, identity: str, by: str) -> Experiment:
+        """Takes back what waits; stops the arm where it runs. Raises a 404, and a 409 for what has ended."""
+        name = self._context.robot.name
+        with self._lock:
+            running = self._running
+            if running is not None and running.id == identity:
+                running.cancelled_by = by
+                if running.answer is not None:
+                    self._context.robot.tell(HaltRun())
+                return self.with_progress(self._context.experiments.get(name, identity))
+        found = self._context.experiments.cancel_waiting(name, identity, self._context.clock.utc(), by)
+        self._context.record_event("experiment", "cancelled", actor=by, experiment=identity)
+        return found
+
+    def pause(self, reason: str, by: str | None = None) -> None:
+        """Lets no other experiment begin; one that runs goes on."""
+        with self._lock:
+            held = self._hold(reason, anew=by is not None)
+        if held:
+            self._context.record_event("queue", f"paused: {reason}", actor=by)
+
+    def resume(self, by: str, *, moves_real_arm: bool, seen: Seen | None = None) -> None:
+        """The operator's word that the queue may move the arm, given when there was so much to be `seen`: what came
+        later holds the queue again. Raises a 409 while the arm is stopped or at fault."""
+        seen = seen or self.notices.seen
+        with self._lock:
+            self.notices.answer_for(seen)
+            arm = self._context.robot.arm
+            if arm is not None and (held := why_held(arm)):
+                self.notices.note(held)
+                line = f"the arm is {arm.arm}: {arm.cause}"
+                raise conflict("arm-stopped", line, "look at the arm, reset it, then resume the queue")
+            state = QueueState(False, f"resumed by {by}", self._context.clock.utc())
+            self._context.queues.set(self._context.robot.name, state)  # first: what is not written stays paused
+            self._state, self._written = state, True
+            self._consented = seen.connections if moves_real_arm else self._consented
+            self._attendance.say()
+        self._context.record_event("queue", "resumed", actor=by)
+        self.wake()
+
+    def attend(self) -> None:
+        """An operator says to be there, for a minute more. No lock: the event loop calls this, and may not wait."""
+        self._notice_absence()  # one who comes back too late does not make up for it
+        self._attendance.say()
+        self.wake()
+
+    def on_arm_report(self, arm: ArmReport) -> None:
+        """What the arm's owner says: a stop, a fault or a lost link holds the queue, whatever waits. Must not wait."""
+        self.notices.arm_reported(arm)
+        self.wake()
+
+    def stop_asked(self, name: str) -> None:
+        """At any door: the queue is held whether or not the stop reaches an arm. Must not wait."""
+        self.notices.stop_asked(name)
+        self.wake()
+
+    def control_lapsed(self, name: str) -> None:
+        """A client that had the control went silent: the queue is held. Must not wait."""
+        self.notices.control_lapsed(name)
+        self.wake()
+
+    def control_given_back(self, name: str) -> None:
+        """A client gave the control back: what waits does not begin by that. Must not wait."""
+        self.notices.control_given_back(name, self._count_waiting())
+        self.wake()
+
+    def connection_made(self) -> None:
+        """The robot is connected: what waits does not begin by that. Must not wait."""
+        self.notices.connection_made(self._count_waiting())
+        self.wake()
+
+    def connection_ended(self, why: str) -> None:
+        """The robot is not connected any more. The operator's word was for the arm that was there. Must not wait."""
+        self.notices.connection_ended(why)
+        self.wake()
+
+    def wake(self) -> None:
+        """Something has changed that may let the next experiment begin."""
+        self._changed.set()  # and nothing else: whoever calls must not wait for a disk
+
+    def progressed(self, fraction: float, text: str) -> None:
+        """How far the experiment that runs is."""
+        running = self._running
+        if running is not None:
+            running.progress, running.text = fraction, text
+
+    def with_progress(self, experiment: Experiment) -> Experiment:
+        """With the progress of the one that runs."""
+        running = self._running
+        if running is None or running.id != experiment.id or experiment.state != "running":
+            return experiment
+        return experiment.model_copy(update={"progress": running.progress, "progress_text": running.text})
+
+    def status(self) -> QueueStatus:
+        """Now. Waits for nothing, neither for a disk nor for whoever holds the queue: the event loop asks this."""
+        running, waiting_for, state, left = self._running, self._waiting_for, self._state, self._attendance.left
+        if not state.paused and (held := self.notices.reason):  # it is held from this moment on, and written down soon
+            state = QueueState(True, held, self._context.clock.utc())
+        attended = self._context.clock.utc() + timedelta(seconds=left) if left and self._needs_attendance() else None
+        return QueueStatus(
+            paused=state.paused,
+            reason=state.reason,
+            since=state.since,
+            queued=self._count_waiting(),
+            running=None if running is None else running.id,
+            waiting_for="" if state.paused or running is not None else waiting_for,
+            attended_until=attended,
+        )
+
+    def take_no_more(self) -> None:
+        """Lets nothing begin any more. What is heard of from now on is the service's own end, and holds nothing."""
+        with self._lock:
+            self._closing = True
+        self._changed.set()
+
+    def close(self, patience: float) -> None:
+        """Lets nothing begin any more, and waits for what the robot's owner says about what ran."""
+        self.take_no_more()
+        if self._worker.is_alive():
+            self._worker.join(patience)
+
+    def _state_at_start(self) -> QueueState:
+        context, now = self._context, self._context.clock.utc()
+        name = context.robot.name
+        interrupted = context.experiments.settle_after_restart(name, now)
+        for one in interrupted:
+            context.record_event("experiment", f"interrupted: {one.reason}", experiment=one.id)
+        waiting = context.experiments.count_waiting(name)
+        before = context.queues.get(name)
+        if before is not None and before.paused:
+            return before
+        if waiting or interrupted:
+            line = f"the service was restarted with {waiting} waiting and {len(interrupted)} interrupted"
+            state = QueueState(True, f"{line}: look at the arm, then resume the queue", now)
+        else:
+            state = QueueState(False, "nothing was waiting when the service started", now)
+        context.queues.set(name, state)
+        return state
+
+    def _hold(self, reason: str, *, anew: bool = False) -> bool:
+        """Pauses, under the lock; False where it is paused already, and keeps its first reason unless it is `anew`."""
+        if self._state.paused and not anew:
+            return False
+        self._state, self._written = QueueState(True, reason, self._context.clock.utc()), False
+        try:
+            self._write_state()
+        except Exception:  # it is paused, whatever the disk says, and is written as soon as that is possible
+            log.exception("queue: paused: %s: not written yet", reason)
+        return True
+
+    def _write_state(self) -> None:
+        if not self._written:
+            self._context.queues.set(self._context.robot.name, self._state)
+            self._written = True
+
+    def _count_waiting(self) -> int:
+        return self._context.experiments.count_waiting(self._context.robot.name)
+
+    def _has_consent(self) -> bool:
+        return self._consented == self.notices.seen.connections
+
+    def _needs_attendance(self) -> bool:
+        identity = self._context.robot.identity
+        return identity is not None and not identity.simulated and not self._context.unattended
+
+    def _work(self) -> None:
+        while True:
+            with self._lock:
+                if self._closing:
+                    return
+            self._changed.clear()
+            try:
+                self._settle()
+                self._runs.submit()
+                experiment = self._take()
+                if experiment is not None:
+                    self._carry_out(experiment)
+                    continue
+            except Exception:
+                # A disk that is full, a database that is locked: the queue must not end with it, nor go on blindly.
+                log.exception("queue")
+                self._waiting_for = "the queue met an error of this program: see the log"
+            self._changed.wait(LOOK_EVERY)
+
+    def _settle(self) -> None:
+        """What was noticed holds the queue, and what could not be written is written before anything begins."""
+        self._notice_absence()
+        with self._lock:
+            if not self._closing and (reason := self.notices.take()):
+                self.pause(reason)
+            self._write_state()
+            self._write_end()
+
+    def _take(self) -> Experiment | None:
+        """The next experiment, with the control of the robot; None when none may begin now."""
+        context = self._context
+        with self._lock:
+            now = context.clock.utc()
+            following = next_due(context.experiments.due(context.robot.name, now), now)
+            if following is None:
+                self._waiting_for = ""
+                return None
+            self._waiting_for = self._what_is_missing()
+            if self._state.paused or self._waiting_for or self._closing:
+                return None
+            if not context.control.take_for_queue(following.id):
+                self._waiting_for = "somebody has control of the robot"
+                return None
+            if self.notices.reason:  # a control that has just ended, say: the queue is held first
+                context.control.give_back_for_queue()
+                self.wake()
+                return None
+            self._running = Running(following.id)  # before it leaves those that wait: the queue never looks empty
+            try:
+                return context.experiments.begin(context.robot.name, following.id, context.clock.utc())
+            except BaseException as error:
+                self._running = None
+                context.control.give_back_for_queue()
+                if isinstance(error, IllegalEventError):  # cancelled in this moment
+                    return None
+                raise
+
+    def _what_is_missing(self) -> str:
+        robot = self._context.robot
+        if robot.arm is not None:
+            self.notices.arm_reported(robot.arm)  # what this decision is made from has been noticed before it
+        attended = self._attendance.left > 0 or not self._needs_attendance()
+        missing = what_is_missing(
+            Circumstances(robot.identity, robot.arm, robot.problem, self._has_consent(), attended)
+        )
+        if missing is not None and missing.pause:
+            self.pause(missing.pause)
+        return "" if missing is None else missing.line
+
+    def _notice_absence(self) -> None:
+        """An operator who had said to be there, and says so no more, holds the queue: also while nothing waits."""
+        if self._attendance.has_lapsed() and self._needs_attendance():
+            self.notices.operator_left()
+
+    def _carry_out(self, experiment: Experiment) -> None:
+        """From its begin to its end, whatever fails meanwhile: then a person looks before the next one."""
+        context = self._context
+        try:
+            context.robot.experiment = experiment.id
+            context.record_event("experiment", "started", experiment=experiment.id)
+            ending = self._run(experiment)
+        except Exception as error:
+            log.exception("experiment %s", experiment.id)
+            why = str(error) if isinstance(error, DaqError) else f"{type(error).__name__}: see the log"
+            ending = Ending(Event.LOST, why)
+        finally:
+            context.robot.experiment = None
+            context.control.give_back_for_queue()
+        with self._lock:
+            ending = self._as_wished(ending, self._running)
+            state = advance("running", ending.event)
+            why = f"{_ended_as(experiment, state)} ({ending.reason}): look at the arm, then resume the queue"
+            held = ending.holds_queue and self._hold(why)  # whoever hears of the end finds the queue paused
+            self._ended = Ended(experiment.id, ending, context.clock.utc())
+            try:
+                self._write_end()
+            except Exception:
+                log.exception("experiment %s: its end as %s is not written yet", experiment.id, state)
+                held = self._hold(why) or held
+            finally:
+                self._running = None
+        if held:
+            context.record_event("queue", f"paused: {why}")
+
+    def _write_end(self) -> None:
+        """Of what ran last, under the lock. Raises what the database does; the end is kept then."""
+        ended, context = self._ended, self._context
+        if ended is None:
+            return
+        ending, state = ended.ending, advance("running", ended.ending.event)
+        try:
+            context.experiments.end(context.robot.name, ended.id, ending.event, ended.at, ending.reason, ending.outcome)
+        except (IllegalEventError, ProblemError):
+            log.exception("experiment %s", ended.id)  # it has an end, or is gone: nothing is left to be written
+        self._ended = None
+        what = "completed" if ending.event is Event.COMPLETED else state
+        context.record_event("experiment", f"{what}: {ending.reason}".rstrip(": "), experiment=ended.id)
+        if ending.untaken:
+            context.unfinished()  # the database can be written again, and finds the trace in its folder
+
+    def _run(self, experiment: Experiment) -> Ending:
+        """How it ended. Raises whatever keeps it from being begun, or loses it."""
+        context = self._context
+        with self._lock:
+            running = self._running
+            assert running is not None
+            if running.cancelled_by is not None:
+                return Ending(Event.STOPPED, "cancelled before it moved")
+            answer = running.answer = context.robot.ask(
+                RunExperiment,
+                asked=context.clock.monotonic(),
+                spec=experiment.spec,
+                trace_id=context.experiments.trace_number(experiment.id),
+                moves_real_arm=self._has_consent(),
+            )
+        found = self._await(answer)
+        ending = ending_of(found)
+        try:
+            if found.finished is not None:
+                context.recorded(found)
+            elif ending.event is not Event.REFUSED:
+                context.unfinished()
+        except Exception:
+            log.exception("experiment %s: its trace", experiment.id)
+            line = "its trace is not in the catalogue: see the log"
+            return replace(ending, reason=f"{ending.reason}; {line}".removeprefix("; "), untaken=True)
+        return ending
+
+    def _await(self, answer: Future[Answer]) -> Answer:
+        """The answer; on a real arm that must be attended, an operator's absence ends the run with a stop."""
+        while True:
+            try:
+                return answer.result(LOOK_EVERY)
+            except TimeoutError:
+                if self._needs_attendance() and not self._attendance.left:
+                    running = self._running
+                    if running is not None and running.cancelled_by is None:
+                        running.cancelled_by = "the service: no operator confirmed to be present"
+                        self._context.robot.tell(HaltRun())
+
+    def _as_wished(self, ending: Ending, running: Running | None) -> Ending:
+        """Whose wish a stop was."""
+        if ending.event is not Event.STOPPED:
+            return ending
+        if self._closing:
+            return replace(ending, event=Event.LOST, reason="the service was shut down while this ran")
+        if running is not None and running.cancelled_by is not None:
+            return replace(ending, reason=f"cancelled by {running.cancelled_by}")
+        return ending
+
+
+def _ended_as(experiment: Experiment, state: ExperimentState) -> str:
+    """`ramp failed`: people know an experiment by its name, not by its number."""
+    name = experiment.spec.name or experiment.spec.trajectory.kind.replace("_", " ")
+    return f"{name} {state}" if state == "failed" else f"{name} was {state}"

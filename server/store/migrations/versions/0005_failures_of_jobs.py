@@ -1,0 +1,26 @@
+"""Why a job failed, for programs."""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "0005"
+down_revision = "0004"
+branch_labels = None
+depends_on = None
+
+
+def upgrade() -> None:
+    """To this version. Of older jobs only the sentence is known."""
+    with op.batch_alter_table("jobs", schema=None) as batch_op:
+        batch_op.add_column(sa.Column("failure", sa.String(length=32), nullable=True))
+    op.execute("UPDATE jobs SET failure = 'program-fault' WHERE reason LIKE 'program fault: %'")
+    op.execute("UPDATE jobs SET failure = 'refused' WHERE state = 'failed' AND failure IS NULL")
+    op.execute("UPDATE jobs SET failure = 'lost' WHERE state = 'interrupted'")
+
+
+def downgrade() -> None:
+    """Back."""
+    with op.batch_alter_table("jobs", schema=None) as batch_op:
+        batch_op.drop_column("failure")

@@ -1,0 +1,19 @@
+"""Fitted candidates of which only name, joints and evidence matter."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+
+from model.discrepancy.candidates.library import Hypothesis
+from model.discrepancy.candidates.probing import Probe
+from model.discrepancy.output_error.candidate_fit import CandidateFit
+from tests.model.fitting import imagined
+
+
+def candidate_fit(name: str, joints: tuple[int, ...], evidence: float) -> CandidateFit:
+    """A candidate with that evidence, and without the fit that it would come from."""
+    hypothesis = Hypothesis(name, joints, imagined.arm(), (), (), proportional=True)
+    probe = Probe(hypothesis, 0.0, {}, np.zeros(0), np.zeros(0))
+    return CandidateFit(probe, cast(Any, None), evidence)

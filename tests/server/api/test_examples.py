@@ -1,0 +1,126 @@
+"""Every body of the API has an example, and every example is what its schema says."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import jsonschema_rs  # schemathesis's own: an opinion that is independent of pydantic's
+import pytest
+
+from server.api.problem_examples import PROBLEM_EXAMPLES
+from server.app import bare_app
+from tests.server.service import Service
+
+JSON = ("application/json", "application/problem+json")
+GUIDE = Path(__file__).parents[3].joinpath("docs", "service.md").read_text("utf-8")
+NO_ADDRESS = {"ticket-unknown", "no-such-method", "fault", "head-too-large"}
+"""Of the WebSocket, of addresses that are none, of what never happens, of requests whose address is not read."""
+
+
+@pytest.fixture(scope="module")
+def described() -> dict[str, Any]:
+    """The OpenAPI document."""
+    return bare_app(None).openapi()
+
+
+def _bodies(described: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Operation, which body of it, and its description."""
+    for path, methods in described["paths"].items():
+        for method, operation in methods.items():
+            parts = {"request": operation.get("requestBody", {}), **operation["responses"]}
+            for part, body in parts.items():
+                for kind, content in body.get("content", {}).items():
+                    if kind in JSON:
+                        yield f"{method} {path}", part, content
+
+
+def test_every_body_has_an_example_that_fits_its_schema(described: dict[str, Any]) -> None:
+    count = 0
+    validators: dict[str, jsonschema_rs.Validator] = {}  # of the few schemas of the many bodies
+    for operation, part, content in _bodies(described):
+        assert content.get("examples"), (operation, part)
+        schema = json.dumps(content["schema"], sort_keys=True)
+        if schema not in validators:
+            validators[schema] = jsonschema_rs.validator_for(
+                content["schema"] | {"components": described["components"]}
+            )
+        for name, example in content["examples"].items():
+            errors = [error.message for error in validators[schema].iter_errors(example["value"])]
+            assert not errors, (operation, part, name, errors)
+            count += 1
+    assert count > 300
+
+
+def test_problems_are_described_under_the_media_type_that_they_have(described: dict[str, Any]) -> None:
+    for operation, part, content in _bodies(described):
+        problem = content["schema"] == {"$ref": "#/components/schemas/ProblemDetails"}
+        assert problem == (part.isdecimal() and int(part) >= 400 and "readyz" not in operation), (operation, part)
+
+
+def test_every_kind_of_problem_has_an_example_at_an_address_that_knows_it(described: dict[str, Any]) -> None:
+    met = {
+        name
+        for _, part, content in _bodies(described)
+        if part.isdecimal() and int(part) >= 400
+        for name in content["examples"]
+    }
+    kinds = set(re.findall(r'<a id="([a-z-]+)"></a>', GUIDE))
+    assert {example.problem.kind for example in PROBLEM_EXAMPLES} == kinds - NO_ADDRESS
+    assert kinds - NO_ADDRESS <= met | {"Health"}
+
+
+def test_an_example_of_a_problem_says_what_to_do() -> None:
+    for example in PROBLEM_EXAMPLES:
+        assert example.details.detail
+        assert example.details.advice
+
+
+def test_the_service_takes_every_example_of_a_body(described: dict[str, Any], service: Service) -> None:
+    """What is named in one need not be there; whatever else speaks against it would make it a bad example."""
+    gains = service.robot.get("/gains").json()
+    sent = 0
+    effects = {effect["name"] for effect in service.robot.get("/effects").json()}
+    for operation, part, content in _bodies(described):
+        for name, example in content["examples"].items() if part == "request" else ():
+            answer = _sent(service, operation, example["value"])
+            assert answer.status_code in (200, 201, 202, 404), (operation, name, answer.text)
+            if answer.status_code == 404:
+                assert "there is no " in answer.json()["detail"], (operation, name)
+            chosen = example["value"].get("effects") or ()
+            assert {one["name"] for one in chosen} <= effects, (operation, name)
+            sent += 1
+    assert sent >= 23
+    lease = {"Control-Lease": service.robot.post("/control", json={}).json()["lease"]}
+    assert service.robot.put("/gains", json=gains, headers=lease).status_code == 200  # as other tests expect them
+    assert service.robot.delete("/control", headers=lease).status_code == 204
+
+
+def _sent(service: Service, operation: str, body: Any) -> httpx.Response:
+    """With the control of the arm, which afterwards is at rest."""
+    method, path = operation.split()
+    path = re.sub(r"\{\w+\}", "000000000000", path.replace("{robot}", "ma2000").replace("{output}", "3"))
+    assert service.robot.post("/queue/pause").status_code == 200  # nothing that is submitted runs
+    headers: dict[str, str] = {}
+    if not path.endswith("/control"):
+        headers["Control-Lease"] = service.robot.post("/control", json={}).json()["lease"]
+    query = {"name": "example"} if path.endswith("/models") else {}
+    answer = service.client.request(method, f"{service.url}{path}", json=body, headers=headers, params=query)
+    if answer.status_code == 202:
+        service.robot.post("/stop")
+        service.until_arm("stopped")
+        while service.status()["activity"] != "none":
+            assert service.process.poll() is None
+        assert service.robot.post("/reset", json={}, headers=headers).status_code == 200
+        service.until_arm("idle")
+    if path.endswith(("/experiments", "/gain")):
+        assert service.robot.post(f"/experiments/{answer.json()['id']}/cancel").status_code == 200
+    if path.endswith("/schedules"):
+        assert service.robot.delete(f"/schedules/{answer.json()['id']}").status_code == 204
+    lease = answer.json()["lease"] if path.endswith("/control") else headers["Control-Lease"]
+    assert service.robot.delete("/control", headers={"Control-Lease": lease}).status_code == 204
+    return answer

@@ -1,0 +1,171 @@
+"""The description of the API: complete, usable for generated clients, and true."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from server.app import bare_app
+from server.clock import SystemClock
+from tests.server.inside import service_inside
+from tests.server.service import running_service
+
+
+@pytest.fixture(scope="module")
+def described() -> dict[str, Any]:
+    """The OpenAPI document."""
+    return bare_app(None).openapi()
+
+
+def _operations(described: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    return [
+        (f"{method.upper()} {path}", operation)
+        for path, methods in described["paths"].items()
+        for method, operation in methods.items()
+    ]
+
+
+def test_operations_have_names_of_their_own_that_are_functions(described: dict[str, Any]) -> None:
+    names = [operation["operationId"] for _, operation in _operations(described)]
+    assert len(names) == len(set(names))
+    assert all(name.isidentifier() and name.islower() for name in names)
+
+
+def test_every_operation_says_what_it_does_and_what_it_answers(described: dict[str, Any]) -> None:
+    for name, operation in _operations(described):
+        assert operation.get("description"), name
+        good = [answer for status, answer in operation["responses"].items() if status.startswith("2")]
+        assert good, name
+        if "204" not in operation["responses"]:
+            assert any("content" in answer for answer in good), name
+
+
+def test_everything_of_a_robot_names_it(described: dict[str, Any]) -> None:
+    of_no_robot = {
+        "/api/v1/robots",
+        "/api/v1/tickets",
+        "/api/v1/me",
+        "/api/v1/system",
+        "/healthz",
+        "/readyz",
+        "/metrics",
+    }
+    for path in described["paths"]:
+        assert path in of_no_robot or path.startswith("/api/v1/robots/{robot}"), path
+
+
+def test_every_address_of_the_guide_is_one(described: dict[str, Any]) -> None:
+    """Those that begin with … for the robot; a name in capitals is a parameter."""
+    guide = Path(__file__).parents[3].joinpath("docs", "service.md").read_text("utf-8")
+    named = {path.rstrip("/") for path in re.findall(r"…(/[\w/-]+)", guide)}
+    known = {re.sub(r"\{\w+\}", "ID", path.removeprefix("/api/v1/robots/{robot}")) for path in described["paths"]}
+    assert {path for path in named if path not in known} == {"/live"}, "a WebSocket, which OpenAPI does not describe"
+
+
+def test_the_types_of_the_live_stream_are_in_it(described: dict[str, Any]) -> None:
+    assert {"LiveFrame", "SampleMessage", "RobotMessage", "QueueMessage", "JobMessage"} <= set(
+        described["components"]["schemas"]
+    )
+
+
+def test_nobody_waits_while_it_is_put_together() -> None:
+    app, asked, answered, times = bare_app(None), threading.Event(), threading.Event(), 0
+
+    def slow() -> dict[str, Any]:
+        nonlocal times
+        times += 1
+        asked.set()
+        assert answered.wait(60), "the event loop waits for it"
+        return {"openapi": "3.1.0"}
+
+    app.openapi = slow  # type: ignore[method-assign]
+
+    async def three() -> list[httpx.Response]:
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://127.0.0.1") as client:
+            waiting = [asyncio.create_task(client.get("/api/v1/openapi.json")) for _ in range(2)]
+            await asyncio.to_thread(asked.wait)
+            assert (await client.get("/healthz")).status_code == 200
+            answered.set()
+            return [*await asyncio.gather(*waiting), await client.get("/api/v1/openapi.json")]
+
+    assert [answer.json() for answer in asyncio.run(three())] == [{"openapi": "3.1.0"}] * 3
+    assert times == 1
+
+
+CHECKS = "status_code_conformance,content_type_conformance,response_schema_conformance"
+"""A 500 is described nowhere. 503 and 507 are: a robot that is not there is no fault of the program."""
+
+
+def _without_prefix_items(part: Any) -> Any:
+    """The same description where an array of so many alike is said with `items`.
+
+    Schemathesis turns `prefixItems` into a list of items, which JSON Schema has not had since 2020, and refuses every
+    answer then.
+    """
+    if isinstance(part, list):
+        return [_without_prefix_items(one) for one in part]
+    if not isinstance(part, dict):
+        return part
+    part = {name: _without_prefix_items(value) for name, value in part.items()}
+    if "prefixItems" in part:
+        first, *others = part.pop("prefixItems")
+        assert part["minItems"] == part["maxItems"] == 1 + len(others)
+        assert all(other == first for other in others), "an array of unlike items cannot be said otherwise"
+        part["items"] = first
+    return part
+
+
+def _tried(url: str, folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    """Schemathesis over the whole description; the same requests in every run, but for the time that there is."""
+    schemathesis = Path(sys.executable).with_name("schemathesis")
+    description = folder / "openapi.json"
+    told = httpx.get(f"{url}/api/v1/openapi.json", timeout=100).json()
+    description.write_text(json.dumps(_without_prefix_items(told)), "utf-8")
+    command = [
+        str(schemathesis),
+        "run",
+        str(description),
+        "--url",
+        url,
+        "--checks",
+        CHECKS,
+        "--seed",
+        "1",
+        "--request-timeout",
+        "60",
+        "--generation-database",
+        "none",
+        "--no-color",
+        *options,
+    ]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.timeout(300)
+def test_requests_that_fit_the_description_meet_no_fault_and_answers_are_as_described(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a robot, whose answers come from another process; the long one has it."""
+    with service_inside(tmp_path, SystemClock(), monkeypatch) as api:
+        url = str(api.base_url.join("/")).rstrip("/")
+        few = ("--phases", "examples,stateful", "--max-examples", "1", "--max-time", "6")
+        ended = _tried(url, tmp_path, *few, "--exclude-operation-id", "connect_robot")
+    assert ended.returncode == 0, ended.stdout[-4000:]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_no_request_that_fits_the_description_meets_a_fault_of_the_program(tmp_path: Path) -> None:
+    with running_service(tmp_path) as service:
+        service.until_connected()
+        ended = _tried(service.url, tmp_path, "--max-examples", "30", "--max-time", "300", "--continue-on-failure")
+    assert ended.returncode == 0, ended.stdout[-8000:]

@@ -1,0 +1,368 @@
+"""Backup and restore: true while a service writes, and nothing touched unless all of it is as it was written."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import threading
+import zipfile
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from sqlalchemy import select
+
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.service.experiments import ExperimentRequest
+from server.backup.manifest import MANIFEST, verify
+from server.backup.places import DATABASE, BackupError, Places, places_of
+from server.backup.restore import restore
+from server.backup.write import back_up
+from server.store.engine import Store
+from server.store.experiments import ExperimentStore
+from server.store.lock import InUseError, sole_use
+from server.store.queues import QueueState, QueueStore
+from server.store.tables import TraceRow
+from server.store.traces import NewTrace, TraceStore
+from tests.daq_cli.invoke import CommandLine
+from tests.server.service import Service
+
+NOW = datetime(2026, 1, 1, 12, tzinfo=UTC)
+SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]})
+
+
+def quietly(_fraction: float, _text: str) -> None:
+    """Nobody watches."""
+
+
+def places_in(folder: Path, robot: str = "ma2000") -> Places:
+    database = folder / "service" / "service.sqlite"
+    return Places(robot, f"sqlite:///{database}", database, folder / "traces", folder / "service")
+
+
+def add_trace(store: Store, places: Places, number: str) -> None:
+    """As a recorded one: the file first, then its row."""
+    places.traces.mkdir(parents=True, exist_ok=True)
+    part = places.traces / f"{number}.mcap.part"
+    part.write_bytes(f"trace {number} ".encode() * 1000)
+    part.replace(places.traces / f"{number}.mcap")
+    new = NewTrace(
+        id=number,
+        robot="ma2000",
+        file=f"{number}.mcap",
+        created=NOW,
+        source="mock",
+        kind="ramp",
+        name=None,
+        joints=(1,),
+        outcome="complete",
+        samples=1,
+        duration=0.0,
+        size=1,
+        operator=None,
+        experiment=None,
+        notes="",
+    )
+    TraceStore(store).insert(new)
+
+
+def filled(folder: Path) -> Places:
+    """A service's folders with an experiment that waits, traces, a model and a job's result."""
+    places = places_in(folder)
+    store = Store(places.url)
+    store.migrate()
+    ExperimentStore(store).submit("ma2000", ExperimentRequest(spec=SPEC), NOW, "anna")
+    for number in ("aaa", "bbb"):
+        add_trace(store, places, number)
+    store.close()
+    (places.traces / "ccc.mcap.part").write_bytes(b"is being recorded")
+    (places.service / "models").mkdir()
+    (places.service / "models" / "0123456789ab.json").write_text("{}")
+    job = places.service / "jobs" / "0123456789ab"
+    job.mkdir(parents=True)
+    (job / "result.json").write_text('{"found": 1}')
+    task = {"request": {"kind": "fit"}, "traces": {"aaa": str(places.traces / "aaa.mcap")}, "models": {}}
+    (job / "request.json").write_text(json.dumps(task))
+    (job / "cancel").touch()
+    return places
+
+
+def everything(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and not path.name.endswith((".lock", "-shm", "-wal"))
+    }
+
+
+def traces_in(places: Places) -> list[str]:
+    store = Store(places.url)
+    with store.reading() as session:
+        found = list(session.scalars(select(TraceRow.file).order_by(TraceRow.file)))
+    store.close()
+    return found
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Path:
+    path = tmp_path / "arm.zip"
+    back_up(filled(tmp_path / "here"), path, NOW, quietly)
+    return path
+
+
+def test_everything_comes_back_elsewhere_as_it_was(archive: Path, tmp_path: Path) -> None:
+    places = places_in(tmp_path / "there")
+    restored = restore(archive, places, NOW, quietly)
+    assert restored.put_aside == ()
+    assert traces_in(places) == ["aaa.mcap", "bbb.mcap"]
+    before, after = everything(tmp_path / "here"), everything(tmp_path / "there")
+    assert set(before) - set(after) == {"traces/ccc.mcap.part", "service/jobs/0123456789ab/cancel"}
+    changed = {"service/service.sqlite", "service/jobs/0123456789ab/request.json"}
+    assert {name: after[name] for name in set(after) - changed} == {name: before[name] for name in set(after) - changed}
+    task = json.loads(after["service/jobs/0123456789ab/request.json"])
+    assert task["traces"] == {"aaa": str(places.traces / "aaa.mcap")}
+    store = Store(places.url)
+    store.migrate()
+    assert ExperimentStore(store).count_waiting("ma2000") == 1
+    store.close()
+
+
+@pytest.mark.parametrize("before", [None, QueueState(False, "resumed", NOW), QueueState(True, "paused by anna", NOW)])
+def test_the_queue_comes_back_paused(tmp_path: Path, before: QueueState | None) -> None:
+    here, there, later = filled(tmp_path / "here"), places_in(tmp_path / "there"), NOW + timedelta(days=7)
+    store = Store(here.url)
+    if before is not None:
+        QueueStore(store).set("ma2000", before)
+    store.close()
+    back_up(here, tmp_path / "arm.zip", NOW, quietly)
+    restore(tmp_path / "arm.zip", there, later, quietly)
+    store = Store(there.url)
+    line = "restored from a backup: look at the arm, then resume the queue"
+    expected = before if before is not None and before.paused else QueueState(True, line, later)
+    assert QueueStore(store).get("ma2000") == expected
+    store.close()
+
+
+def test_a_backup_is_for_nobody_else_to_read_and_never_written_over(archive: Path, tmp_path: Path) -> None:
+    assert archive.stat().st_mode & 0o077 == 0
+    with pytest.raises(BackupError, match="is there already"):
+        back_up(places_in(tmp_path / "here"), archive, NOW, quietly)
+    assert verify(archive).count("traces") == 2
+
+
+def test_what_a_backup_names_is_in_it_however_much_is_written_meanwhile(tmp_path: Path) -> None:
+    places = filled(tmp_path / "here")
+    ended = threading.Event()
+
+    def record() -> None:
+        store = Store(places.url)
+        number = 0
+        while not ended.is_set():
+            add_trace(store, places, f"n{number:04}")
+            number += 1
+        store.close()
+
+    writer = threading.Thread(target=record)
+    writer.start()
+    try:
+        for number in range(5):
+            back_up(places, tmp_path / f"{number}.zip", NOW, quietly)
+    finally:
+        ended.set()
+        writer.join()
+    for number in range(5):
+        there = places_in(tmp_path / f"there{number}")
+        restore(tmp_path / f"{number}.zip", there, NOW, quietly)
+        named = traces_in(there)
+        assert len(named) >= 2
+        assert all((there.traces / name).is_file() for name in named)
+
+
+def test_nothing_is_written_over_unless_asked_for_and_then_it_is_put_aside(archive: Path, tmp_path: Path) -> None:
+    places = filled(tmp_path / "there")
+    (places.traces / "aaa.mcap").write_bytes(b"another trace of this number")
+    before = everything(tmp_path / "there")
+    with pytest.raises(BackupError, match=r"are there already .*: with --overwrite they are put aside"):
+        restore(archive, places, NOW, quietly)
+    assert everything(tmp_path / "there") == before
+    restored = restore(archive, places, NOW, quietly, overwrite=True)
+    after = everything(tmp_path / "there")
+    assert after["traces/aaa.mcap"] == everything(tmp_path / "here")["traces/aaa.mcap"]
+    assert after["traces/before-restore-2026-01-01T12-00-00Z/aaa.mcap"] == b"another trace of this number"
+    assert set(restored.put_aside) == {
+        places.traces / "before-restore-2026-01-01T12-00-00Z",
+        places.service / "before-restore-2026-01-01T12-00-00Z",
+    }
+    assert sorted(before.values()) == sorted(data for name, data in after.items() if "before-restore" in name)
+
+
+def _changed(archive: Path, change: str) -> None:
+    """Writes the backup again with something wrong in it, all checksums of the ZIP file right."""
+    with zipfile.ZipFile(archive) as pack:
+        files = {name: pack.read(name) for name in pack.namelist()}
+    manifest = json.loads(files[MANIFEST])
+    match change:
+        case "a file is missing":
+            del files["traces/bbb.mcap"]
+        case "a file has other bytes":
+            files["traces/bbb.mcap"] = files["traces/bbb.mcap"].replace(b"bbb", b"xxx")
+        case "a file too many":
+            files["traces/ddd.mcap"] = b"whence?"
+        case "another robot's":
+            manifest["robot"] = "other"
+        case "a newer format":
+            manifest["format"] = 2
+        case "newer tables":
+            manifest["revision"] = "9999"
+        case "a path out of it":
+            files["../../evil.mcap"] = files.pop("traces/bbb.mcap")
+            manifest["files"][2]["name"] = "../../evil.mcap"
+        case "no list":
+            del files[MANIFEST]
+        case "no database":
+            del files[DATABASE]
+            manifest["files"] = [entry for entry in manifest["files"] if entry["name"] != DATABASE]
+    if MANIFEST in files:
+        files[MANIFEST] = json.dumps(manifest).encode()
+    with zipfile.ZipFile(archive, "w") as pack:
+        for name, data in files.items():
+            pack.writestr(name, data)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "a file is missing",
+        "a file has other bytes",
+        "a file too many",
+        "another robot's",
+        "a newer format",
+        "newer tables",
+        "a path out of it",
+        "no list",
+        "no database",
+    ],
+)
+def test_what_is_not_a_whole_backup_of_this_robot_is_refused_before_anything_is_touched(
+    archive: Path, tmp_path: Path, change: str
+) -> None:
+    places = filled(tmp_path / "there")
+    before = everything(tmp_path)
+    _changed(archive, change)
+    before["arm.zip"] = archive.read_bytes()
+    with pytest.raises(BackupError) as refused:
+        restore(archive, places, NOW, quietly, overwrite=True)
+    assert "\n" not in str(refused.value)
+    assert everything(tmp_path) == before
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7), cut=st.booleans())
+def test_a_flipped_bit_or_a_cut_is_refused_or_harmless(
+    archive: Path, tmp_path: Path, place: float, bit: int, cut: bool
+) -> None:
+    data = bytearray(archive.read_bytes())
+    at = int(place * len(data))
+    if cut:
+        del data[at:]
+    else:
+        data[at] ^= 1 << bit
+    damaged = tmp_path / "damaged.zip"
+    damaged.write_bytes(data)
+    there = tmp_path / "there"
+    shutil.rmtree(there, ignore_errors=True)
+    try:
+        restore(damaged, places_in(there), NOW, quietly)
+    except BackupError:
+        assert everything(there) == {}
+    else:
+        assert traces_in(places_in(there)) == ["aaa.mcap", "bbb.mcap"]
+        assert everything(there)["traces/aaa.mcap"] == everything(tmp_path / "here")["traces/aaa.mcap"]
+
+
+def test_a_restore_waits_for_no_service_that_runs(archive: Path, tmp_path: Path) -> None:
+    places = filled(tmp_path / "there")
+    before = everything(tmp_path / "there")
+    with sole_use(places.url), pytest.raises(InUseError, match="a service uses it; end that one first"):
+        restore(archive, places, NOW, quietly, overwrite=True)
+    assert everything(tmp_path / "there") == before
+    with sole_use(places.url):
+        pass
+
+
+def test_a_disk_that_fills_up_leaves_no_half_backup_and_no_half_restore(
+    archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.backup.write.RESERVE", 1 << 60)
+    with pytest.raises(BackupError, match="are free, a backup needs"):
+        back_up(places_in(tmp_path / "here"), tmp_path / "second.zip", NOW, quietly)
+    monkeypatch.setattr("server.backup.restore.RESERVE", 1 << 60)
+    with pytest.raises(BackupError, match="are needed"):
+        restore(archive, places_in(tmp_path / "there"), NOW, quietly)
+    assert not (tmp_path / "second.zip").exists()
+    assert everything(tmp_path / "there") == {}
+    assert {path.name for path in tmp_path.iterdir()} == {"here", "there", "arm.zip"}
+
+
+# ---- as a person does it
+
+
+@pytest.fixture
+def daq(
+    service: Service, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> CommandLine:
+    """The command, with the running service's configuration."""
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(service.folder)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "configuration"))
+    return CommandLine(capsys, monkeypatch)
+
+
+def test_a_backup_of_a_running_service_is_brought_back_elsewhere(
+    daq: CommandLine, service: Service, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = SPEC.model_dump(mode="json") | {"hold": 0.1}
+    done = service.robot.post("/experiments", json={"spec": spec}).json()["id"]
+    trace = service.end_of(done)["trace"]
+    long = service.robot.post("/experiments", json={"spec": spec | {"hold": 600}}).json()["id"]
+    waits = service.robot.post("/experiments", json={"spec": spec}).json()["id"]
+    service.until_recording(long)
+    said = daq("backup", str(tmp_path / "arm.zip"))
+    assert said.code == 0, said.err
+    daq("restore", str(tmp_path / "arm.zip"), "--overwrite").complains(3, "a service uses it; end that one first")
+    service.robot.post(f"/experiments/{waits}/cancel")
+    service.robot.post(f"/experiments/{long}/cancel")
+    service.end_of(long)
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert "is as it was written" in daq("restore", "../arm.zip", "--check").out
+    assert list((tmp_path / "elsewhere").iterdir()) == []
+    said = daq("restore", "../arm.zip")
+    assert said.code == 0, said.err
+    assert f"{trace[:8]}" in daq("traces", "ls").out
+    daq("restore", "../arm.zip").complains(2, "are there already")
+    store = Store(f"sqlite:///{tmp_path / 'elsewhere' / 'service' / 'service.sqlite'}")
+    experiments = ExperimentStore(store)
+    assert experiments.get("ma2000", done).state == "done"
+    assert experiments.get("ma2000", waits).state == "queued"
+    assert [one.id for one in experiments.settle_after_restart("ma2000", NOW)] == [long]
+    store.close()
+
+
+def test_what_cannot_be_backed_up_or_restored_is_one_line(daq: CommandLine, tmp_path: Path) -> None:
+    daq("restore", str(tmp_path / "none.zip")).complains(2, "none.zip", "cannot be read")
+    (tmp_path / "no.zip").write_text("no")
+    daq("restore", str(tmp_path / "no.zip"), "--check").complains(2, "is damaged, or no backup")
+    daq("backup", str(tmp_path / "no" / "folder.zip")).complains(2, "cannot be written")
+
+
+def test_the_configured_places(tmp_path: Path) -> None:
+    from daq.config import Settings
+    from daq.config.service import ServiceSettings
+
+    places = places_of(Settings(server=ServiceSettings(folder=tmp_path)))
+    assert places.target(DATABASE) == tmp_path / "service.sqlite"
+    assert places.target("jobs/0123456789ab/result.json") == tmp_path / "jobs" / "0123456789ab" / "result.json"
+    with pytest.raises(BackupError, match="is no file"):
+        places_of(Settings(server=ServiceSettings(database="postgresql://x/y")))

@@ -1,0 +1,52 @@
+"""Worker processes give way to the service, and do not outlive it."""
+
+from __future__ import annotations
+
+import os
+import select
+import subprocess
+import sys
+
+import pytest
+
+from server.jobs.service import worker_processes
+
+FOREVER = """
+import os, sys
+from server.jobs.service import worker_processes
+
+if __name__ == "__main__":
+    workers = worker_processes(1)
+    worker = workers.submit(os.getpid).result()
+    busy = workers.submit(pow, 3, 10**9)  # never lets another thread of its process run
+    while not busy.running():
+        pass
+    print(worker, flush=True)
+    sys.stdin.read()
+"""
+ENDS_WITHIN_S = 60
+
+
+def test_a_worker_ends_with_the_process_that_began_it_whatever_it_does() -> None:
+    with subprocess.Popen([sys.executable, "-c", FOREVER], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        worker = int(process.stdout.readline())
+        end_of_worker = os.pidfd_open(worker)
+        try:
+            assert not _readable(end_of_worker, 0)
+            process.kill()
+            assert _readable(end_of_worker, ENDS_WITHIN_S)
+        finally:
+            os.close(end_of_worker)
+
+
+def _readable(descriptor: int, patience: float) -> bool:
+    return bool(select.select([descriptor], [], [], patience)[0])
+
+
+@pytest.mark.skipif(not hasattr(os, "SCHED_IDLE"), reason="Linux's classes of processes")
+def test_a_worker_is_in_a_session_of_its_own_and_in_the_class_for_idle_times() -> None:
+    with worker_processes(1) as workers:
+        worker = workers.submit(os.getpid).result()
+        assert os.getsid(worker) == worker
+        assert os.sched_getscheduler(worker) == os.SCHED_IDLE

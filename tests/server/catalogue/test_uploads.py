@@ -1,0 +1,111 @@
+"""Files that are made to harm their reader: each is one line, and the service goes on as if nothing had been."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import resource
+import signal
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from benchmarks.hostile_files import bomb, hostile_tables, hostile_traces, sound_trace, table
+from server.bounded.messages import Limits, ReadUpload
+from server.bounded.process import answer_order
+from server.bounded.workers import ExhaustedError, Workers
+from server.problems import ProblemError
+from tests.server.service import Service
+
+MCAP, CSV = {"Content-Type": "application/octet-stream"}, {"Content-Type": "text/csv"}
+SOUND = sound_trace()
+HOSTILE = [(name, content, MCAP) for name, content in hostile_traces(SOUND).items()] + [
+    (name, content, CSV) for name, content in hostile_tables().items()
+]
+LIMITS = Limits(memory=256 << 20, seconds=30.0)
+
+
+@pytest.mark.parametrize(("content", "kind"), [one[1:] for one in HOSTILE], ids=[one[0] for one in HOSTILE])
+def test_a_hostile_file_is_refused_in_one_line(service: Service, content: bytes, kind: dict[str, str]) -> None:
+    """Most need no new process: what is merely wrong leaves its reader as it was."""
+    answer = service.robot.post("/traces", content=content, headers=kind)
+    assert answer.status_code in (413, 422), answer.text
+    problem = answer.json()
+    assert problem["type"] in ("docs/service.md#not-a-trace", "docs/service.md#too-large")
+    assert problem["detail"].startswith("upload: ")
+    assert len(problem["detail"]) < 400
+    assert "\n" not in problem["detail"]
+    assert str(service.folder) not in answer.text
+    assert not list((service.folder / "traces").glob(".upload-*"))
+
+
+@pytest.fixture
+def workers() -> Iterator[Workers]:
+    """A process with limits, started when it is needed."""
+    made = Workers(LIMITS, 1)
+    yield made
+    made.close()
+
+
+def _order(folder: Path, content: bytes, name: str = "upload.mcap") -> ReadUpload:
+    path = folder / name
+    path.write_bytes(content)
+    return ReadUpload(path=path, folder=folder)
+
+
+def test_what_needs_too_much_memory_is_refused_and_the_next_file_is_read(workers: Workers, tmp_path: Path) -> None:
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    order = _order(tmp_path, bomb(SOUND, 1 << 30))
+    with contextlib.suppress(ExhaustedError):  # where its end comes by the kernel
+        assert workers.ask(order).problem
+    assert workers.ask(_order(tmp_path, SOUND)).data["summary"]["samples"] == 50
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000, "kB: it was inflated here"
+
+
+def test_what_takes_too_long_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("server.bounded.workers.START_WITHIN", 0.0)
+    hasty = Workers(Limits(memory=LIMITS.memory, seconds=0.01), 1)
+    with pytest.raises(ExhaustedError, match=r"takes more than the 0\.01 s"):
+        hasty.ask(_order(tmp_path, SOUND))
+    hasty.close()
+
+
+def test_a_reader_that_is_killed_is_told_and_another_takes_its_place(workers: Workers, tmp_path: Path) -> None:
+    assert not workers.ask(_order(tmp_path, SOUND)).problem
+    (idle,) = workers.idle_processes()
+    os.kill(idle, signal.SIGSEGV)
+    os.waitid(os.P_PID, idle, os.WEXITED | os.WNOWAIT)
+    assert not workers.ask(_order(tmp_path, SOUND)).problem
+    assert workers.idle_processes() != (idle,)
+
+
+def test_a_disk_without_room_is_not_the_files_fault(workers: Workers, tmp_path: Path) -> None:
+    order = _order(tmp_path, table(), "upload.csv")
+    assert not workers.ask(order).problem
+    (number,) = workers.idle_processes()
+    resource.prlimit(number, resource.RLIMIT_FSIZE, (100, resource.RLIM_INFINITY))
+    for made in tmp_path.glob("*.mcap"):
+        made.unlink()
+    assert workers.ask(order).no_room
+
+
+def test_nobody_waits_for_a_reader_once_the_service_ends(tmp_path: Path) -> None:
+    workers, pipe = Workers(LIMITS, 1), tmp_path / "upload.csv"
+    os.mkfifo(pipe)  # a file that never has an end, and never a beginning
+    with ThreadPoolExecutor(2) as threads:
+        asked = [threads.submit(workers.ask, ReadUpload(path=pipe, folder=tmp_path)) for _ in range(2)]
+        while not workers.busy_processes():
+            pass
+        workers.close()
+        for one in asked:
+            with pytest.raises(ProblemError, match="the service ends"):
+                one.result(30)
+
+
+def test_an_error_that_nobody_has_foreseen_is_a_line_and_a_traceback_for_the_log() -> None:
+    answer = answer_order('{"kind": "nonsense"}', LIMITS)
+    assert answer.problem.startswith("cannot be read: ValidationError")
+    assert "Traceback" in answer.fault
+    assert answer.spent

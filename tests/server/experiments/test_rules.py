@@ -1,0 +1,230 @@
+"""The pure rules of the queue: states, order, schedule, what is missing."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from typing import Any, get_args
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+
+from daq.contracts.errors import SpecError
+from daq.contracts.experiment import ExperimentSpec, Trajectory
+from daq.contracts.machine import load_machine
+from daq.contracts.service.experiments import ENDS
+from daq.contracts.service.robot import RobotIdentity
+from daq.trajectories import plan, start_angles
+from server.experiments.length import LONGEST, least_length, points_of
+from server.experiments.order import Waiting, next_due
+from server.experiments.schedule import Plan, following, is_due
+from server.experiments.states import Event, IllegalEventError, advance, after_restart
+from server.owner.messages import ArmReport
+from server.queue.readiness import Circumstances, what_is_missing
+
+START = datetime(2026, 1, 1, tzinfo=UTC)
+moments = st.datetimes(datetime(2026, 1, 1), datetime(2027, 1, 1)).map(lambda moment: moment.replace(tzinfo=UTC))
+
+
+class ExperimentLife(RuleBasedStateMachine):
+    """Whatever happens, in whatever order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.state = "queued"
+        self.runs = 0
+        self.past = ["queued"]
+
+    @rule(event=st.sampled_from(Event))
+    def happens(self, event: Event) -> None:
+        try:
+            after = advance(self.state, event)  # type: ignore[arg-type]
+        except IllegalEventError:
+            return
+        self.runs += event is Event.TAKEN
+        self.state = after
+        self.past.append(after)
+
+    @rule()
+    def the_service_begins_again(self) -> None:
+        self.state = after_restart(self.state)  # type: ignore[arg-type]
+        self.past.append(self.state)
+
+    @invariant()
+    def it_runs_once_at_most_and_an_end_is_an_end(self) -> None:
+        assert self.runs <= 1
+        ended = [index for index, state in enumerate(self.past) if state in ENDS]
+        assert not ended or set(self.past[ended[0] :]) == {self.past[ended[0]]}
+
+    @invariant()
+    def after_a_restart_nothing_is_running(self) -> None:
+        assert after_restart(self.state) != "running"  # type: ignore[arg-type]
+
+
+TestExperimentLife = ExperimentLife.TestCase
+TestExperimentLife.settings = settings(max_examples=50, stateful_step_count=20)  # six states, seven events
+
+
+@pytest.mark.parametrize("event", sorted(set(Event) - {Event.TAKEN, Event.CANCELLED}))
+def test_what_waits_can_only_be_taken_or_cancelled(event: Event) -> None:
+    with pytest.raises(IllegalEventError, match=f"an experiment that is queued cannot be {event}"):
+        advance("queued", event)
+
+
+waiting = st.lists(
+    st.builds(
+        Waiting,
+        id=st.uuids().map(str),
+        sequence=st.integers(0, 10**6),
+        priority=st.integers(-100, 100),
+        at=st.none() | moments,
+    ),
+    unique_by=lambda one: one.sequence,
+)
+
+
+@given(waiting, moments)
+def test_the_next_is_due_and_nothing_due_goes_before_it(all_of_them: list[Waiting], now: datetime) -> None:
+    chosen = next_due(all_of_them, now)
+    due = [one for one in all_of_them if one.at is None or one.at <= now]
+    if chosen is None:
+        assert not due
+        return
+    assert chosen in due
+    for other in due:
+        assert (chosen.priority, -chosen.sequence) >= (other.priority, -other.sequence)
+
+
+@given(waiting, moments, st.timedeltas(timedelta(0), timedelta(days=100)))
+def test_a_clock_that_is_set_back_reorders_nothing(all_of_them: list[Waiting], now: datetime, back: timedelta) -> None:
+    at_once = [one for one in all_of_them if one.at is None]
+    assert next_due(at_once, now) == next_due(at_once, now - back)
+
+
+intervals = st.floats(10, 10**6)
+
+
+@given(moments, intervals, moments, moments, st.integers(0, 50))
+def test_the_following_run_is_later_and_on_the_grid(
+    starts: datetime, every: float, last: datetime, now: datetime, made: int
+) -> None:
+    plan = Plan(starts, every, None)
+    found = following(plan, made, last, now)
+    assert found is not None
+    assert found > last
+    assert found >= starts
+    steps = (found - starts).total_seconds() / every
+    assert abs(steps - round(steps)) * every < 1e-3
+
+
+@given(moments, intervals, st.integers(1, 20))
+def test_a_schedule_with_a_count_makes_that_many_runs(starts: datetime, every: float, count: int) -> None:
+    plan, moment, made = Plan(starts, every, count), starts, 0
+    while is_due(moment, moment):
+        made += 1
+        found = following(plan, made, moment, moment)
+        if found is None:
+            break
+        assert found > moment
+        moment = found
+    assert made == count
+
+
+def test_runs_that_were_missed_are_left_out_not_made_up_for() -> None:
+    plan = Plan(START, 60, None)
+    found = following(plan, 3, START + timedelta(seconds=120), START + timedelta(seconds=1000))
+    assert found == START + timedelta(seconds=1020)
+
+
+def test_a_clock_that_is_set_back_makes_no_run_due_again() -> None:
+    last = START + timedelta(seconds=120)
+    found = following(Plan(START, 60, None), 3, last, START - timedelta(days=1))
+    assert found == last + timedelta(seconds=60)
+
+
+def _arm(**changes: object) -> ArmReport:
+    calm = {"arm": "idle", "cause": "", "activity": "none", "limp": (), "link": "connected", "counters": {}}
+    return ArmReport.model_validate(calm | changes)
+
+
+REAL = RobotIdentity(simulated=False, protocol=2, period=0.02, boots=1)
+MOCK = REAL.model_copy(update={"simulated": True})
+
+
+@pytest.mark.parametrize(
+    ("now", "line", "pauses"),
+    [
+        (Circumstances(None, None, "no such port", True, True), "the robot is not connected. no such port", False),
+        (Circumstances(MOCK, _arm(link="lost"), "", True, True), "the link to the robot is lost", False),
+        (Circumstances(MOCK, _arm(arm="disconnected"), "", True, True), "the link to the robot is lost", False),
+        (Circumstances(MOCK, _arm(arm="stopped", cause="x"), "", True, True), "the arm is stopped", True),
+        (Circumstances(MOCK, _arm(arm="fault"), "", True, True), "the arm is fault", True),
+        (Circumstances(MOCK, _arm(activity="jog"), "", True, True), "the arm is busy: jog", False),
+        (Circumstances(REAL, _arm(), "", True, False), "no operator is present", True),
+    ],
+)
+def test_what_is_missing_is_said_and_pauses_the_queue_where_a_person_must_look(
+    now: Circumstances, line: str, pauses: bool
+) -> None:
+    missing = what_is_missing(now)
+    assert missing is not None
+    assert (missing.line, bool(missing.pause)) == (line, pauses)
+
+
+def test_a_real_arm_needs_an_operators_word_and_a_mock_does_not() -> None:
+    assert what_is_missing(Circumstances(MOCK, _arm(), "", False, True)) is None
+    missing = what_is_missing(Circumstances(REAL, _arm(), "", False, True))
+    assert missing is not None
+    assert "moves_real_arm" in missing.line
+    assert what_is_missing(Circumstances(REAL, _arm(), "", True, True)) is None
+
+
+def _repeated(amplitude: float, **more: object) -> ExperimentSpec:
+    return ExperimentSpec.model_validate(
+        {"trajectory": {"kind": "step", "amplitude": amplitude}, "joints": [1], **more}
+    )
+
+
+def test_the_least_length_has_settling_and_holding_of_every_repeat() -> None:
+    machine = load_machine("ma2000")
+    spec = _repeated(0.0, repeats=5, settle=0.5, hold=2.0)  # no way back: only the step's own set point is not in it
+    planned = plan(spec, machine, start_angles(spec, machine))
+    assert least_length(spec) == pytest.approx(planned.duration, abs=5 * planned.period + 1e-9)
+
+
+def test_what_the_ways_back_make_too_long_is_refused_by_the_planner() -> None:
+    machine = load_machine("ma2000")
+    spec = _repeated(3.0, repeats=1000, hold=0.0)
+    assert least_length(spec) < LONGEST
+    with pytest.raises(SpecError, match="at most 4 h are allowed"):
+        plan(spec, machine, start_angles(spec, machine))
+
+
+VIA = {"kind": "via", "points": [0.01, 0.02], "times": [2.0, 4.0]}
+OF_EVERY_KIND: tuple[tuple[dict[str, Any], float, int], ...] = (
+    ({"kind": "ramp", "duration": 4.0}, 4.0, 0),
+    ({"kind": "step"}, 0.0, 0),
+    ({"kind": "staircase", "steps": 4, "dwell": 0.5}, 4.0, 0),
+    ({"kind": "slow_ramp", "amplitude": 0.1, "speed": 0.1, "reversals": 3}, 4.0, 0),
+    ({"kind": "sine", "period": 2.0, "cycles": 2.0}, 4.0, 0),
+    ({"kind": "multisine", "duration": 4.0}, 4.0, 0),
+    ({"kind": "cubic", "duration": 4.0}, 4.0, 0),
+    (VIA, 4.0, 2),
+    ({"kind": "pick_and_place", "pick": 1.0, "travel": 2.0, "place": 1.0}, 4.0, 0),
+    ({"kind": "path", "times": [0.0, 4.0], "positions": [[0.0] * 3] * 2}, 4.0, 2),
+    ({"kind": "pause", "duration": 4.0}, 4.0, 0),
+    ({"kind": "sequence", "segments": [{"move": VIA}, {"move": {"kind": "pause", "duration": 1.0}}]}, 5.0, 3),
+)
+
+
+@pytest.mark.parametrize(("trajectory", "length", "points"), OF_EVERY_KIND, ids=lambda one: str(one)[10:15])
+def test_every_kind_of_motion_is_as_long_as_it_says(trajectory: dict[str, Any], length: float, points: int) -> None:
+    spec = ExperimentSpec.model_validate({"trajectory": trajectory, "settle": 0.0, "hold": 0.0})
+    assert least_length(spec) == pytest.approx(length)
+    assert points_of(spec) == points
+
+
+def test_no_kind_of_motion_is_left_out() -> None:
+    kinds = {one.model_fields["kind"].default for one in get_args(get_args(Trajectory)[0])}
+    assert {trajectory["kind"] for trajectory, _, _ in OF_EVERY_KIND} == kinds

@@ -1,0 +1,131 @@
+"""The owner's loop when the robot is silent for a while although its line stays open."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from threading import Event
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from daq.contracts.errors import ReachError
+from daq.driver import NoSampleError
+from daq.link import LinkState
+from daq.runner import ArmControl
+from firmware_protocol.commands import StatusFlag
+from server.owner import long_orders
+from server.owner.messages import BEGINS_WITHIN, Answer, Reset, RunProgram
+from server.owner.owner import serve
+
+SILENT = NoSampleError("mock://: no whole sample")
+
+
+class SilentForAWhile:
+    """A controller that gives a sample, then none twice while its line stays open, then samples again."""
+
+    def __init__(self) -> None:
+        self.link = SimpleNamespace(state=LinkState.CONNECTED, lock_step=True, url="mock://")
+        self.period_s = 0.0
+        self.ticks = iter(range(1000))
+        self.silence: Iterator[bool] = iter([False, True, True])
+
+    def next_snapshot(self, _after: int | None = None) -> SimpleNamespace:
+        if next(self.silence, False):
+            raise SILENT
+        return SimpleNamespace(tick=next(self.ticks), flags=StatusFlag(0))
+
+    def hello(self) -> None:
+        """The greeting."""
+
+    def status(self) -> SimpleNamespace:
+        return SimpleNamespace(flags=StatusFlag(0))
+
+
+def served(
+    orders: dict[int, Any], turns: int = 8, activities: list[str] | None = None, anew: list[int] | None = None
+) -> tuple[list[str], list[Answer]]:
+    """States of the arm as they are told, and answers; `orders` by the turn in which they come. `anew` gets how many
+    answers there were whenever the state was told in any case."""
+    controller, closing = SilentForAWhile(), Event()
+    states: list[str] = []
+    answers: list[Answer] = []
+    control = ArmControl(cast(Any, controller))
+    numbers = iter(range(turns))
+
+    def take(_timeout: float) -> Any:
+        return orders.get(next(numbers))
+
+    def tell_arm(**told: bool) -> None:
+        if anew is not None and told.get("anew"):
+            anew.append(len(answers))
+        states.append(str(control.arm.state))
+        if activities is not None:
+            activities.append(robot.activity)
+        if len(states) >= turns:
+            closing.set()
+
+    robot = SimpleNamespace(
+        controller=controller,
+        control=control,
+        tell_arm=tell_arm,
+        read_gains=dict,
+        activity="none",
+        guardian=SimpleNamespace(cause=None),
+        speaker=SimpleNamespace(ended=answers.append),
+        inbox=SimpleNamespace(take=take, closing=closing, done=lambda: None),
+    )
+    serve(cast(Any, robot))
+    return states, answers
+
+
+def test_a_robot_that_answers_again_is_connected_again() -> None:
+    states, _ = served({})
+    assert states[:5] == ["idle", "disconnected", "disconnected", "idle", "idle"]
+
+
+def test_what_would_move_a_robot_that_is_silent_is_refused() -> None:
+    order = cast(Any, RunProgram).model_construct(number=7, asked=time.monotonic(), activity="program")
+    states, answers = served({2: order})
+    assert [(a.number, a.exit_code) for a in answers] == [(7, ReachError.exit_code)]
+    assert "the link is lost; it is being tried again" in answers[0].problem
+    assert states[-1] == "idle"
+
+
+def test_a_reset_is_told_before_its_answer_though_the_stop_before_it_never_was(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The service has noted the stop by then, and lets nobody resume the queue until it is told of another state."""
+    monkeypatch.setattr(long_orders, "answered_quickly", lambda _robot, order: Answer(number=order.number))
+    told: list[int] = []
+    _, answers = served({0: Reset(number=7, asked=time.monotonic(), here=False)}, anew=told)
+    assert [answer.number for answer in answers] == [7]
+    assert told == [0]
+
+
+def test_an_order_that_comes_late_moves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The process was put aside with the order in its pipe, and goes on when nobody expects it any more."""
+    monkeypatch.setattr(long_orders, "perform", lambda *_: pytest.fail("the arm has begun"))
+    late = time.monotonic() - BEGINS_WITHIN - 0.1
+    order = cast(Any, RunProgram).model_construct(number=7, asked=late, activity="program")
+    _, (answer,) = served({0: order})
+    assert answer.exit_code == ReachError.exit_code
+    assert "nothing moved" in answer.problem
+
+
+@pytest.mark.parametrize("activity", ["program", "step"])
+def test_what_is_carried_out_is_told_before_it_begins_and_by_its_own_name(
+    activity: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order = cast(Any, RunProgram).model_construct(number=7, asked=time.monotonic(), activity=activity)
+    activities: list[str] = []
+
+    def perform(_robot: Any, order: RunProgram) -> Answer:
+        assert activities[-1] == activity
+        return Answer(number=order.number)
+
+    monkeypatch.setattr(long_orders, "perform", perform)
+    _, answers = served({0: order}, activities=activities)
+    assert answers == [Answer(number=7)]
+    assert activities[:2] == [activity, "none"]

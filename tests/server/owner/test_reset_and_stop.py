@@ -1,0 +1,156 @@
+"""In the owner's process: a reset ends the stop that its asker knew of, and none that has come since."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from daq.acquisition import stop_socket
+from daq.acquisition.guardian import EndCause, Guardian
+from daq.acquisition.stop_socket import StopAnswer, request_stop, stop_listener
+from daq.contracts.errors import SafetyError
+from daq.driver import Controller
+from daq.link import Link
+from daq.runner import ArmControl
+from daq.safety import State
+from firmware_protocol.commands import ReadStatus, Release, Request, Stop, to_frame
+from firmware_protocol.framing import Frame
+from mock_controller.bridge.bridge import Bridge
+from server.owner.messages import Reset
+from server.owner.quick_orders import carry_out
+from tests.mock.in_process import InProcess
+
+
+class Interrupted(Bridge):
+    """Something happens just before it hears the next request of a kind."""
+
+    before: type[Request] | None = None
+    happens: Callable[[], object]
+
+    def receive(self, frame: Frame) -> list[Frame]:
+        if self.before is not None and frame.opcode == self.before.OPCODE:
+            self.before = None
+            self.happens()
+        return super().receive(frame)
+
+    def hear_a_stop(self) -> None:
+        """From whomever."""
+        super().receive(to_frame(0, Stop()))
+
+
+@dataclass
+class Scene:
+    """An owner's robot, and a bridge that hears stops of others."""
+
+    endpoint: InProcess
+    guardian: Guardian
+    control: ArmControl
+    robot: Any
+
+    def press_stop(self) -> None:
+        """On this computer: through the guardian."""
+        (attempt,) = request_stop()
+        assert attempt.answer is not None
+        assert attempt.answer.confirmed
+
+    def between(self, request: type[Request], happens: Callable[[], object]) -> None:
+        """Before the next request of a kind reaches the bridge."""
+        self.endpoint.bridge.happens, self.endpoint.bridge.before = happens, request
+
+    def reset(self, *, here: bool, asked: float | None = None) -> None:
+        order = Reset(number=1, asked=time.monotonic() if asked is None else asked, here=here)
+        carry_out(self.robot, order)
+
+    def is_stopped(self) -> bool:
+        return bool(self.endpoint.board.frozen) and self.control.arm.state is State.STOPPED
+
+
+@contextmanager
+def owner_at(endpoint: InProcess) -> Iterator[Scene]:
+    controller = Controller(Link(cast(Any, endpoint)))
+    control = ArmControl(controller)
+
+    def freeze(cause: str) -> StopAnswer:
+        del cause
+        endpoint.bridge.hear_a_stop()
+        return StopAnswer(robot="arm", delivered=True, confirmed=True, tick=7)
+
+    with stop_listener("arm") as listener, Guardian(listener, None, freeze) as guardian:
+        robot = SimpleNamespace(
+            activity="none",
+            controller=controller,
+            control=control,
+            guardian=guardian,
+            read_gains=controller.gains,
+            ended=lambda: guardian.cause and guardian.cause.value,
+        )
+        yield Scene(endpoint, guardian, control, robot)
+
+
+@pytest.fixture
+def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Scene]:
+    """The arm has been stopped for a reason that the asker of the reset knows."""
+    monkeypatch.setenv(stop_socket.FOLDER_VARIABLE, str(tmp_path / "run"))
+    with owner_at(InProcess(Interrupted, sample=True)) as made:
+        made.control.stop("following error")
+        assert made.is_stopped()
+        yield made
+
+
+@pytest.mark.parametrize("here", [False, True])
+def test_a_reset_ends_the_stop_before_it(scene: Scene, here: bool) -> None:
+    scene.press_stop()
+    scene.reset(here=here)
+    assert not scene.endpoint.board.frozen
+    assert (scene.control.arm.state, scene.guardian.cause) == (State.IDLE, None)
+
+
+@pytest.mark.parametrize("here", [False, True])
+def test_a_stop_after_the_reset_was_asked_for_holds(scene: Scene, here: bool) -> None:
+    """The owner came to the reset late: it was repeating another request on a bad line."""
+    asked = time.monotonic()
+    scene.press_stop()
+    with pytest.raises(SafetyError, match=f"stopped since this reset was asked for .{EndCause.STOP.value}"):
+        scene.reset(here=here, asked=asked)
+    assert scene.is_stopped()
+    assert scene.guardian.cause is EndCause.STOP
+    scene.reset(here=here)
+    assert not scene.endpoint.board.frozen
+
+
+@pytest.mark.parametrize("here", [False, True])
+@pytest.mark.parametrize("request_under_way", [ReadStatus, Release])
+def test_a_stop_while_the_reset_is_carried_out_holds(
+    scene: Scene, here: bool, request_under_way: type[Request]
+) -> None:
+    scene.between(request_under_way, scene.press_stop)
+    with pytest.raises(SafetyError, match="reset again"):
+        scene.reset(here=here)
+    assert scene.is_stopped()
+    assert scene.guardian.cause is EndCause.STOP
+
+
+def test_a_stop_just_before_the_one_of_a_reset_here_holds(scene: Scene) -> None:
+    scene.between(Stop, scene.press_stop)
+    with pytest.raises(SafetyError, match="stopped since this reset was asked for"):
+        scene.reset(here=True)
+    assert scene.is_stopped()
+    assert scene.guardian.cause is EndCause.STOP
+
+
+@pytest.mark.parametrize("here", [False, True])
+def test_a_stop_of_another_computer_holds(scene: Scene, here: bool) -> None:
+    scene.between(Release, scene.endpoint.bridge.hear_a_stop)
+    with pytest.raises(SafetyError, match="another stop has come meanwhile, and holds: reset again"):
+        scene.reset(here=here)
+    assert scene.is_stopped()
+    assert scene.control.halted is not None
+    scene.reset(here=here)
+    assert not scene.endpoint.board.frozen

@@ -1,0 +1,150 @@
+"""A queue on stores of its own, with a clock turned by hand and an arm that answers what a test says."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from sqlalchemy.exc import OperationalError
+
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.service.experiments import Experiment, ExperimentRequest, Schedule, ScheduleRequest
+from daq.contracts.service.robot import RobotIdentity
+from daq.contracts.trace import Outcome
+from server.owner.messages import Answer, ArmReport, Finished
+from server.queue.context import QueueContext
+from server.queue.service import QueueService
+from server.robot.control import ControlService
+from server.store.engine import Store
+from server.store.experiments import ExperimentStore
+from server.store.queues import QueueStore
+from server.store.schedules import ScheduleStore
+from tests.server.clocks import HandClock
+
+CALM = ArmReport(arm="idle", cause="", activity="none", limp=(), link="connected", counters={})
+MOCK = RobotIdentity(simulated=True, protocol=2, period=0.02, boots=1)
+REAL = MOCK.model_copy(update={"simulated": False})
+FULL = OperationalError("INSERT", {}, Exception("database or disk is full"))
+SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]})
+
+
+class Bench:
+    """A queue, its stores, an arm, and all events.
+
+    answer:   what the arm answers an experiment with; None while it moves
+    fails_at: the event whose listener fails, once
+    lost:     raised for a trace that is to be taken into the catalogue
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.store = Store(f"sqlite:///{folder / 'service.sqlite'}")
+        self.store.migrate()
+        self.experiments, self.schedules = ExperimentStore(self.store), ScheduleStore(self.store)
+        self.clock = HandClock()
+        self.answer: Answer | None = Answer(number=1, problem="refused", exit_code=2)
+        self.asked: Future[Answer] = Future()
+        self.moves = threading.Event()
+        self.fails_at = ""
+        self.lost: Exception | None = None
+        self.looked_for_traces = 0
+        self.orders: list[object] = []
+        self._heard = threading.Condition()
+        self.events: list[str] = []
+        self.control = ControlService(
+            self.clock, lambda who: self._end("lapsed", who), lambda who: self._end("given_back", who)
+        )
+        self.robot: Any = SimpleNamespace(
+            name="ma2000",
+            identity=MOCK,
+            arm=CALM,
+            problem="",
+            experiment=None,
+            place=SimpleNamespace(folder=folder),
+            ask=self._ask,
+            tell=self.orders.append,
+        )
+        self.queues = QueueStore(self.store)
+        self.queue = self.begun_anew()
+
+    def close(self) -> None:
+        """What runs ends, and so does everything else."""
+        if self.moves.is_set() and not self.asked.done():
+            self.asked.set_result(done())
+        self.queue.close(10)
+        self.control.close()
+        self.store.close()
+
+    def begun_anew(self) -> QueueService:
+        """The queue as a service that begins now has it."""
+        context = QueueContext(
+            robot=self.robot,
+            control=self.control,
+            experiments=self.experiments,
+            schedules=self.schedules,
+            queues=self.queues,
+            clock=self.clock,
+            record_event=self._record_event,
+            recorded=self._record,
+            unfinished=self._look_for_traces,
+            unattended=False,
+        )
+        return QueueService(context)
+
+    def _end(self, how: str, who: str) -> None:
+        """The queue is made after the control, and anew by some tests."""
+        {"lapsed": self.queue.control_lapsed, "given_back": self.queue.control_given_back}[how](who)
+
+    def _ask(self, _order: object, **_fields: object) -> Future[Answer]:
+        self.asked = Future()
+        if self.answer is not None:
+            self.asked.set_result(self.answer)
+        self.moves.set()
+        return self.asked
+
+    def _record(self, _answer: Answer) -> None:
+        if self.lost is not None:
+            raise self.lost
+
+    def _look_for_traces(self) -> None:
+        self.looked_for_traces += 1
+
+    def _record_event(self, kind: str, text: str, *, actor: str | None = None, experiment: str | None = None) -> None:
+        del actor, experiment
+        with self._heard:
+            self.events.append(f"{kind}: {text}")
+            self._heard.notify_all()
+            if text == self.fails_at:
+                self.fails_at = ""
+                raise FULL
+
+    def until(self, said: Callable[[str], bool]) -> str:
+        """Waits for such an event; the test's own time limit ends the wait."""
+        with self._heard:
+            self._heard.wait_for(lambda: any(said(event) for event in self.events))
+            return next(event for event in self.events if said(event))
+
+    def submit(self) -> Experiment:
+        """An experiment that may run at once."""
+        return self.queue.submit(ExperimentRequest(spec=SPEC), "anna", None)[0]
+
+    def schedule(self, every: float = 3600) -> Schedule:
+        """One whose first run is due now, and then every hour."""
+        return self.schedules.create("ma2000", ScheduleRequest(spec=SPEC, every=every), self.clock.utc(), "anna")
+
+    def runs(self, schedule: Schedule) -> list[Experiment]:
+        """What it has submitted."""
+        return list(self.experiments.page("ma2000", (), schedule.id, None, 10).items)
+
+    def counted(self, schedule: Schedule) -> int:
+        """How many runs count as made."""
+        return self.schedules.get("ma2000", schedule.id).submitted_runs
+
+
+def done(outcome: Outcome = "complete") -> Answer:
+    """Of a run that left a trace."""
+    finished = Finished(outcome=outcome, trace="x.mcap", samples=1, missing=0, counters={}, reason="")
+    return Answer(number=1, finished=finished)

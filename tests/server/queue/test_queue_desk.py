@@ -1,0 +1,255 @@
+"""The queue's own thread, on stores of its own and an arm that answers what a test says."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from collections.abc import Callable
+from datetime import timedelta
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from sqlalchemy import text
+from sqlalchemy.exc import OperationalError
+
+from daq.contracts.service.experiments import Experiment, ExperimentRequest
+from server.owner.messages import Answer
+from server.problems import ProblemError
+from server.queue.due_runs import DueRuns
+from tests.server.queue.bench import CALM, FULL, REAL, SPEC, Bench, done
+
+
+def test_a_run_that_a_full_disk_refuses_is_not_counted_and_comes_when_there_is_room(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    schedule = bench.schedule()
+    usage = shutil.disk_usage
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: SimpleNamespace(free=10**6))
+    bench.queue.start()
+    line = "1 MB are free for traces, 20 MB stay free"
+    bench.until(lambda event: event == f"schedule: schedule {schedule.id}: its run has to wait: {line}")
+    assert (bench.runs(schedule), bench.counted(schedule)) == ([], 0)
+    monkeypatch.setattr(shutil, "disk_usage", usage)
+    bench.queue.wake()
+    bench.until(lambda event: "queued by schedule" in event)
+    assert (len(bench.runs(schedule)), bench.counted(schedule)) == (1, 1)
+
+
+def test_a_run_counts_as_made_only_with_its_experiment(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    schedule = bench.schedule()
+    submit = bench.experiments.submit
+
+    def fails_once(*args: Any, **named: Any) -> tuple[Experiment, bool]:
+        monkeypatch.setattr(bench.experiments, "submit", submit)
+        raise OperationalError("INSERT", {}, Exception("database or disk is full"))
+
+    monkeypatch.setattr(bench.experiments, "submit", fails_once)
+    bench.queue.start()
+    bench.until(lambda event: "queued by schedule" in event)
+    assert (len(bench.runs(schedule)), bench.counted(schedule)) == (1, 1)
+
+
+def test_an_experiment_is_made_only_with_the_count_of_its_run(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    schedule = bench.schedule()
+    count = bench.schedules.count_run
+
+    def fails_once(*_args: Any) -> None:
+        monkeypatch.setattr(bench.schedules, "count_run", count)
+        raise OperationalError("UPDATE", {}, Exception("database or disk is full"))
+
+    monkeypatch.setattr(bench.schedules, "count_run", fails_once)
+    bench.queue.start()
+    bench.until(lambda event: "queued by schedule" in event)
+    assert (len(bench.runs(schedule)), bench.counted(schedule)) == (1, 1)
+
+
+def test_a_schedule_that_cannot_be_read_holds_up_neither_another_nor_the_queue(bench: Bench) -> None:
+    bad = bench.schedule()
+    with bench.store.writing() as session:
+        session.execute(text("UPDATE schedules SET spec = :spec"), {"spec": '{"trajectory": {"kind": "none"}}'})
+    good = bench.schedule()
+    bench.experiments.submit("ma2000", ExperimentRequest(spec=SPEC), bench.clock.utc(), "anna")
+    bench.queue.start()
+    bench.until(lambda event: event.startswith(f"schedule: schedule {bad.id}: its run has to wait"))
+    bench.until(lambda event: event == f"experiment: queued by schedule {good.id}")
+    bench.until(lambda event: event == "experiment: failed: refused")
+
+
+@pytest.mark.parametrize(("exit_code", "state"), [(3, "interrupted"), (6, "cancelled"), (5, "failed")])
+def test_events_and_the_queue_call_an_end_as_the_experiment_does(bench: Bench, exit_code: int, state: str) -> None:
+    bench.answer = Answer(number=1, problem="why", exit_code=exit_code)
+    made = bench.queue.submit(ExperimentRequest(spec=SPEC), "anna", None)[0]
+    bench.queue.start()
+    bench.until(lambda event: event == f"experiment: {state}: why")
+    bench.until(lambda event: event.startswith("queue: paused"))
+    assert bench.experiments.get("ma2000", made.id).state == state
+    how = state if state == "failed" else f"was {state}"
+    expected = f"{SPEC.name or SPEC.trajectory.kind} {how} (why): look at the arm, then resume the queue"
+    assert bench.queue.status().reason == expected
+
+
+def _fails(times: int, otherwise: Callable[..., Any]) -> Callable[..., Any]:
+    """What a full disk makes of `otherwise`, and of those who call it again."""
+    left = [FULL] * times
+
+    def tried(*args: Any, **named: Any) -> Any:
+        if left:
+            raise left.pop()
+        return otherwise(*args, **named)
+
+    return tried
+
+
+def _is_free(bench: Bench) -> bool:
+    """Whether Reset, Disconnect and whoever wants the control get it."""
+    bench.control.require_free_of_others(None)
+    return bench.robot.experiment is None and bench.queue.running is None
+
+
+# ---- what fails at the end
+
+
+def test_a_fault_before_the_arm_is_asked_ends_the_experiment_gives_the_control_back_and_holds_the_queue(
+    bench: Bench,
+) -> None:
+    bench.fails_at = "started"
+    made, following = bench.submit(), bench.submit()
+    bench.queue.start()
+    bench.until(lambda event: event.startswith("queue: paused"))
+    ended = bench.experiments.get("ma2000", made.id)
+    assert (ended.state, ended.reason) == ("interrupted", "OperationalError: see the log")
+    assert _is_free(bench)
+    assert bench.experiments.get("ma2000", following.id).state == "queued"
+
+
+def test_a_trace_that_cannot_be_taken_in_holds_the_queue_and_is_looked_for(bench: Bench) -> None:
+    bench.answer, bench.lost = done(), FULL
+    made, following = bench.submit(), bench.submit()
+    bench.queue.start()
+    bench.until(lambda event: event.startswith("queue: paused"))
+    ended = bench.experiments.get("ma2000", made.id)
+    assert (ended.state, ended.outcome) == ("done", "complete")
+    assert ended.reason == "its trace is not in the catalogue: see the log"
+    assert bench.looked_for_traces == 1
+    assert _is_free(bench)
+    assert bench.experiments.get("ma2000", following.id).state == "queued"
+
+
+def test_an_end_that_cannot_be_written_holds_the_queue_and_is_written_later(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.answer = done()
+    monkeypatch.setattr(bench.experiments, "end", _fails(2, bench.experiments.end))
+    made, following = bench.submit(), bench.submit()
+    bench.queue.start()
+    bench.until(lambda event: event.startswith("queue: paused"))
+    assert bench.queue.status().paused
+    assert _is_free(bench)
+    bench.queue.wake()
+    bench.until(lambda event: event == "experiment: completed")
+    assert bench.experiments.get("ma2000", made.id).state == "done"
+    assert bench.experiments.get("ma2000", following.id).state == "queued"
+
+
+def test_a_pause_holds_though_the_database_does_not_know_it_yet(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    write, written = bench.queues.set, threading.Event()
+
+    def then_told(*args: Any) -> None:
+        write(*args)
+        written.set()
+
+    monkeypatch.setattr(bench.queues, "set", _fails(1, then_told))
+    bench.queue.pause("paused by anna", "anna")
+    assert bench.queue.status().paused
+    assert bench.begun_anew().status().paused is False
+    bench.queue.start()
+    written.wait()
+    assert bench.begun_anew().status().reason == "paused by anna"
+
+
+def test_a_queue_whose_resuming_cannot_be_written_stays_paused(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench.queue.pause("paused by anna", "anna")
+    monkeypatch.setattr(bench.queues, "set", _fails(1, bench.queues.set))
+    with pytest.raises(OperationalError):
+        bench.queue.resume("anna", moves_real_arm=True)
+    assert bench.queue.status().paused
+
+
+# ---- a person beside the arm
+
+
+def test_a_pause_lets_the_one_that_runs_go_on_where_an_operator_must_be_there(bench: Bench) -> None:
+    bench.robot.identity, bench.answer = REAL, None
+    bench.queue.resume("anna", moves_real_arm=True)
+    bench.submit()
+    bench.queue.start()
+    bench.moves.wait()
+    bench.queue.pause("paused by anna", "anna")
+    attended = bench.queue.status().attended_until
+    assert attended is not None  # else the run is stopped within a second
+    assert attended > bench.clock.utc()
+
+
+@pytest.mark.parametrize("state", ["stopped", "fault"])
+def test_a_stop_holds_the_queue_though_nothing_waits_and_whatever_is_reset_meanwhile(bench: Bench, state: str) -> None:
+    stopped = CALM.model_copy(update={"arm": state, "cause": "somebody"})
+    bench.queue.on_arm_report(stopped)
+    bench.queue.on_arm_report(CALM)  # reset, before the queue's thread has looked
+    bench.queue.start()
+    line = f"the arm is {state} (somebody): look at it, reset it, then resume the queue"
+    bench.until(lambda event: event == f"queue: paused: {line}")
+    assert bench.queue.status().reason == line
+    bench.queue.resume("anna", moves_real_arm=False)
+    made = bench.submit()
+    bench.until(lambda event: event == "experiment: failed: refused")
+    assert bench.experiments.get("ma2000", made.id).state == "failed"
+
+
+def test_a_stop_is_remembered_by_whoever_wants_to_resume_too_early(bench: Bench) -> None:
+    bench.robot.arm = CALM.model_copy(update={"arm": "stopped", "cause": "somebody"})
+    bench.queue.on_arm_report(bench.robot.arm)
+    with pytest.raises(ProblemError, match="the arm is stopped: somebody"):
+        bench.queue.resume("anna", moves_real_arm=False)
+    bench.robot.arm = CALM
+    bench.queue.start()
+    bench.until(lambda event: event.startswith("queue: paused: the arm is stopped"))
+
+
+# ---- schedules that nobody could submit
+
+
+def test_what_was_due_while_the_service_was_off_is_left_out(bench: Bench) -> None:
+    schedule = bench.schedule()
+    bench.clock.turn(3 * 3600 + 60)
+    bench.queue = bench.begun_anew()
+    line = "runs that were due while the service was off were skipped"
+    assert bench.events == [f"schedule: schedule {schedule.id}: {line}"]
+    assert bench.schedules.due("ma2000", bench.clock.utc()) == []
+    found = bench.schedules.get("ma2000", schedule.id)
+    assert (found.next, found.submitted_runs) == (schedule.starts + timedelta(hours=4), 0)
+
+
+def test_switching_a_schedule_on_submits_nothing_that_was_due_while_it_was_off(bench: Bench) -> None:
+    schedule = bench.schedule()
+    name, due = "ma2000", [schedule.id]
+    bench.schedules.switch(name, schedule.id, active=True, now=bench.clock.utc())  # it is on: its run stays due
+    assert bench.schedules.due(name, bench.clock.utc()) == due
+    bench.schedules.switch(name, schedule.id, active=False, now=bench.clock.utc())
+    bench.clock.turn(7 * 86400)
+    on = bench.schedules.switch(name, schedule.id, active=True, now=bench.clock.utc())
+    assert bench.schedules.due(name, bench.clock.utc()) == []
+    assert on.next == bench.clock.utc() + timedelta(hours=1)
+    bench.clock.turn(3600)
+    assert bench.schedules.due(name, bench.clock.utc()) == due
+
+
+def test_runs_that_are_left_out_are_told_once(bench: Bench) -> None:
+    schedule = bench.schedule(every=10)
+    bench.queue.pause("paused by anna", "anna")
+    runs = DueRuns(bench.queue._context)
+    for _ in range(5):
+        runs.submit()
+        bench.clock.turn(10)
+    assert len([event for event in bench.events if "skipped" in event]) == 1
+    assert bench.counted(schedule) == 5

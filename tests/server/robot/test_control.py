@@ -1,0 +1,107 @@
+"""The control of the robot, with a clock turned by hand."""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Iterator
+
+import pytest
+
+from server.problems import ProblemError
+from server.robot.control import LEASE_TIME, ControlService
+from tests.server.clocks import HandClock
+
+WITHIN = 60.0
+"""s after which a test has failed."""
+
+
+@pytest.fixture
+def lapsed() -> queue.Queue[str]:
+    """Who went silent."""
+    return queue.Queue()
+
+
+@pytest.fixture
+def clock() -> HandClock:
+    """Stands still until it is turned."""
+    return HandClock()
+
+
+@pytest.fixture
+def desk(clock: HandClock, lapsed: queue.Queue[str]) -> Iterator[ControlService]:
+    """Nobody has the control."""
+    made = ControlService(clock, lapsed.put)
+    yield made
+    made.close()
+
+
+def test_a_heartbeat_keeps_the_control_and_silence_ends_it(desk: ControlService, clock: HandClock) -> None:
+    lease = desk.take("anna", moves_real_arm=False).lease
+    for _ in range(5):
+        clock.turn(LEASE_TIME - 1)
+        desk.renew(lease)
+    clock.turn(LEASE_TIME)
+    with pytest.raises(ProblemError, match=r"lost control|no longer"):
+        desk.require(lease)
+    assert desk.status().holder == "nobody"
+    assert desk.take("bert", moves_real_arm=False).lease != lease
+
+
+def test_a_wall_clock_that_is_set_forward_ends_no_lease(desk: ControlService, clock: HandClock) -> None:
+    lease = desk.take("anna", moves_real_arm=False).lease
+    clock.wall = clock.wall.replace(year=2030)
+    assert desk.require(lease).name == "anna"
+
+
+def test_the_queue_and_a_client_never_have_it_together(desk: ControlService) -> None:
+    lease = desk.take("anna", moves_real_arm=False).lease
+    assert not desk.take_for_queue("an experiment")
+    desk.give_back(lease)
+    assert desk.take_for_queue("an experiment")
+    with pytest.raises(ProblemError, match="of the queue is running"):
+        desk.take("anna", moves_real_arm=False)
+    desk.give_back_for_queue()
+    assert desk.take("anna", moves_real_arm=False)
+
+
+def test_silence_is_told_once(clock: HandClock, desk: ControlService, lapsed: queue.Queue[str]) -> None:
+    desk.take("anna", moves_real_arm=False)
+    clock.turn(LEASE_TIME)
+    bert = desk.take("bert", moves_real_arm=False)
+    desk.renew(bert.lease)
+    assert desk.status().name == "bert"
+    desk.close()
+    assert lapsed.get_nowait() == "anna"
+    assert lapsed.empty()
+
+
+def test_a_listener_that_fails_ends_neither_the_watch_nor_the_next_lease(clock: HandClock) -> None:
+    heard: queue.Queue[str] = queue.Queue()
+
+    def fails(holder: str) -> None:
+        heard.put(holder)
+        raise OSError("database or disk is full")
+
+    desk = ControlService(clock, fails)
+    for name in ("anna", "bert"):
+        desk.take(name, moves_real_arm=False)
+        clock.turn(LEASE_TIME)
+        if desk.take_for_queue("an experiment"):  # the watch looks at the clock, where it has not done so before
+            desk.give_back_for_queue()
+        assert heard.get(timeout=WITHIN) == name
+    desk.take("carl", moves_real_arm=False)
+    clock.turn(LEASE_TIME)
+    assert desk.take("dora", moves_real_arm=False).lease
+    assert heard.get(timeout=WITHIN) == "carl"
+    desk.close()
+
+
+def test_the_queue_has_the_control_only_after_it_was_told_that_a_client_went_silent(
+    desk: ControlService, clock: HandClock, lapsed: queue.Queue[str]
+) -> None:
+    desk.take("anna", moves_real_arm=False)
+    clock.turn(LEASE_TIME)
+    while not desk.take_for_queue("an experiment"):
+        assert lapsed.get(timeout=WITHIN) == "anna"
+    assert desk.status().holder == "queue"
+    assert lapsed.empty()

@@ -1,0 +1,108 @@
+"""The service's side of a robot's owner when the owner, or a listener, or the computer does what it should not."""
+
+from __future__ import annotations
+
+import subprocess
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from queue import SimpleQueue
+from types import SimpleNamespace
+from typing import NoReturn
+
+import pytest
+
+from daq.contracts.errors import ReachError
+from daq.contracts.machine import load_machine
+from daq.transport import ReconnectDelay
+from server.owner.messages import Open, ReadGains, Report, TeachingText
+from server.robot.keeper import Keeper
+from server.robot.owner_process import OwnerGoneError, OwnerProcess
+from server.robot.robot import Robot, RobotPlace
+from tests.server.clocks import HandClock
+
+HALF = '{"kind":"answer","num'
+LINES = '{"kind":"told","text":"first"}\n{"kind":"told","text":"second"}\n'
+MACHINE = load_machine("ma2000")
+OPEN = Open(url="mock://", machine=MACHINE, limits=MACHINE.limits, folder=Path(), robot="ma2000")
+Start = Callable[[str], None]
+
+
+@pytest.fixture
+def owners_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Start:
+    """From now on an owner is a program that writes something, reads its first order, and kills itself."""
+
+    def replaced(output: str) -> None:
+        program = tmp_path / "owner"
+        program.write_text(f"#!/bin/sh\nprintf '%s' '{output}'\nread -r order\nkill -9 $$\n")
+        program.chmod(0o700)
+        monkeypatch.setattr("server.robot.owner_process.sys", SimpleNamespace(executable=str(program)))
+
+    return replaced
+
+
+@pytest.mark.parametrize("output", [HALF, f"{HALF}\n", f"no JSON\n{HALF}", ""])
+def test_an_owner_killed_in_the_middle_of_a_report_is_gone(owners_are: Start, output: str) -> None:
+    owners_are(output)
+    ended: SimpleQueue[str] = SimpleQueue()
+    owner = OwnerProcess(OPEN, lambda _report: None, ended.put)
+    answer = owner.ask(ReadGains, asked=0.0)
+    assert ended.get(timeout=60) == "signal 9"
+    for asked in (answer, owner.ask(ReadGains, asked=0.0)):
+        with pytest.raises(OwnerGoneError):
+            asked.result(0)
+    assert owner.close()
+
+
+def test_a_listener_at_fault_costs_nobody_else_a_report(owners_are: Start) -> None:
+    owners_are(LINES)
+    robot = Robot(RobotPlace("ma2000", "mock://", MACHINE, Path()), HandClock())
+    heard: SimpleQueue[Report] = SimpleQueue()
+    ends: SimpleQueue[str] = SimpleQueue()
+
+    def at_fault(_news: object) -> NoReturn:
+        raise RuntimeError("a fault")
+
+    robot.listeners += [at_fault, heard.put]
+    robot.disconnected += [at_fault, ends.put]
+    connecting = threading.Thread(target=_refused, args=(robot,))
+    connecting.start()
+    assert [heard.get(timeout=60) for _ in range(2)] == [TeachingText(text="first"), TeachingText(text="second")]
+    assert ends.get(timeout=60) == "signal 9"
+    connecting.join()
+    assert robot.connection == "disconnected"
+
+
+def _refused(robot: Robot) -> None:
+    with pytest.raises(ReachError, match="signal 9"):
+        robot.connect()
+
+
+def test_a_process_that_cannot_be_started_is_a_robot_that_is_not_reached(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_process(*_: object, **__: object) -> NoReturn:
+        raise OSError(12, "Cannot allocate memory")
+
+    monkeypatch.setattr(subprocess, "Popen", no_process)
+    robot = Robot(RobotPlace("ma2000", "mock://", MACHINE, Path()), HandClock())
+    with pytest.raises(ReachError, match="Cannot allocate memory"):
+        robot.connect()
+    assert (robot.connection, "Cannot allocate memory" in robot.problem) == ("disconnected", True)
+
+
+@pytest.mark.parametrize("error", [OSError(24, "Too many open files"), ValueError("a fault"), ReachError("no answer")])
+def test_whatever_keeps_it_from_connecting_is_tried_again(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.robot.keeper.DELAYS", ReconnectDelay(1e-6, 1e-6))
+    robot = Robot(RobotPlace("ma2000", "mock://", MACHINE, Path()), HandClock())
+    tried, third = [0], threading.Event()
+
+    def connect(**_: object) -> None:
+        tried[0] += 1
+        if tried[0] == 3:
+            third.set()
+        raise error
+
+    monkeypatch.setattr(robot, "connect", connect)
+    keeper = Keeper(robot)
+    keeper.start(connect=True)
+    assert third.wait(60)
+    keeper.close(60)

@@ -1,0 +1,85 @@
+"""Between the board's word that it has stopped and its owner's report of that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Future
+from pathlib import Path
+from types import SimpleNamespace
+from typing import NoReturn
+
+import pytest
+
+from daq.acquisition.stop_socket import StopAnswer
+from daq.contracts.machine import load_machine
+from daq.contracts.service.robot import ArmState
+from server.owner.messages import Answer, ArmReport
+from server.problems import ProblemError
+from server.robot.robot import Robot, RobotPlace
+from server.robot.stop import StopService
+from server.robot.teaching import TeachingService
+from tests.server.clocks import HandClock
+
+JOG = {2: 0.1}
+
+
+@pytest.fixture
+def robot(monkeypatch: pytest.MonkeyPatch) -> Robot:
+    """Connected, idle; what it is asked goes on."""
+    robot = Robot(RobotPlace("ma2000", "mock://", load_machine("ma2000"), Path()), HandClock())
+    monkeypatch.setattr(robot, "ask", lambda *_, **__: Future[Answer]())
+    robot._on_report(_report("idle"))
+    return robot
+
+
+@pytest.fixture
+def desk(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> Iterator[StopService]:
+    """Whose stops are confirmed."""
+    answer = StopAnswer(robot="ma2000", port="mock://", delivered=True, confirmed=True, tick=7, text="")
+    monkeypatch.setattr("server.stopping.arm.request_stop", lambda *_: [SimpleNamespace(answer=answer)])
+    desk = StopService(robot)
+    yield desk
+    desk.close()
+
+
+def _report(arm: ArmState) -> ArmReport:
+    return ArmReport(arm=arm, cause="", activity="none", limp=(), link="connected", counters={})
+
+
+@pytest.mark.parametrize("jogging", [True, False])
+def test_nothing_is_jogged_after_a_confirmed_stop(robot: Robot, desk: StopService, jogging: bool) -> None:
+    teaching = TeachingService(robot, lambda _line: None)
+    if jogging:
+        teaching.jog(JOG, robot.clock.monotonic())
+    assert desk.stop_now().confirmed
+    with pytest.raises(ProblemError) as refused:
+        teaching.jog(JOG, robot.clock.monotonic())
+    assert (refused.value.status, refused.value.kind) == (409, "arm-stopped")
+    robot._on_report(_report("stopped"))
+    with pytest.raises(ProblemError):
+        teaching.jog(JOG, robot.clock.monotonic())
+    robot._on_report(_report("idle"))  # after a reset
+    teaching.jog(JOG, robot.clock.monotonic())
+    assert teaching.status().activity == "jog"
+
+
+def test_a_stop_that_finds_no_file_for_its_socket_says_that_it_was_not_delivered(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_socket(*_: object) -> NoReturn:
+        raise OSError(24, "Too many open files")
+
+    monkeypatch.setattr("server.stopping.arm.request_stop", no_socket)
+    desk = StopService(robot)
+    told = desk.stop_now()
+    desk.close()
+    assert (told.delivered, told.confirmed) == (False, False)
+    assert told.text.startswith("stop NOT DELIVERED: ")
+    assert told.text.endswith("Too many open files. Use the emergency stop.")
+
+
+def test_a_fault_keeps_its_cause_when_it_is_stopped_too(robot: Robot, desk: StopService) -> None:
+    fault = _report("fault").model_copy(update={"cause": "joint 2 moved"})
+    robot._on_report(fault)
+    assert desk.stop_now().confirmed
+    assert robot.arm == fault

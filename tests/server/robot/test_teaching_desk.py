@@ -1,0 +1,158 @@
+"""Teaching in the service, without a robot: when a command was said, and what is left of a lead."""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from daq.contracts.machine import load_machine
+from daq.teaching import Program
+from daq.teaching.jog import DEAD_MAN
+from daq.teaching.lead import PATIENCE
+from daq.teaching.program import Relative
+from server.owner.messages import Answer, Finish, JogBegin, JogDrive, RunProgram
+from server.problems import ProblemError, conflict
+from server.robot import teaching
+from server.robot.robot import Robot, RobotPlace
+from server.robot.teaching import LEAD_ENDS_WITHIN, TeachingService, Word
+from tests.server.clocks import HandClock
+
+JOG = {2: 0.1}
+PATH = {"joints": [1], "times": [0.0, 0.02], "positions": [[0.0], [0.1]]}
+
+
+class Asked(Robot):
+    """A robot that keeps what its owner is told and asked for, and lets the test answer."""
+
+    def __init__(self) -> None:
+        super().__init__(RobotPlace("ma2000", "mock://", load_machine("ma2000"), Path()), HandClock())
+        self.orders: list[Any] = []
+        self.answers: list[Future[Answer]] = []
+        self.finished = threading.Event()
+
+    def ask(self, kind: Any, **fields: object) -> Future[Answer]:
+        """An order with an answer."""
+        self.orders.append(kind(number=len(self.orders), **fields))
+        self.answers.append(Future())
+        return self.answers[-1]
+
+    def tell(self, order: Any) -> None:
+        """An order without."""
+        self.orders.append(order)
+        if isinstance(order, Finish):
+            self.finished.set()
+
+
+@pytest.fixture
+def robot() -> Asked:
+    """Connected, idle."""
+    return Asked()
+
+
+@pytest.fixture
+def desk(robot: Asked) -> TeachingService:
+    """Its teaching."""
+    return TeachingService(robot, lambda _line: None)
+
+
+def test_a_command_goes_on_with_the_moment_at_which_it_arrived(robot: Asked, desk: TeachingService) -> None:
+    said = robot.clock.monotonic()
+    robot.clock.turn(DEAD_MAN / 2)  # type: ignore[attr-defined]
+    desk.jog(JOG, said)
+    assert robot.orders == [JogBegin(number=0, asked=robot.clock.monotonic()), JogDrive(velocities=JOG, said=said)]
+
+
+def test_a_command_that_was_held_up_begins_nothing(robot: Asked, desk: TeachingService) -> None:
+    desk.jog(JOG, robot.clock.monotonic() - DEAD_MAN - 0.1)
+    assert (robot.orders, desk.status().activity) == ([], "none")
+
+
+def test_a_step_is_asked_for_as_one(robot: Asked, desk: TeachingService) -> None:
+    program = Program(name="step", machine="ma2000", instructions=(Relative(angles={1: 0.1}),))
+    desk.perform(Word(robot.clock.monotonic()), program, "step")
+    assert robot.orders == [RunProgram(number=0, asked=robot.clock.monotonic(), program=program, activity="step")]
+
+
+def test_nothing_begins_once_the_control_has_lapsed_while_a_jog_came_to_its_end(
+    robot: Asked, desk: TeachingService
+) -> None:
+    lapsed: list[str] = []
+
+    def require() -> None:
+        assert robot.finished.is_set()
+        if lapsed:
+            raise conflict("control-lost", "you lost control of the robot", "take control again")
+
+    program = Program(name="step", machine="ma2000", instructions=(Relative(angles={1: 0.1}),))
+    refused: list[ProblemError] = []
+
+    def perform() -> None:
+        try:
+            desk.perform(Word(robot.clock.monotonic(), require), program)
+        except ProblemError as problem:
+            refused.append(problem)
+
+    desk.jog(JOG, robot.clock.monotonic())
+    waiting = threading.Thread(target=perform)
+    waiting.start()
+    assert robot.finished.wait(60)
+    lapsed.append("now")
+    robot.answers[0].set_result(Answer(number=0))
+    waiting.join()
+    assert [problem.kind for problem in refused] == ["control-lost"]
+    assert not any(isinstance(order, RunProgram) for order in robot.orders)
+
+
+def test_a_program_goes_on_with_the_moment_at_which_it_was_asked_for(robot: Asked, desk: TeachingService) -> None:
+    said = robot.clock.monotonic()
+    robot.clock.turn(4.0)  # type: ignore[attr-defined]
+    desk.perform(Word(said), Program(name="p", machine="ma2000", instructions=(Relative(angles={1: 0.1}),)))
+    assert robot.orders[0].asked == said
+
+
+def test_a_lead_without_a_path_does_not_have_that_of_the_one_before(robot: Asked, desk: TeachingService) -> None:
+    desk.lead(Word(0.0), (1,))
+    robot.answers[0].set_result(Answer(number=0, data={"path": PATH}))
+    assert desk.status().path is not None
+    desk.lead(Word(0.0), (1,))
+    assert desk.status().path is None
+    robot.answers[1].set_result(Answer(number=1, problem="lead: 1 samples are no path", exit_code=4))
+    assert desk.status().path is None
+
+
+def test_the_end_of_a_lead_is_waited_for_as_long_as_the_arm_may_take_to_come_to_rest(
+    robot: Asked, desk: TeachingService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert LEAD_ENDS_WITHIN > PATIENCE
+    monkeypatch.setattr(teaching, "ANSWER_WITHIN", 0.0)
+    desk.lead(Word(0.0), (1,))
+    ending = threading.Thread(target=desk.finish)
+    ending.start()
+    assert robot.finished.wait(60)
+    robot.answers[0].set_result(Answer(number=0, data={"path": PATH}))
+    ending.join()
+    assert desk.status().path is not None
+
+
+def test_a_lead_that_does_not_end_says_that_a_stop_holds_nothing(
+    desk: TeachingService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(teaching, "LEAD_ENDS_WITHIN", 0.0)
+    desk.lead(Word(0.0), (1,))
+    with pytest.raises(ProblemError, match="lead did not end within") as refused:
+        desk.finish()
+    assert "HOLD THE ARM" in refused.value.advice
+
+
+def test_a_jog_that_does_not_end_is_to_be_stopped(
+    robot: Asked, desk: TeachingService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(teaching, "ANSWER_WITHIN", 0.0)
+    desk.jog(JOG, robot.clock.monotonic())
+    with pytest.raises(ProblemError, match="jog did not end within") as refused:
+        desk.finish()
+    assert refused.value.advice == "stop the robot"

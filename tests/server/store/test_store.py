@@ -1,0 +1,212 @@
+"""The database: tables and migrations agree, catalogue and cursors do what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+from alembic import command
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from sqlalchemy import text
+
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.service.base import Page
+from daq.contracts.service.experiments import ExperimentRequest
+from daq.contracts.service.traces import TraceChange
+from server.experiments.states import Event
+from server.problems import ProblemError
+from server.store.engine import Store, StoreError, migrations
+from server.store.experiments import ExperimentStore
+from server.store.pages import Cursor
+from server.store.remembered import Remembered
+from server.store.tables import Table
+from server.store.traces import TraceSearch, TraceStore
+from tests.server.store.rows import new_trace
+
+NOW = datetime(2026, 1, 1, tzinfo=UTC)
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    """A new database."""
+    made = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
+    made.migrate()
+    yield made
+    made.close()
+
+
+def test_nobody_else_may_read_the_database(store: Store, tmp_path: Path) -> None:
+    with store.engine.begin() as connection:
+        connection.execute(text("CREATE TABLE written (x INTEGER)"))
+        files = [path for path in tmp_path.iterdir() if path.name.startswith("service.sqlite")]
+        assert files
+        assert not [path.name for path in files if path.stat().st_mode & 0o077]
+
+
+def test_tables_are_those_of_the_migrations(store: Store) -> None:
+    with store.engine.connect() as connection:
+        assert compare_metadata(MigrationContext.configure(connection), Table.metadata) == []
+
+
+def test_migrations_lead_back_too(store: Store) -> None:
+    config = migrations()
+    with store.engine.connect() as connection:
+        config.attributes["connection"] = connection
+        command.downgrade(config, "base")
+        connection.commit()
+        left = set(connection.execute(text("SELECT name FROM sqlite_master WHERE type='table'")).scalars())
+    assert left <= {"alembic_version", "sqlite_sequence"}
+
+
+def test_a_database_of_a_newer_version_is_refused(store: Store) -> None:
+    with store.writing() as session:
+        session.execute(text("UPDATE alembic_version SET version_num='9999'"))
+    with pytest.raises(StoreError, match="cannot be brought up to date"):
+        store.migrate()
+
+
+def test_what_is_committed_survives_a_power_cut(store: Store) -> None:
+    with store.engine.connect() as connection:
+        assert connection.execute(text("PRAGMA journal_mode")).scalar() == "wal"
+        assert connection.execute(text("PRAGMA synchronous")).scalar() == 2  # FULL
+
+
+def test_a_change_that_fails_leaves_nothing(store: Store) -> None:
+    def fails() -> None:
+        with store.writing() as session:
+            session.execute(text("INSERT INTO queues VALUES ('ma2000', 1, 'x', '2026-01-01')"))
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fails()
+    with store.reading() as session:
+        assert session.execute(text("SELECT count(*) FROM queues")).scalar() == 0
+
+
+def test_what_ran_is_interrupted_after_a_restart_and_what_waits_waits(store: Store) -> None:
+    experiments = ExperimentStore(store)
+    made = [experiments.submit("ma2000", ExperimentRequest(), NOW, "anna")[0] for _ in range(3)]
+    experiments.begin("ma2000", made[0].id, NOW)
+    experiments.begin("ma2000", made[1].id, NOW)
+    experiments.end("ma2000", made[1].id, Event.COMPLETED, NOW, "", "complete")
+    assert [one.id for one in experiments.settle_after_restart("ma2000", NOW)] == [made[0].id]
+    states = [experiments.get("ma2000", one.id).state for one in made]
+    assert states == ["interrupted", "done", "queued"]
+    assert experiments.settle_after_restart("ma2000", NOW) == []
+
+
+def test_a_trace_that_is_found_before_the_end_of_its_experiment_is_told_stays_found(store: Store) -> None:
+    experiments = ExperimentStore(store)
+    made, _ = experiments.submit("ma2000", ExperimentRequest(), NOW, "anna")
+    experiments.begin("ma2000", made.id, NOW)
+    trace = experiments.trace_number(made.id)
+    experiments.traced(trace, "interrupted")
+    ended = experiments.end("ma2000", made.id, Event.LOST, NOW, "its process was killed")
+    assert (ended.outcome, ended.trace) == ("interrupted", trace)
+
+
+def test_a_clock_that_is_set_back_keeps_the_order_of_submission(store: Store) -> None:
+    experiments = ExperimentStore(store)
+    moments = [NOW, NOW - timedelta(days=3), NOW - timedelta(days=1), NOW + timedelta(hours=1)]
+    made = [experiments.submit("ma2000", ExperimentRequest(), moment, "anna")[0].id for moment in moments]
+    assert [one.id for one in experiments.in_order("ma2000")] == made
+    listed = experiments.page("ma2000", (), None, None, 10).items
+    assert [one.id for one in listed] == made[::-1]
+
+
+def test_what_ended_last_comes_first_whenever_it_was_submitted(store: Store) -> None:
+    experiments = ExperimentStore(store)
+    made = [experiments.submit("ma2000", ExperimentRequest(), NOW, "anna")[0].id for _ in range(5)]
+    ends = [2, 0, 4, 1]
+    for minutes, place in enumerate(ends):
+        experiments.cancel_waiting("ma2000", made[place], NOW + timedelta(minutes=minutes // 2), "anna")
+    first = experiments.page("ma2000", (), None, None, 3, "ended")
+    rest = experiments.page("ma2000", (), None, first.next, 3, "ended")
+    found = [one.id for one in (*first.items, *rest.items)]
+    assert (set(found[:2]), set(found[2:])) == ({made[4], made[1]}, {made[2], made[0]})
+    assert rest.next is None
+
+
+def test_pages_leave_nothing_out_and_double_nothing_while_rows_come(store: Store) -> None:
+    experiments = ExperimentStore(store)
+    for _ in range(7):
+        experiments.submit("ma2000", ExperimentRequest(), NOW, "anna")
+    seen, cursor = [], None
+    while True:
+        page = experiments.page("ma2000", (), None, cursor, 3)
+        seen += [one.id for one in page.items]
+        experiments.submit("ma2000", ExperimentRequest(), NOW, "bert")
+        cursor = page.next
+        if cursor is None:
+            break
+    assert len(seen) == len(set(seen)) == 7
+
+
+@pytest.mark.parametrize("text_", ["", "x", "e30=", "WzFd", "W251bGwsICIiXQ==", "ä", "A" * 200])
+def test_a_cursor_of_somebodys_own_making_is_refused(text_: str) -> None:
+    with pytest.raises(ProblemError, match="cursor"):
+        Cursor.parse(text_)
+
+
+def test_search_finds_what_it_is_asked_for_and_takes_nothing_as_a_pattern(store: Store) -> None:
+    traces = TraceStore(store)
+    traces.insert(new_trace(1, notes="Loose BELT at 100%"))
+    traces.insert(new_trace(2, name="belt_test", kind="sine"))
+    traces.insert(new_trace(3, outcome="fault"))
+
+    def found(**search: object) -> list[int]:
+        page = traces.page("ma2000", TraceSearch(**search), None, 10)  # type: ignore[arg-type]
+        return [int(one.id, 16) for one in page.items]
+
+    assert found() == [3, 2, 1]
+    assert found(text="belt") == [2, 1]
+    assert found(text="100%") == [1]
+    assert found(text="%") == [1]
+    assert found(text="belt_") == [2]
+    assert found(text="'; DROP TABLE traces; --") == []
+    assert found(outcome="fault") == [3]
+    assert found(kind="sine") == [2]
+    assert found(since=NOW + timedelta(seconds=2)) == [3, 2]
+    traces.change("ma2000", f"{3:012x}", TraceChange(tags=("wear", "wear", "week 2")))
+    assert found(tag="wear") == [3]
+    assert found(text="WEEK") == [3]
+    assert traces.get("ma2000", f"{3:012x}").tags == ("wear", "week 2")
+
+
+def test_a_file_that_is_gone_is_marked_and_comes_back(store: Store) -> None:
+    traces = TraceStore(store)
+    traces.insert(new_trace(1))
+    traces.mark_missing(["1.mcap"], missing=True)
+    assert traces.get("ma2000", f"{1:012x}").missing
+    traces.mark_missing(["1.mcap"], missing=False)
+    assert not traces.get("ma2000", f"{1:012x}").missing
+
+
+def test_the_spec_comes_back_as_it_was_submitted(store: Store) -> None:
+    experiments = ExperimentStore(store)
+    spec = ExperimentSpec.model_validate({"trajectory": {"kind": "sine", "amplitude": {1: 0.1}}, "joints": [1]})
+    made, _ = experiments.submit("ma2000", ExperimentRequest(spec=spec), NOW, "anna")
+    assert experiments.get("ma2000", made.id).spec == spec
+
+
+def test_a_list_is_read_again_once_anything_was_written_also_while_it_was_read(store: Store) -> None:
+    read: list[str] = []
+
+    def page(name: str) -> Page[str]:
+        read.append(name)
+        if len(read) == 2:
+            with store.writing():  # by another thread, as far as the reader knows
+                pass
+        return Page(items=(f"{name} {len(read)}",), next=None)
+
+    listed = Remembered(store, page)
+    assert [listed("a").items, listed("a").items] == [("a 1",), ("a 1",)]
+    with store.writing():
+        pass
+    assert listed("a").items == ("a 2",)
+    assert listed("a").items == ("a 3",)
+    assert listed("b").items == ("b 4",)
+    assert listed("a").items == ("a 3",)
