@@ -32,14 +32,14 @@ from scipy.ndimage import binary_erosion
 from scipy.signal import find_peaks, lombscargle, savgol_filter
 
 from benchmarks.figures import Figure, show
+from benchmarks.smoothed_torques import TorquesAlongTrace, torques_along
 from daq.contracts.errors import TraceError
 from daq.contracts.machine import BoardPid
 from daq.contracts.trace import Trace
 from daq.traces.reader import read_trace
 from model import layout as at
-from model.discrepancy.inverse_dynamics.records import acts_until_next_sample
+from model.inverse_dynamics.recorded_motion import holds_drive_between_samples
 from model.machine_model.model import Model, base_model
-from model.simulation.torque_space import TorquesAlongTrace, torque_balance
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -83,7 +83,7 @@ def ranked_effects(trace: Trace, model: Model) -> list[Place]:
 
 
 def _torque_scores(trace: Trace, model: Model) -> Iterator[tuple[Place, float]]:
-    base = torque_balance(model, _as_it_acts(trace, model), WINDOW)
+    base = torques_along(model, _as_it_acts(trace, model), WINDOW)
     assert base.residual is not None
     target = base.residual
     nuisances = _tolerances(trace, model, target)
@@ -129,7 +129,7 @@ def _as_it_acts(trace: Trace, model: Model) -> Trace:
     """
     assert trace.drive is not None
     drive = _smooth(trace.drive, float(np.median(np.diff(trace.time))))
-    held = 0.5 * float(model.vector[at.PERIOD]) if acts_until_next_sample(model.machine) else 0.0
+    held = 0.5 * float(model.vector[at.PERIOD]) if holds_drive_between_samples(model.machine) else 0.0
     for j, joint in enumerate(model.machine.modelled_joints):
         late = held + float(model.vector[at.DELAY] + model.vector[at.slot(j + 1, at.EXTRA_DELAY)])
         column = trace.column(joint)
@@ -209,7 +209,7 @@ def _with_friction(model: Model, joint: int, values: dict[str, float]) -> Model:
 
 def _moved(model: Model, trace: Trace, target: Floats) -> Floats:
     """Change of the residual from the target to that of another model, or of a changed trace."""
-    residual = torque_balance(model, _as_it_acts(trace, model), WINDOW).residual
+    residual = torques_along(model, _as_it_acts(trace, model), WINDOW).residual
     assert residual is not None
     return residual - target
 

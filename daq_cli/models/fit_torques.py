@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from daq.contracts.trace import Trace
     from model.fitting.options import FitOptions
+    from model.inverse_dynamics.fit import TorqueFit
     from model.machine_model.model import Model
-    from model.torque_space.fit import TorqueFit
 
 MOST_DRAWN = 6
 """Most traces that the report shows as pictures."""
@@ -33,8 +33,8 @@ def fit_recorded_torques(
 ) -> None:
     """Fits, saves the model, and prints the result. Raises SpecError and TraceError as the fit does."""
     from daq_cli.app.progress import shown_progress
+    from model.inverse_dynamics.fit import fit_torques
     from model.machine_model.model_file import save_model
-    from model.torque_space.fit import fit_torques
 
     with shown_progress("fitting torques") as progress:
         found = fit_torques(begin, traces, held_out, options, progress=progress)
@@ -46,9 +46,9 @@ def fit_recorded_torques(
         _print(found)
         console().print(f"model {found.model.identity}: {out}")
     if report is not None:
+        from model.inverse_dynamics.fit import torque_curves
         from model.reports.page import write_report
         from model.reports.torque_report import torque_report
-        from model.torque_space.curves import torque_curves
 
         curves = [torque_curves(found.model, t, found.cutoff) for t in (*traces, *held_out)[:MOST_DRAWN]]
         console().print(f"report: {write_report(torque_report(found, curves), report)}")

@@ -36,7 +36,7 @@ def require_load_held(model: Model, traces: Sequence[Trace]) -> None:
     import numpy as np
 
     from model import layout as at
-    from model.discrepancy.inverse_dynamics.supplied import gravity_along
+    from model.inverse_dynamics.supplied_torque import gravity_along
     from model.simulation.bodies import chain_body
 
     joints = np.ascontiguousarray(model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT))

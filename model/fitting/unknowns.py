@@ -22,6 +22,7 @@ class Unknown:
         expected, deviation: Gaussian prior; deviation None where nothing is claimed.
         nuisance: found only so that the others are not biased by it (start posture, bend of a potentiometer).
         trace: index of the only trace it belongs to; None for all.
+        size: natural size of a change where no deviation is claimed; None: from the starting value, or the bounds.
     """
 
     parameter: Parameter
@@ -32,6 +33,7 @@ class Unknown:
     deviation: float | None = None
     nuisance: bool = False
     trace: int | None = None
+    size: float | None = None
 
     def __post_init__(self) -> None:
         if not self.low < self.high:
@@ -70,9 +72,11 @@ class Unknown:
 
     @property
     def scale(self) -> float:
-        """Natural size of a change: the expected deviation, else the value, else the bounds' distance, else 1."""
+        """Natural size of a change: the expected deviation, else `size`, the value, the bounds' distance, or 1."""
         if self.deviation is not None:
             return self.deviation
+        if self.size is not None:
+            return self.size
         if self.start != 0.0:
             return abs(self.start)
         width = self.high - self.low

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from model.inverse_dynamics.fit import TorqueCurves, TorqueFit
 from model.reports.figures import COLOURS, INK, baseline, drawn, panels, thinned
 from model.reports.page import Cell, Picture, Report, Section, Table, cells, listed, spoken
 from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
-from model.torque_space.curves import TorqueCurves
-from model.torque_space.fit import TorqueFit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

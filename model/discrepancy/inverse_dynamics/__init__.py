@@ -1,6 +1,5 @@
-"""Diagnosis without a simulation: recorded drive and measured motion, compared as torques.
+"""Diagnosis without a simulation: which effects explain the residual torques of `model.inverse_dynamics`.
 
-For rigs without a known controller, and motions that no simulation follows for long. The torque that the motion needs
-(inverse dynamics) less the torque that drive and friction supply is the residual; an effect is a torque that explains
-it.
+For rigs whose controller is unknown, and motions that no simulation follows for long. The torque that the motion needs
+less the torque that drive and friction supply is the residual; an effect is a torque that explains it.
 """

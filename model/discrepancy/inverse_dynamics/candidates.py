@@ -4,57 +4,54 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.contracts.machine import BoardPid, DcMotor, NoController, SampledPid
+from daq.contracts.machine import DcMotor, NoController
 from model import layout as at
-from model.discrepancy.inverse_dynamics.balance import levels_along
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
-from model.discrepancy.inverse_dynamics.records import RESOLVED, TorqueRecord
+from model.discrepancy.inverse_dynamics.case import Case
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.effects.effect import Effect
 from model.effects.library import library
+from model.inverse_dynamics.recorded_motion import RESOLVED, RecordedMotion
+from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, levels_along
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
 Floats = NDArray[np.float64]
 Start = dict[str, float]
 
-NOT_IN_TORQUE_SPACE = {
-    "wrong_gain": "acts before the drive that is recorded",
-    "lost_set_points": "acts before the drive that is recorded",
-    "stiction": "shows in the moment of breaking away, which low-passed torques do not resolve",
-}
-"""Effects that recorded torques cannot show, and why."""
-UNSEEN = ".damping"
-"""Parameters that torques do not show: a transmission's damping acts while its parts swing, above every cutoff."""
+UNSEEN = "damping"
+"""Part of an effect that torques do not show: a transmission's damping acts while it vibrates, above every cutoff."""
 MOTOR_EFFECTS = ("back_emf_error", "resistance_drift", "motor_inductance")
 SENSOR_EFFECTS = ("potentiometer_gain", "potentiometer_offset", "potentiometer_nonlinearity")
 ROTOR_EFFECTS = ("backlash", "joint_compliance")
 CONSTANT_LOAD = 0.05
 """Relative change of a load below which it counts as constant."""
 SPEED_QUANTILES = (0.05, 0.2, 0.5, 0.8)
-"""Of a joint's speed in magnitude: where friction may have fallen."""
+"""Quantiles of a joint's speed in magnitude: speeds at which Stribeck friction may have faded."""
 DRIVE_QUANTILES = (0.2, 0.5, 0.8)
-"""Of the drive in magnitude: dead zones; and limits, as shares of the largest."""
+"""Quantiles of the drive in magnitude that are tried as dead zones."""
+LIMIT_SHARES = (0.95, 0.85, 0.7, 0.5)
+"""Limits of the drive that are tried, as shares of its largest value."""
 UNLIMITED = 0.7
 """Share of the record in which a limit of the drive must not be reached."""
-LIMIT_SHARES = (0.95, 0.85, 0.7, 0.5)
 DELAYS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08)
-"""s: delays, and time constants of windings."""
+"""Delays, and time constants of windings, that are tried, s."""
+WARMING_TIMES = (10.0, 40.0, 200.0)
+"""Thermal time constants that are tried, s."""
 WINDING_SHARES = (0.01, 0.1)
-"""Of a joint's torque: what a rotor on a spring may take beside its link's motion."""
+"""Share of a joint's torque that moving the rotor apart from its link may take."""
 PLAY_SHARES = (0.0005, 0.003, 0.02)
-"""Of a joint's travel: free play."""
+"""Free play that is tried, as a share of the joint's travel."""
 LONGEST_SCAN = 400
-"""Frequencies that are tried, at most."""
+"""Largest number of frequencies that are tried."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """An effect on joints, the starts to look from, and over how many places the looking went.
+    """An effect on joints, with its own parameters and the starting values from which it is tried.
 
     amplitudes: its parameters (full names) that measure its size; the others only shape it.
     """
@@ -72,41 +69,78 @@ class Trial:
         return len(self.parameters)
 
 
-def trials(
-    model: Model, records: Sequence[TorqueRecord], residual: Sequence[Floats], options: TorqueOptions
-) -> Iterator[Trial]:
+@dataclass(frozen=True)
+class _Place:
+    """Where starting values are looked for: a joint's column, the model with the effect, records and their residual."""
+
+    model: Model
+    column: int
+    records: Sequence[RecordedMotion]
+    residual: Sequence[Floats]
+
+    @property
+    def numbers(self) -> Floats:
+        """The joint's columns of the model's vector."""
+        return self.model.vector[at.slot(self.column + 1, 0) : at.slot(self.column + 2, 0)]
+
+    @property
+    def gain(self) -> float:
+        """Torque of the drive a volt (a unit of drive), N·m/V."""
+        joint = self.numbers
+        return float(joint[at.GEAR] * joint[at.TORQUE_CONSTANT] / joint[at.RESISTANCE])
+
+    @property
+    def speeds(self) -> Floats:
+        """Magnitudes of the joint's speed where it moves."""
+        return self._magnitudes(lambda r: r.speed)
+
+    @property
+    def drives(self) -> Floats:
+        """Magnitudes of the joint's drive where it moves."""
+        return self._magnitudes(lambda r: r.drive)
+
+    @property
+    def torque(self) -> float:
+        """A tenth of the drive's torque, N·m or N: a size to probe with."""
+        return max(0.1 * abs(self.gain) * float(np.sqrt(np.mean(self.drives**2))), 1e-9)
+
+    def _magnitudes(self, signal: Callable[[RecordedMotion], Floats]) -> Floats:
+        pieces = [np.abs(signal(r)[r.rows, self.column])[r.moving[:, self.column]] for r in self.records]
+        every = np.concatenate(pieces)
+        return every if every.size else np.zeros(1)
+
+
+def list_trials(model: Model, now: BalanceFit, case: Case) -> Iterator[Trial]:
     """Every effect that the model lacks, joint by joint, and those of the whole machine once."""
-    names = options.effects
+    names = case.options.effects
     for name, effect in library().items():
-        if name in NOT_IN_TORQUE_SPACE or (names is not None and name not in names):
+        if name in NOT_IN_TORQUES or (names is not None and name not in names):
             continue
         places: list[tuple[int, ...]] = (
-            [()] if effect.whole_machine else [(j,) for j in options.joints or model.machine.modelled_joints]
+            [()] if effect.whole_machine else [(j,) for j in case.options.joints or model.machine.modelled_joints]
         )
         for joints in places:
             if _present(model, name, joints) or not _possible(model, effect, joints):
                 continue
-            if name == "load_dependent_friction" and _constant_load(model, joints[0] - 1, records):
+            if name == "load_dependent_friction" and _constant_load(model, joints[0] - 1, case.records):
                 continue  # the same torque as Coulomb friction, by a longer name
-            trial = trial_of(model, name, joints, records, residual)
+            trial = _trial(model, name, joints, now)
             if trial.starts:
                 yield trial
 
 
-def trial_of(
-    model: Model, name: str, joints: tuple[int, ...], records: Sequence[TorqueRecord], residual: Sequence[Floats]
-) -> Trial:
+def _trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceFit) -> Trial:
     """One effect on one joint, or of the whole machine."""
     wider = model.with_effect(name, joints)
-    column = joints[0] - 1 if joints else 0
-    added = (p for p in wider.parameters if p.name not in model.by_name and not p.name.endswith(UNSEEN))
-    own = tuple(_narrowed(p, column, records) for p in added)
-    starts = tuple(_starts(name, wider, own, column, records, residual))
-    return Trial(name, joints, wider, own, tuple(p.name for p in own if p.null is not None), starts)
+    place = _Place(wider, joints[0] - 1 if joints else 0, now.balance.records, now.residual)
+    added = (p for p in wider.parameters if p.name not in model.by_name and p.part != UNSEEN)
+    own = tuple(_narrowed(p, place) for p in added)
+    amplitudes = tuple(p.name for p in own if p.null is not None)
+    return Trial(name, joints, wider, own, amplitudes, tuple(_starts(name, own, place)))
 
 
-def _constant_load(model: Model, column: int, records: Sequence[TorqueRecord]) -> bool:
-    """Whether the load that presses on a joint is the same wherever it went."""
+def _constant_load(model: Model, column: int, records: Sequence[RecordedMotion]) -> bool:
+    """Whether the load that presses on a joint is the same everywhere along the records."""
     arm = model.with_effect("load_dependent_friction", (column + 1,), {"arm": 1.0})
     levels = np.concatenate([levels_along(arm, r)[r.rows, column] for r in records])
     return bool(np.ptp(levels) < CONSTANT_LOAD * np.abs(levels).max() + 1e-12)
@@ -135,32 +169,29 @@ def _possible(model: Model, effect: Effect, joints: tuple[int, ...]) -> bool:
     return bool(needs.get(effect.name, True)) and (not effect.joints or set(joints) <= set(effect.joints))
 
 
-def _starts(
-    name: str, model: Model, own: Sequence[Parameter], column: int, records: Sequence[TorqueRecord],
-    residual: Sequence[Floats],
-) -> Iterator[Start]:  # fmt: skip
-    """Values to probe from: finite sizes, since many effects have no useful derivative where they begin."""
-    by_last = {p.name.rpartition(".")[2]: p for p in own}
-    special = _SPECIAL.get(name)
-    if special is not None:
-        for start in special(model, column, records, residual):
-            yield {by_last[k].name: _inside(by_last[k], v) for k, v in start.items()}
+def _starts(name: str, own: Sequence[Parameter], place: _Place) -> Iterator[Start]:
+    """Values to probe from: finite sizes, since many effects have no useful derivative at their null value."""
+    search = _SEARCHED.get(name)
+    if search is None:
+        yield {p.name: _typical(p) for p in own}
         return
-    grids = [[_typical(p)] for p in own]
-    for values in product(*grids):
-        yield {p.name: v for p, v in zip(own, values, strict=True)}
+    by_part = {p.part: p for p in own}
+    for start in search(place):
+        yield {by_part[k].name: _inside(by_part[k], v) for k, v in start.items()}
 
 
-def _narrowed(p: Parameter, column: int, records: Sequence[TorqueRecord]) -> Parameter:
-    """A limit of the drive must leave most of the record below it: a drive that never acts explains any motion, by
-    bodies without mass. And friction must not change within the speeds in which its direction is not resolved."""
+def _narrowed(p: Parameter, place: _Place) -> Parameter:
+    """The parameter with bounds that the record allows.
+
+    A limit of the drive must leave most of the record below it: a drive that hardly ever acts explains any motion, by
+    bodies without mass. Friction must not change within the speeds at which its direction is not resolved.
+    """
     if p.effect == "stribeck_friction" and p.null is None:
-        slowest = RESOLVED * max(float(r.turning[column]) for r in records)
+        slowest = RESOLVED * max(float(r.turning[place.column]) for r in place.records)
         return replace(p, low=min(p.high, max(p.low, slowest)))
     if p.effect != "supply_limit":
         return p
-    drive = _magnitudes(lambda r: r.drive, records, column)
-    return replace(p, low=min(p.high, max(p.low, float(np.quantile(drive, UNLIMITED)))))
+    return replace(p, low=min(p.high, max(p.low, float(np.quantile(place.drives, UNLIMITED)))))
 
 
 def _typical(p: Parameter) -> float:
@@ -172,118 +203,94 @@ def _inside(p: Parameter, value: float) -> float:
     return float(np.clip(value, p.low, p.high))
 
 
-def _magnitudes(signal: Callable[[TorqueRecord], Floats], records: Sequence[TorqueRecord], column: int) -> Floats:
-    every = np.concatenate([np.abs(signal(r)[r.rows, column])[r.moving[:, column]] for r in records])
-    return every if every.size else np.zeros(1)
+def _stribeck(place: _Place) -> Iterator[Start]:
+    for speed in np.quantile(place.speeds, SPEED_QUANTILES):
+        yield {"torque": place.torque, "speed": max(float(speed), 1e-3)}
 
 
-def _stribeck(model: Model, column: int, records: Sequence[TorqueRecord], _left: Sequence[Floats]) -> Iterator[Start]:
-    speeds = _magnitudes(lambda r: r.speed, records, column)
-    for speed in np.quantile(speeds, SPEED_QUANTILES):
-        yield {"torque": _torque(model, column, records), "speed": max(float(speed), 1e-3)}
-
-
-def _dead_zone(_m: Model, column: int, records: Sequence[TorqueRecord], _left: Sequence[Floats]) -> Iterator[Start]:
-    drive = _magnitudes(lambda r: r.drive, records, column)
+def _dead_zone(place: _Place) -> Iterator[Start]:
+    drive = place.drives
     for width in (0.05 * float(drive.max()), *np.quantile(drive, DRIVE_QUANTILES)):
         yield {"width": float(width)}
 
 
-def _limit(model: Model, column: int, records: Sequence[TorqueRecord], _left: Sequence[Floats]) -> Iterator[Start]:
-    largest = float(_magnitudes(lambda r: r.drive, records, column).max())
-    supply = float(model.vector[at.slot(column + 1, at.SUPPLY)])
+def _limit(place: _Place) -> Iterator[Start]:
+    largest, supply = float(place.drives.max()), float(place.numbers[at.SUPPLY])
     for share in LIMIT_SHARES:
         if share * min(largest, supply) > 0:
             yield {"voltage": share * min(largest, supply)}
 
 
-def _delay(model: Model, _c: int, _records: Sequence[TorqueRecord], _left: Sequence[Floats]) -> Iterator[Start]:
-    controller = model.machine.controller
-    longest = np.inf if isinstance(controller, NoController) else 13 * _period(controller)
+def _delay(place: _Place) -> Iterator[Start]:
+    controller = place.model.machine.controller
+    longest = np.inf if isinstance(controller, NoController) else 13 * controller.period.value
     for time in DELAYS:
         if time <= longest:
             yield {"time": time}
 
 
-def _period(controller: BoardPid | SampledPid) -> float:
-    return controller.period.value
-
-
-def _inductance(model: Model, column: int, _r: Sequence[TorqueRecord], _left: Sequence[Floats]) -> Iterator[Start]:
-    resistance = float(model.vector[at.slot(column + 1, at.RESISTANCE)])
+def _inductance(place: _Place) -> Iterator[Start]:
     for time in DELAYS:
-        yield {"inductance": resistance * time}
+        yield {"inductance": float(place.numbers[at.RESISTANCE]) * time}
 
 
-def _warming(model: Model, column: int, records: Sequence[TorqueRecord], _left: Sequence[Floats]) -> Iterator[Start]:
-    resistance = float(model.vector[at.slot(column + 1, at.RESISTANCE)])
-    current = float(np.sqrt(np.mean(_magnitudes(lambda r: r.drive, records, column) ** 2))) / resistance
-    for time in (10.0, 40.0, 200.0):
+def _warming(place: _Place) -> Iterator[Start]:
+    current = float(np.sqrt(np.mean(place.drives**2))) / float(place.numbers[at.RESISTANCE])
+    for time in WARMING_TIMES:
         yield {"heating": 0.2 / max(current**2 * time, 1e-12), "time_constant": time}
 
 
-def _ripple(model: Model, column: int, records: Sequence[TorqueRecord], left: Sequence[Floats]) -> Iterator[Start]:
+def _ripple(place: _Place) -> Iterator[Start]:
+    column, records = place.column, place.records
     every = np.concatenate([r.position[r.rows, column][r.moving[:, column]] for r in records])
-    if np.ptp(every) <= 0:
+    travel = float(np.ptp(every))
+    if travel <= 0:
         return
-    slow = float(np.quantile(_magnitudes(lambda r: r.speed, records, column), 0.25))
+    slow = float(np.quantile(place.speeds, 0.25))
     highest = 2 * np.pi * records[0].cutoff / max(slow, 1e-9)
-    lowest = 2 * np.pi / float(np.ptp(every))
-    prismatic = model.machine.joint(column + 1).kind == "prismatic"
-    grid = _scanned(max(lowest, 0.5), min(highest, 1000.0), 0.7 * np.pi / float(np.ptp(every)))
-    if not prismatic and float(np.ptp(every)) > np.pi:
+    grid = _scanned(max(2 * np.pi / travel, 0.5), min(highest, 1000.0), 0.7 * np.pi / travel)
+    prismatic = place.model.machine.joint(column + 1).kind == "prismatic"
+    if not prismatic and travel > np.pi:
         whole = np.arange(1, min(int(highest), 200) + 1, dtype=np.float64)
         grid = np.unique(np.concatenate([grid, whole]))
-    torque = _torque(model, column, records)
-    for cycles in _peaks(grid, [r.position[r.rows, column] for r in records], records, left, column):
-        yield {"sine": torque, "cosine": torque, "cycles": cycles}
+    for cycles in _peaks(grid, [r.position[r.rows, column] for r in records], place):
+        yield {"sine": place.torque, "cosine": place.torque, "cycles": cycles}
 
 
-def _disturbance(model: Model, column: int, records: Sequence[TorqueRecord], left: Sequence[Floats]) -> Iterator[Start]:
-    longest = max(float(np.ptp(r.time)) for r in records)
-    grid = _scanned(max(0.05, 2 / longest), 0.8 * records[0].cutoff, 0.4 / longest)
-    torque = _torque(model, column, records)
-    angular = 2 * np.pi * grid
-    for rate in _peaks(angular, [r.time[r.rows] for r in records], records, left, column):
-        yield {"sine": torque, "cosine": torque, "frequency": rate / (2 * np.pi)}
+def _disturbance(place: _Place) -> Iterator[Start]:
+    longest = max(float(np.ptp(r.time)) for r in place.records)
+    grid = _scanned(max(0.05, 2 / longest), 0.8 * place.records[0].cutoff, 0.4 / longest)
+    for rate in _peaks(2 * np.pi * grid, [r.time[r.rows] for r in place.records], place):
+        yield {"sine": place.torque, "cosine": place.torque, "frequency": rate / (2 * np.pi)}
 
 
-def _spring(model: Model, column: int, records: Sequence[TorqueRecord], _left: Sequence[Floats]) -> Iterator[Start]:
-    position = np.concatenate([r.position[r.rows, column] for r in records])
-    stiffness = _torque(model, column, records) / max(float(np.ptp(position)), 1e-9)
+def _spring(place: _Place) -> Iterator[Start]:
+    position = np.concatenate([r.position[r.rows, place.column] for r in place.records])
     middle, span = float(np.mean(position)), float(np.ptp(position))
     for rest in (middle, middle - 2 * span, middle + 2 * span):
-        yield {"stiffness": stiffness, "rest": rest}
+        yield {"stiffness": place.torque / max(span, 1e-9), "rest": rest}
 
 
-def _winding(model: Model, column: int, records: Sequence[TorqueRecord], _left: Sequence[Floats]) -> Iterator[Start]:
-    """Compliances with which turning the rotor apart from the link takes a share of the torque."""
-    joint = model.vector[at.slot(column + 1, 0) : at.slot(column + 2, 0)]
+def _compliance(place: _Place) -> Iterator[Start]:
+    """Compliances with which moving the rotor apart from the link takes a share of the torque."""
+    joint = place.numbers
     gain = joint[at.GEAR] * joint[at.TORQUE_CONSTANT] / joint[at.RESISTANCE]
-    torque = np.concatenate([gain * r.drive[:, column] for r in records])
-    change = np.concatenate([np.gradient(np.gradient(gain * r.drive[:, column], r.time), r.time) for r in records])
+    torques = [gain * r.drive[:, place.column] for r in place.records]
+    changes = [np.gradient(np.gradient(t, r.time), r.time) for t, r in zip(torques, place.records, strict=True)]
     inertia = joint[at.ROTOR_INERTIA] * joint[at.GEAR] ** 2
-    whole = float(np.std(torque) / max(inertia * np.std(change), 1e-300))
+    whole = float(np.std(np.concatenate(torques)) / max(inertia * np.std(np.concatenate(changes)), 1e-300))
     for share in WINDING_SHARES:
         yield {"compliance": share * whole}
 
 
-def _play(_m: Model, column: int, records: Sequence[TorqueRecord], _left: Sequence[Floats]) -> Iterator[Start]:
-    travel = max(float(np.ptp(r.position[:, column])) for r in records)
+def _play(place: _Place) -> Iterator[Start]:
+    travel = max(float(np.ptp(r.position[:, place.column])) for r in place.records)
     for share in PLAY_SHARES:
         yield {"gap": share * travel}
 
 
-def _tilt(_m: Model, _c: int, _r: Sequence[TorqueRecord], _left: Sequence[Floats]) -> Iterator[Start]:
+def _tilt(_place: _Place) -> Iterator[Start]:
     yield {"about_x": 0.05, "about_y": 0.05}
-
-
-def _torque(model: Model, column: int, records: Sequence[TorqueRecord]) -> float:
-    """A tenth of the drive's torque, N·m or N: a size to probe with."""
-    joint = model.vector[at.slot(column + 1, 0) : at.slot(column + 2, 0)]
-    gain = joint[at.GEAR] * joint[at.TORQUE_CONSTANT] / joint[at.RESISTANCE]
-    drive = _magnitudes(lambda r: r.drive, records, column)
-    return max(0.1 * abs(float(gain)) * float(np.sqrt(np.mean(drive**2))), 1e-9)
 
 
 def _scanned(low: float, high: float, step: float) -> Floats:
@@ -292,12 +299,10 @@ def _scanned(low: float, high: float, step: float) -> Floats:
     return np.linspace(low, high, int(np.clip((high - low) / step, 2, LONGEST_SCAN)))
 
 
-def _peaks(
-    rates: Floats, along: Sequence[Floats], records: Sequence[TorqueRecord], left: Sequence[Floats], column: int
-) -> list[float]:
-    """The two rates (rad per unit of `along`) whose sine and cosine explain most of what is left of a joint."""
-    masks = [r.moving[:, column] for r in records]
-    signal = np.concatenate([x[:, column][m] for x, m in zip(left, masks, strict=True)])
+def _peaks(rates: Floats, along: Sequence[Floats], place: _Place) -> list[float]:
+    """The two rates (rad per unit of `along`) whose sine and cosine explain most of the residual of a joint."""
+    masks = [r.moving[:, place.column] for r in place.records]
+    signal = np.concatenate([x[:, place.column][m] for x, m in zip(place.residual, masks, strict=True)])
     where = np.concatenate([a[m] for a, m in zip(along, masks, strict=True)])
     if signal.size < 20:
         return []
@@ -313,7 +318,7 @@ def _peaks(
     return found
 
 
-_SPECIAL: dict[str, Callable[[Model, int, Sequence[TorqueRecord], Sequence[Floats]], Iterator[Start]]] = {
+_SEARCHED: dict[str, Callable[[_Place], Iterator[Start]]] = {
     "stribeck_friction": _stribeck,
     "dead_zone": _dead_zone,
     "supply_limit": _limit,
@@ -324,7 +329,7 @@ _SPECIAL: dict[str, Callable[[Model, int, Sequence[TorqueRecord], Sequence[Float
     "periodic_disturbance": _disturbance,
     "spring_torque": _spring,
     "base_tilt": _tilt,
-    "joint_compliance": _winding,
+    "joint_compliance": _compliance,
     "backlash": _play,
 }
-"""Effects whose place has to be looked for in the record."""
+"""Effects whose starting values have to be looked for in the record."""

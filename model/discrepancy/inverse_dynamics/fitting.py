@@ -1,4 +1,4 @@
-"""Fitting adjustable parameters to residual torques: weighted least squares with priors, re-linearised to the end."""
+"""Fitting unknowns to residual torques: weighted least squares with priors, re-linearised until it settles."""
 
 from __future__ import annotations
 
@@ -9,23 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from model.discrepancy.inverse_dynamics.balance import TorqueBalance
 from model.discrepancy.inverse_dynamics.likelihood import (
     NoiseModel,
     Stretches,
     minus_twice_log_likelihood,
     noise_model,
 )
-from model.discrepancy.inverse_dynamics.tolerances import Adjustable
+from model.fitting.unknowns import Unknown
+from model.inverse_dynamics.torque_balance import TorqueBalance
 
 Floats = NDArray[np.float64]
 Slopes = dict[str, list[Floats]]
 """Derivatives (m, n) of the residual of every record, by parameter."""
 
-DIFFERENCE = 1e-3
-"""Step of the finite differences, as a share of a parameter's natural size: torques are smooth or piecewise linear."""
 ROUNDS = 6
-"""Of noise model and Gauss-Newton step, at most."""
+"""Rounds of noise model and Gauss-Newton step, at most."""
 STEPS = (1.0, 0.5, 0.2, 0.05)
 """Shares of a Gauss-Newton step that are tried, until one is downhill."""
 SETTLED = 1e-2
@@ -34,21 +32,21 @@ SETTLED = 1e-2
 
 @dataclass(frozen=True)
 class Data:
-    """What every fit of one diagnosis shares. floor: (n,) least standard deviation of a residual's innovation."""
+    """The samples that every fit of one diagnosis uses. floor: (n,) least standard deviation of a residual."""
 
     stretches: Stretches
     floor: Floats
 
 
 @dataclass(frozen=True)
-class TorqueFit:
-    """A structure of model with its adjustable parameters at their best.
+class BalanceFit:
+    """A structure of model with its unknowns at their best.
 
-    residual: per record (m, n). criterion: −2 log posterior (n,) by joint, prior apart in `prior`.
+    residual: per record (m, n). by_joint: −2 log likelihood (n,); prior: −2 log prior.
     """
 
     balance: TorqueBalance
-    adjustables: tuple[Adjustable, ...]
+    unknowns: tuple[Unknown, ...]
     values: dict[str, float]
     residual: list[Floats]
     noise: NoiseModel
@@ -60,60 +58,46 @@ class TorqueFit:
         """−2 log posterior up to a constant of the data."""
         return float(self.by_joint.sum()) + self.prior
 
+    def slope(self, unknown: Unknown) -> list[Floats]:
+        """Derivative (m, n) of every record's residual by one unknown."""
+        return self.balance.slope(self.values, self.residual, unknown)
 
-def derivatives(
-    balance: TorqueBalance, values: Mapping[str, float], residual: Sequence[Floats], parameters: Sequence[Adjustable],
-    known: Slopes,
-) -> list[Floats]:  # fmt: skip
-    """Derivatives (m, n, p) of the residuals of every record, by differences towards the inside of the bounds."""
-    columns: list[list[Floats]] = [[] for _ in residual]
-    for p in parameters:
-        for i, column in enumerate(known[p.name] if p.name in known else _slope(balance, values, residual, p)):
-            columns[i].append(column)
-    return [np.stack(c, axis=2) if c else np.zeros((*residual[i].shape, 0)) for i, c in enumerate(columns)]
+    def slopes(self) -> Slopes:
+        """Derivatives by every unknown, by name, to be used again."""
+        return {u.name: self.slope(u) for u in self.unknowns}
 
 
-def slopes_of(now: TorqueFit) -> Slopes:
-    """Derivatives by every parameter of a fit, by name, to be used again."""
-    return {p.name: _slope(now.balance, now.values, now.residual, p) for p in now.adjustables}
-
-
-def _slope(
-    balance: TorqueBalance, values: Mapping[str, float], residual: Sequence[Floats], p: Adjustable
-) -> list[Floats]:
-    step = DIFFERENCE * p.scale
-    if values[p.name] + step > p.high:
-        step = -step
-    moved = balance.residual({**values, p.name: values[p.name] + step})
-    return [(after - before) / step for after, before in zip(moved, residual, strict=True)]
-
-
-def prior_cost(parameters: Sequence[Adjustable], values: Mapping[str, float]) -> float:
+def prior_cost(unknowns: Sequence[Unknown], values: Mapping[str, float]) -> float:
     """Σ ((value − expected)/deviation)²."""
-    return sum(((values[p.name] - p.expected) / p.deviation) ** 2 for p in parameters if p.deviation is not None)
+    return sum(((values[u.name] - u.expected) / u.deviation) ** 2 for u in unknowns if u.deviation is not None)
 
 
 def fit(
-    balance: TorqueBalance, parameters: Sequence[Adjustable], begin: Mapping[str, float], data: Data,
-    memory: Floats | None = None, known: Slopes | None = None, rounds: int = ROUNDS,
-) -> TorqueFit:  # fmt: skip
-    """Parameters that make the residual most probable, from where `begin` says.
+    balance: TorqueBalance,
+    unknowns: Sequence[Unknown],
+    begin: Mapping[str, float],
+    data: Data,
+    memory: Floats | None = None,
+    known: Slopes | None = None,
+    rounds: int = ROUNDS,
+) -> BalanceFit:
+    """Values that make the residual most probable, starting from `begin` where it names an unknown.
 
     Args:
-        memory: (n,) of the residual, where it is to be the same as another fit's, so that the two can be compared.
-        known: derivatives by parameters in which the residual is all but linear; they are not worked out again.
+        memory: (n,) memory of the residual, where it is to be that of another fit, so that the two can be compared.
+        known: derivatives by parameters in which the residual is all but linear; they are not computed again.
     """
-    values = {p.name: float(np.clip(begin.get(p.name, p.expected), p.low, p.high)) for p in parameters}
+    values = {u.name: float(np.clip(begin.get(u.name, u.expected), u.low, u.high)) for u in unknowns}
     if memory is None:
-        first = fit(balance, parameters, values, data, np.ones(len(data.floor)), known, rounds)
+        first = fit(balance, unknowns, values, data, np.ones(len(data.floor)), known, rounds)
         memory = noise_model(data.stretches, first.residual, data.floor).memory
         values = first.values
-    best = _state(balance, parameters, values, balance.residual(values), data, memory)
+    best = _evaluate(balance, unknowns, values, data, memory)
     for _ in range(rounds):
         aim = gauss_newton(best, data, known)
         for share in STEPS:
-            tried = {p.name: _between(p, best.values[p.name], aim[p.name], share) for p in parameters}
-            found = _state(balance, parameters, tried, balance.residual(tried), data, memory)
+            tried = {u.name: _between(u, best.values[u.name], aim[u.name], share) for u in unknowns}
+            found = _evaluate(balance, unknowns, tried, data, memory)
             fell = best.criterion - found.criterion
             if fell > 0:
                 break
@@ -124,50 +108,57 @@ def fit(
     return best
 
 
-def _between(p: Adjustable, start: float, aim: float, share: float) -> float:
-    return float(np.clip(start + share * (aim - start), p.low, p.high))
+def _between(u: Unknown, start: float, aim: float, share: float) -> float:
+    return float(np.clip(start + share * (aim - start), u.low, u.high))
 
 
-def _state(
-    balance: TorqueBalance, parameters: Sequence[Adjustable], values: dict[str, float], residual: list[Floats],
-    data: Data, memory: Floats,
-) -> TorqueFit:  # fmt: skip
+def _evaluate(
+    balance: TorqueBalance, unknowns: Sequence[Unknown], values: dict[str, float], data: Data, memory: Floats
+) -> BalanceFit:
+    residual = balance.residual(values)
     noise = NoiseModel(noise_model(data.stretches, residual, data.floor).deviation, memory)
     by_joint = minus_twice_log_likelihood(data.stretches, residual, noise.memory, data.floor)
-    return TorqueFit(balance, tuple(parameters), values, residual, noise, by_joint, prior_cost(parameters, values))
+    return BalanceFit(balance, tuple(unknowns), values, residual, noise, by_joint, prior_cost(unknowns, values))
 
 
-def gauss_newton(now: TorqueFit, data: Data, known: Slopes | None = None) -> dict[str, float]:
+def gauss_newton(now: BalanceFit, data: Data, known: Slopes | None = None) -> dict[str, float]:
     """Values after one bounded Gauss-Newton step."""
-    parameters = now.adjustables
-    if not parameters:
+    unknowns = now.unknowns
+    if not unknowns:
         return {}
-    slopes = derivatives(now.balance, now.values, now.residual, parameters, known or {})
+    ready = known or {}
+    slopes = stacked({u.name: ready[u.name] if u.name in ready else now.slope(u) for u in unknowns}, now)
     A = np.concatenate(now.noise.weighted(data.stretches, slopes))
     b = np.concatenate(now.noise.weighted(data.stretches, now.residual))
-    scale = np.array([p.scale for p in parameters])
-    at = np.array([now.values[p.name] for p in parameters])
-    rows, aims = prior_rows(parameters, at)
-    low, high = np.array([p.low for p in parameters]), np.array([p.high for p in parameters])
+    scale = np.array([u.scale for u in unknowns])
+    at = np.array([now.values[u.name] for u in unknowns])
+    rows, aims = prior_rows(unknowns, at)
+    low, high = np.array([u.low for u in unknowns]), np.array([u.high for u in unknowns])
     room = 1e-9 * np.maximum(high - low, scale)
     # orthogonal triangles first: the bounded search then works on p rows, not on all samples
     triangle: Floats = np.asarray(np.linalg.qr(np.column_stack([A * scale, -b]), mode="r"))
     solved = lsq_linear(
-        np.concatenate([triangle[:, :-1], rows * scale]), np.concatenate([triangle[:, -1], aims]),
-        bounds=((low - at - room) / scale, (high - at + room) / scale), method="bvls",
-    )  # fmt: skip
+        np.concatenate([triangle[:, :-1], rows * scale]),
+        np.concatenate([triangle[:, -1], aims]),
+        bounds=((low - at - room) / scale, (high - at + room) / scale),
+        method="bvls",
+    )
     after = np.clip(at + solved.x * scale, low, high)
-    return {p.name: float(v) for p, v in zip(parameters, after, strict=True)}
+    return {u.name: float(v) for u, v in zip(unknowns, after, strict=True)}
 
 
-def prior_rows(parameters: Sequence[Adjustable], at: Floats) -> tuple[Floats, Floats]:
-    """Rows (c, p) and right-hand sides (c,) that hold parameters near what is expected of them."""
-    claimed = [k for k, p in enumerate(parameters) if p.deviation is not None]
-    rows = np.zeros((len(claimed), len(parameters)))
-    aims = np.zeros(len(claimed))
-    for row, k in enumerate(claimed):
-        p = parameters[k]
-        assert p.deviation is not None
-        rows[row, k] = 1.0 / p.deviation
-        aims[row] = (p.expected - at[k]) / p.deviation
+def stacked(slopes: Slopes, now: BalanceFit) -> list[Floats]:
+    """Derivatives (m, n, p) of the residual of every record, in the order of the fit's unknowns."""
+    if not now.unknowns:
+        return [np.zeros((*r.shape, 0)) for r in now.residual]
+    return [np.stack([slopes[u.name][i] for u in now.unknowns], axis=2) for i in range(len(now.residual))]
+
+
+def prior_rows(unknowns: Sequence[Unknown], at: Floats) -> tuple[Floats, Floats]:
+    """Rows (c, p) and right-hand sides (c,) that hold unknowns near their expected values."""
+    claimed = [(k, u, u.deviation) for k, u in enumerate(unknowns) if u.deviation is not None]
+    rows, aims = np.zeros((len(claimed), len(unknowns))), np.zeros(len(claimed))
+    for row, (k, u, deviation) in enumerate(claimed):
+        rows[row, k] = 1.0 / deviation
+        aims[row] = (u.expected - at[k]) / deviation
     return rows, aims

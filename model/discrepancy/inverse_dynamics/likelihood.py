@@ -1,9 +1,9 @@
-"""How probable residual torques are, joint by joint, over the stretches in which the joint moves.
+"""Likelihood of residual torques, joint by joint, over the stretches in which the joint moves.
 
 Weights are equal within a joint, as in least squares on the inverse dynamics (Gautier 1997). Whitening would be better
-statistics for noise alone. What is left of a real machine is mostly not noise: it is large and slow, and whitening it
-away leaves the fit to the fastest part of the motion, where accelerations are known worst. That neighbours say the same
-is answered for in the count of independent samples instead.
+statistics for noise alone. The residual of a real machine is mostly not noise: it is large and slow, and whitening it
+away leaves the fit to the fastest part of the motion, where accelerations are known worst. The correlation of
+neighbouring samples enters through the number of independent samples instead.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from model.discrepancy.inverse_dynamics.records import TorqueRecord
 from model.fitting.whitening import autocovariance
+from model.inverse_dynamics.recorded_motion import RecordedMotion
 
 Floats = NDArray[np.float64]
 Stretch = tuple[int, slice]
@@ -23,18 +23,18 @@ Stretch = tuple[int, slice]
 LONGEST_MEMORY = 60
 """Samples over which residuals are taken to be correlated: twenty periods of the cutoff."""
 SHORTEST_STRETCH = 6
-"""Samples; a shorter one is left out."""
+"""Samples of the shortest stretch that is used."""
 
 
 @dataclass(frozen=True)
 class Stretches:
-    """Where each joint moves: per joint, the record and rows of every uninterrupted stretch."""
+    """Where each joint moves: per joint, the record (index) and rows of every uninterrupted stretch."""
 
     by_joint: tuple[tuple[Stretch, ...], ...]
 
     @property
     def samples(self) -> int:
-        """Residuals that are compared, of all joints."""
+        """Number of residuals that are compared, of all joints."""
         return sum(rows.stop - rows.start for joint in self.by_joint for _, rows in joint)
 
     def of_joint(self, residual: Sequence[Floats], joint: int) -> list[Floats]:
@@ -54,7 +54,7 @@ class Stretches:
         return Stretches(tuple(cut))
 
 
-def stretches_of(records: Sequence[TorqueRecord]) -> Stretches:
+def stretches_of(records: Sequence[RecordedMotion]) -> Stretches:
     """The stretches of records in which their joints move."""
     joints = records[0].moving.shape[1]
     return Stretches(
@@ -70,10 +70,10 @@ def _pieces(record: int, mask: NDArray[np.bool_]) -> list[Stretch]:
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """How large residual torques are (n,), N·m or N, and over how many samples each says the same, by joint.
+    """Standard deviation of residual torques (n,), N·m or N, and their memory in samples (n,), by joint.
 
-    `memory` is 1 + 2 Σ ρ², ρ the residual's autocorrelation: what the sampling variance of a product of two such
-    signals is larger by than for white ones (Bartlett 1935).
+    `memory` is 1 + 2 Σ ρ², ρ the residual's autocorrelation: the factor by which the sampling variance of a product of
+    two such signals exceeds that of white ones (Bartlett 1935).
     """
 
     deviation: Floats
@@ -81,7 +81,7 @@ class NoiseModel:
 
     def weighted(self, stretches: Stretches, arrays: Sequence[Floats]) -> list[Floats]:
         """Per joint the samples (N_j, …) of arrays (m, n, …), stretch below stretch, each divided by the deviation
-        that makes their squares add up to as many as are independent."""
+        with which the sum of their squares is the number of independent samples."""
         result = []
         for j, size in enumerate(self.deviation * np.sqrt(self.memory)):
             empty = np.zeros((0, *arrays[0].shape[2:]))
@@ -90,7 +90,7 @@ class NoiseModel:
 
 
 def noise_model(stretches: Stretches, residual: Sequence[Floats], floor: Floats) -> NoiseModel:
-    """Size and memory of residuals; `floor` (n,) is the least deviation that they can have."""
+    """Deviation and memory of residuals; `floor` (n,) is the least deviation that they can have."""
     joints = len(stretches.by_joint)
     deviation, memory = floor.copy(), np.ones(joints)
     for j in range(joints):
@@ -104,7 +104,7 @@ def noise_model(stretches: Stretches, residual: Sequence[Floats], floor: Floats)
 def minus_twice_log_likelihood(
     stretches: Stretches, residual: Sequence[Floats], memory: Floats, floor: Floats
 ) -> Floats:
-    """Per joint (n,), constants left out: (n/memory) ln of the mean square, which no noise lets fall below `floor`²."""
+    """Per joint (n,), constants left out: (samples/memory) ln of the mean square, which is `floor`² at least."""
     result = np.zeros(len(stretches.by_joint))
     for j in range(len(result)):
         if pieces := stretches.of_joint(residual, j):

@@ -1,4 +1,4 @@
-"""What a diagnosis in torque space may be told."""
+"""Options of a diagnosis by inverse dynamics."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from model.discrepancy.options import DiagnosisOptions
 class TorqueOptions(BaseModel):
     """How to diagnose from torques.
 
-    cutoff: Hz of the low-pass; None: the highest at which noise of the acceleration stays small.
+    cutoff: of the low-pass, Hz; None: the highest at which noise of the acceleration stays small.
     effects: names to try; None: every effect of the library, and the user's own, that acts on recorded torque.
-    joints: on these joints only; None for all that the model moves.
-    most_steps: effects added at most, one after the other.
-    least_evidence: what an effect must take off −2 log posterior, its own parameters and the places looked at paid for.
-    echo: share of the evidence that steps on its joints have brought, which a further effect must bring besides: what
-        is left where a law is not exactly the rig's is no effect of its own.
-    least_margin: evidence by which it must lead over every other answer, to be named alone.
-    least_share: share by which the torque left on held-out records (in mean square) must fall.
+    joints: joints to look on; None for all that the model moves.
+    most_steps: most effects that are added, one after the other.
+    least_evidence: least fall of −2 log posterior by an effect, after the cost of its parameters and of the places
+        searched.
+    echo: share of the evidence from earlier steps on the same joints, which a further effect must bring in addition:
+        where the law of an effect is not exactly the rig's, what is left is no effect of its own.
+    least_margin: least lead in evidence over every other answer, for an effect to be named alone.
+    least_share: least share by which the mean square of the torque on held-out records must fall.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -36,7 +37,7 @@ class TorqueOptions(BaseModel):
 
 
 def torque_options(options: DiagnosisOptions | TorqueOptions | None) -> TorqueOptions:
-    """What a diagnosis in torque space makes of the options of any diagnosis."""
+    """The options of any diagnosis as options of this one."""
     if isinstance(options, DiagnosisOptions):
         return TorqueOptions(effects=options.effects, joints=options.joints, most_steps=options.most_steps)
     return options or TorqueOptions()

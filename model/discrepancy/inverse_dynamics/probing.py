@@ -1,29 +1,37 @@
-"""How much of the residual a trial could explain: at finite sizes, with the adjustable parameters free to answer."""
+"""How much of the residual a trial could explain, at finite sizes and with the tolerance parameters free to follow."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from model.discrepancy.inverse_dynamics.balance import TorqueBalance
 from model.discrepancy.inverse_dynamics.candidates import Start, Trial
-from model.discrepancy.inverse_dynamics.fitting import Data, Slopes, TorqueFit, prior_rows
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data, Slopes, prior_rows, stacked
+from model.inverse_dynamics.torque_balance import TorqueBalance
 
 Floats = NDArray[np.float64]
 
-BENT = (
-    "dead_zone", "supply_limit", "input_delay", "motor_inductance", "resistance_drift", "backlash", "joint_compliance",
-)  # fmt: skip
-"""Effects whose torque is far from linear in their size: no more than this many times the probed size is believed."""
-BENT_LIMIT = 2.0
+NONLINEAR = frozenset(
+    {
+        "dead_zone",
+        "supply_limit",
+        "input_delay",
+        "motor_inductance",
+        "resistance_drift",
+        "backlash",
+        "joint_compliance",
+    }
+)
+"""Effects whose torque is far from linear in their size."""
+NONLINEAR_LIMIT = 2.0
+"""Largest size of such an effect that a probe may find, in the size at which it was probed."""
 
 
 @dataclass(frozen=True)
 class Probe:
-    """What a trial explained at its best start: fall of the weighted squares, and the start, scaled to fit."""
+    """A trial at its best start: the fall of the weighted squares, and the start, scaled to fit."""
 
     trial: Trial
     gain: float
@@ -32,9 +40,9 @@ class Probe:
 
 @dataclass(frozen=True)
 class Prober:
-    """A fit, prepared for probing: `basis` (N, p) spans what the adjustable parameters can answer."""
+    """A fit, prepared for probing: `basis` (N, p) spans what its unknowns can explain."""
 
-    now: TorqueFit
+    now: BalanceFit
     data: Data
     basis: Floats
     left: Floats
@@ -60,7 +68,7 @@ class Prober:
         return self._prepared(np.concatenate(self.now.noise.weighted(self.data.stretches, change)))
 
     def _prepared(self, signal: Floats) -> Floats:
-        """A signal (N,) with what adjustable parameters explain taken off, priors included."""
+        """A signal (N,) less what the unknowns explain of it, priors included."""
         padded = np.concatenate([signal, np.zeros(self.basis.shape[0] - len(signal))])
         return padded - self.basis @ (self.basis.T @ padded)
 
@@ -71,7 +79,7 @@ class Prober:
         while kept.any():
             found = np.linalg.lstsq(columns[:, kept], -self.left, rcond=1e-8)[0]
             shares[:] = 0.0
-            shares[kept] = np.clip(found, 0.0, BENT_LIMIT) if trial.effect in BENT else found
+            shares[kept] = np.clip(found, 0.0, NONLINEAR_LIMIT) if trial.effect in NONLINEAR else found
             wrong = kept & np.array(
                 [self._outside(trial, n, a, start, null) for n, a in zip(trial.amplitudes, shares, strict=True)]
             )
@@ -89,15 +97,11 @@ class Prober:
         return not p.low - room <= value <= p.high + room
 
 
-def prober(now: TorqueFit, slopes: Slopes, data: Data) -> Prober:
-    """Prepares probing around a fit, whose derivatives are `slopes`."""
-    stacked: Sequence[Floats] = [
-        np.stack([slopes[p.name][i] for p in now.adjustables], axis=2) if now.adjustables else np.zeros((*r.shape, 0))
-        for i, r in enumerate(now.residual)
-    ]
-    A = np.concatenate(now.noise.weighted(data.stretches, stacked))
-    rows, _ = prior_rows(now.adjustables, np.array([now.values[p.name] for p in now.adjustables]))
-    scale = np.array([p.scale for p in now.adjustables])
+def prepare_probes(now: BalanceFit, slopes: Slopes, data: Data) -> Prober:
+    """A prober around a fit whose derivatives are `slopes`."""
+    A = np.concatenate(now.noise.weighted(data.stretches, stacked(slopes, now)))
+    rows, _ = prior_rows(now.unknowns, np.array([now.values[u.name] for u in now.unknowns]))
+    scale = np.array([u.scale for u in now.unknowns])
     whole = np.concatenate([A, rows]) * scale
     u, s, _ = np.linalg.svd(whole, full_matrices=False)
     basis = u[:, s > 1e-10 * s[0]] if s.size else np.zeros((whole.shape[0], 0))

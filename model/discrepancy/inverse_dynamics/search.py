@@ -1,43 +1,43 @@
-"""One turn of the search: probe every trial, fit the promising ones with everything else free, weigh the evidence."""
+"""One step of the search: probe every trial, fit the promising ones with everything else free, weigh the evidence."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.progress import Cancel, Progress, stop_if
-from model.discrepancy.inverse_dynamics.balance import TorqueBalance
-from model.discrepancy.inverse_dynamics.candidates import Start, Trial, trials
-from model.discrepancy.inverse_dynamics.fitting import Data, Slopes, TorqueFit, fit, slopes_of
+from model.discrepancy.inverse_dynamics.candidates import Start, list_trials
+from model.discrepancy.inverse_dynamics.case import Case
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data, Slopes, fit
 from model.discrepancy.inverse_dynamics.likelihood import noise_model
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
-from model.discrepancy.inverse_dynamics.probing import Probe, prober
-from model.discrepancy.inverse_dynamics.tolerances import Adjustable
+from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
+from model.discrepancy.inverse_dynamics.tolerances import free_unknown
+from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
 Floats = NDArray[np.float64]
 
 SHORTLIST = 7
-"""Effects that are fitted."""
+"""Most effects that are fitted after the probes."""
 ALIKE = 0.97
-"""Correlation of the torques of two effects from which they count as the same."""
+"""Correlation of the torques of two effects above which they count as the same."""
 JOINT_GAIN = 12.0
-"""Fall of the squares for which a joint is taken into an effect that acts on several."""
+"""Fall of the squares above which a joint is taken into an effect that acts on several."""
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """An effect on joints with everything fitted again: evidence, and the weighted residual per sample it leaves."""
+    """An effect on joints with everything fitted again, and its evidence."""
 
     effect: str
     joints: tuple[int, ...]
     model: Model
     parameters: tuple[Parameter, ...]
-    fit: TorqueFit
+    fit: BalanceFit
     evidence: float
 
     def rivals(self, other: Fitted) -> bool:
@@ -45,8 +45,8 @@ class Fitted:
         alike = not self.joints or not other.joints or bool(set(self.joints) & set(other.joints))
         return self.effect != other.effect and alike
 
-    def imitates(self, other: Fitted, before: TorqueFit) -> bool:
-        """Whether this is the other one's torque over again, with more parameters."""
+    def imitates(self, other: Fitted, before: BalanceFit) -> bool:
+        """Whether this effect gives the torque of the other one, with more parameters."""
         if len(self.parameters) <= len(other.parameters):
             return False
         own, theirs = (
@@ -57,36 +57,34 @@ class Fitted:
 
 
 @dataclass(frozen=True)
-class Turn:
-    """What one turn found: fitted candidates, best first, and the others as they were probed."""
+class Findings:
+    """What one step found: fitted candidates, best first, and all candidates as they were probed."""
 
     fitted: tuple[Fitted, ...]
     probed: tuple[Probe, ...]
-    memory: Floats
-    trials: int
 
 
-def look(model: Model, now: TorqueFit, data: Data, options: TorqueOptions, progress: Progress, cancel: Cancel) -> Turn:
-    """Every effect that the model lacks, against the residuals of a fit.
+def search(model: Model, now: BalanceFit, case: Case, progress: Progress, cancel: Cancel) -> Findings:
+    """Try every effect that the model lacks against the residuals of a fit.
 
     Raises CancelledError when asked to end.
     """
-    slopes = slopes_of(now)
-    probing = prober(now, slopes, data)
+    slopes = now.slopes()
+    prober = prepare_probes(now, slopes, case.data)
     fitted_model = model.with_values(now.values)
     probes: list[Probe] = []
-    for trial in trials(fitted_model, now.balance.records, now.residual, options):
+    for trial in list_trials(fitted_model, now, case):
         stop_if(cancel)
         progress(0.3, f"trying {trial.effect.replace('_', ' ')}{_on(trial.joints)}")
-        probes.append(probing.probe(trial))
+        probes.append(prober.probe(trial))
     probes.sort(key=lambda p: -p.gain)
     found = []
-    for probe_set in _shortlist(probes):
+    for chosen in _shortlist(probes):
         stop_if(cancel)
-        progress(0.6, f"fitting {probe_set[0].trial.effect.replace('_', ' ')}{_on(_joints(probe_set))}")
-        found.append(_fitted(fitted_model, now, slopes, data, probe_set))
-    weighed, memory = _weighed(found, now, data, sum(len(p.trial.starts) for p in probes))
-    return Turn(tuple(weighed), tuple(probes), memory, len(probes))
+        progress(0.6, f"fitting {chosen[0].trial.effect.replace('_', ' ')}{_on(_joints(chosen))}")
+        found.append(_fit_effect(fitted_model, now, slopes, case.data, chosen))
+    places = sum(len(p.trial.starts) for p in probes)
+    return Findings(tuple(_weigh(found, now, case.data, places)), tuple(probes))
 
 
 def _on(joints: tuple[int, ...]) -> str:
@@ -116,51 +114,32 @@ def _shortlist(probes: Sequence[Probe]) -> list[list[Probe]]:
     return chosen
 
 
-def _fitted(model: Model, now: TorqueFit, slopes: Slopes, data: Data, probes: Sequence[Probe]) -> Fitted:
-    trial: Trial = probes[0].trial
-    joints = _joints(probes)
-    wider = model.with_effect(trial.effect, joints)
+def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, data: Data, probes: Sequence[Probe]) -> Fitted:
+    """An effect on the joints of its probes, fitted together with all unknowns. Its evidence is not known yet."""
+    effect, joints = probes[0].trial.effect, _joints(probes)
+    wider = model.with_effect(effect, joints)
     own = tuple(p for probe in probes for p in probe.trial.parameters)
     start: Start = {name: value for p in probes for name, value in p.start.items()}
-    parameters = (*now.adjustables, *(found_parameter(p) for p in own))
+    unknowns = (*now.unknowns, *(free_unknown(p) for p in own))
     balance = TorqueBalance(wider, now.balance.records)
-    fitted = fit(balance, parameters, {**now.values, **start}, data, now.noise.memory, slopes)
-    return Fitted(trial.effect, joints, wider, own, fitted, 0.0)
+    fitted = fit(balance, unknowns, {**now.values, **start}, data, now.noise.memory, slopes)
+    return Fitted(effect, joints, wider, own, fitted, 0.0)
 
 
-def found_parameter(p: Parameter) -> Adjustable:
-    """A parameter of an effect that is being looked for: bounds and no prior."""
-    scale = p.deviation or abs(p.value) or 1.0
-    low = p.low if np.isfinite(p.low) else -1e6 * scale
-    high = p.high if np.isfinite(p.high) else 1e6 * scale
-    return Adjustable(p.name, p.unit, low, high, p.value, None, scale)
-
-
-def _weighed(found: Sequence[Fitted], now: TorqueFit, data: Data, places: int) -> tuple[list[Fitted], Floats]:
-    """Evidence of every candidate, counted in the independent samples that the best one leaves."""
+def _weigh(found: Sequence[Fitted], now: BalanceFit, data: Data, places: int) -> list[Fitted]:
+    """The candidates with their evidence, best first; independent samples are counted in what the best one leaves."""
     if not found:
-        return [], now.noise.memory
+        return []
     best = min(found, key=lambda f: f.fit.criterion)
     memory = noise_model(data.stretches, best.fit.residual, data.floor).memory
-    weighed = [
-        Fitted(
-            f.effect,
-            f.joints,
-            f.model,
-            f.parameters,
-            f.fit,
-            evidence(now, f.fit, data, memory, len(f.parameters), places),
-        )
-        for f in found
-    ]
-    return sorted(weighed, key=lambda f: -f.evidence), memory
+    weighed = [replace(f, evidence=evidence(now, f.fit, data, memory, len(f.parameters), places)) for f in found]
+    return sorted(weighed, key=lambda f: -f.evidence)
 
 
-def evidence(before: TorqueFit, after: TorqueFit, data: Data, memory: Floats, parameters: int, places: int) -> float:
-    """What `after` takes off −2 log posterior: its parameters and the places looked at paid for."""
+def evidence(before: BalanceFit, after: BalanceFit, data: Data, memory: Floats, parameters: int, places: int) -> float:
+    """Fall of −2 log posterior from one fit to another, less the cost of its parameters and of the places searched."""
     counts = np.array([sum(rows.stop - rows.start for _, rows in s) for s in data.stretches.by_joint])
     independent = max(float((counts / memory).sum()), 2.0)
     fell = float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
-    return (
-        fell + before.prior - after.prior - parameters * float(np.log(independent)) - 2 * float(np.log(max(places, 1)))
-    )
+    cost = parameters * float(np.log(independent))
+    return fell + before.prior - after.prior - cost - 2 * float(np.log(max(places, 1)))

@@ -17,13 +17,12 @@ from model.effects.effect import Effect
 from model.effects.effect_files import load_effect_file
 from model.effects.library import library, own_effects, remove_own
 from model.fitting.options import FitOptions
+from model.inverse_dynamics.fit import fit_torques
 from model.machine_model.model import Model, base_model
 from model.machine_model.model_file import load_model, save_model
-from model.simulation.prepared import Options
-from model.simulation.simulate import sensitivities, simulate
-from model.torque_space.fit import fit_torques
+from model.simulation.simulate import Options, sensitivities, simulate
+from tests.model.inverse_dynamics.test_fit_torques import OPTIONS, rod, swinging
 from tests.model.simulation.records import trace_of
-from tests.model.torque_space.test_fit_torques import OPTIONS, rod, swinging
 
 ROOT = Path(__file__).parents[3]
 SMOOTH = Options(quantise=False)

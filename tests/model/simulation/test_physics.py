@@ -17,7 +17,6 @@ from model.simulation.bodies import chain_body
 from model.simulation.inputs import inputs_of
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
-from model.simulation.torque_space import torque_balance
 from tests.model.simulation.machines import pendulum, slide
 from tests.model.simulation.records import ramp_trace, trace_of
 
@@ -97,23 +96,6 @@ def test_a_cascade_brings_the_carriage_to_its_set_point() -> None:
     run = simulate(model, trace)
     assert run.position[-1, 0] == pytest.approx(0.1, abs=1e-4)
     assert run.position[:, 0].max() < 0.102
-
-
-def test_required_torque_along_a_simulated_trace_is_what_the_motor_supplied() -> None:
-    """Sampled finely, each joint on a sine of its own: inertia, speed, gravity and back-EMF all take part."""
-    model = base_model(load_machine("ma2000"), friction=False).with_values({"controller.delay": 0.0})
-    time = 0.002 * np.arange(1500)
-    drive = np.stack([3 * np.sin(5 * time), 4 * np.sin(4 * time + 0.5) + 2, 3 * np.sin(7 * time)], axis=1)
-    at_start = np.tile([np.pi, 0.8, -0.5], (len(time), 1))
-    run = simulate(model, trace_of(at_start, 0.002, drive=drive), Options(quantise=False, loop="drive"))
-    measured = trace_of(at_start, 0.002, position=run.position, velocity=run.velocity, drive=drive)
-    balance = torque_balance(model, measured, window=0.02)
-    assert balance.motor is not None
-    assert balance.residual is not None
-    inside = slice(50, -50)
-    assert (np.abs(balance.residual[inside]).max(axis=0) < (0.06, 0.02, 0.02) * np.abs(balance.motor).max(axis=0)).all()
-    with pytest.raises(TraceError, match="fewer than"):
-        torque_balance(model, measured, window=10.0)
 
 
 @pytest.mark.parametrize(

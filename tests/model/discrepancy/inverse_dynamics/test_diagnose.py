@@ -17,10 +17,10 @@ from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.judging import relative_torque_error
+from model.discrepancy.inverse_dynamics.holdout import relative_torque_error
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
-from model.discrepancy.inverse_dynamics.records import torque_records
 from model.discrepancy.options import DiagnosisOptions
+from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 
@@ -151,7 +151,7 @@ def test_without_held_out_traces_an_effect_must_hold_on_quarters_of_the_record()
 
 
 def test_an_effect_that_does_not_hold_there_is_refused_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("model.discrepancy.inverse_dynamics.judging.block_squares", lambda _now, _data: np.array([1.0]))
+    monkeypatch.setattr("model.discrepancy.inverse_dynamics.holdout.block_squares", lambda _now, _data: np.array([1.0]))
     found = diagnose_torques(base_model(rigs.slide_machine()), [rigs.slide_trace(1, {"coulomb": 8.0})])
     assert found.steps[0].effect == "coulomb_friction"
     assert not any(step.adopted for step in found.steps)
@@ -213,5 +213,5 @@ def test_a_real_double_pendulum(lab_data: Path) -> None:
     found = diagnose_torques(base_model(load_machine(str(EXAMPLES / "double_pendulum.toml"))), runs[:4], runs[4:])
     adopted = [(s.effect, s.joints) for s in found.steps if s.adopted]
     assert adopted[0] == ("coulomb_friction", (1, 2))
-    assert relative_torque_error(found.model_after, torque_records(runs[4:], found.model_after.machine, 12.0)) < 0.47
+    assert relative_torque_error(found.model_after, recorded_motions(runs[4:], found.model_after.machine, 12.0)) < 0.47
     assert found.notes[0].startswith("Torque left unexplained on held-out traces: 7")

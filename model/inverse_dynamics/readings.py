@@ -1,4 +1,5 @@
-"""What a trace measures, how noisy it is, and how far up its accelerations can be trusted."""
+"""What a trace measures, how noisy it is, up to which frequency its accelerations can be trusted, and what its noise
+alone makes of a residual torque."""
 
 from __future__ import annotations
 
@@ -13,20 +14,29 @@ from scipy.signal import welch
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
+from model.dynamics.recursive import mass_matrix
+from model.machine_model.model import Model
+from model.simulation.chain_of_model import chain_of
 
 Floats = NDArray[np.float64]
 
 CUTOFFS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)
-"""Hz that are tried."""
+"""Cutoffs that `choose_cutoff` tries, Hz."""
 NOISE_SHARE = 0.1
-"""Share of the acceleration's root mean square that its noise may have."""
+"""Largest noise of an acceleration, as a share of its root mean square, at which a cutoff is used."""
 QUIET_BAND = (0.3, 0.45)
 """Band, as a share of the sampling rate, in which a record is taken to hold noise alone."""
+FEWEST = 32
+"""Samples that a trace needs, for its noise to be estimated."""
+LONGEST_GAP = (10.0, 0.05)
+"""Longest gap between samples that is bridged: so many periods, and so many seconds more."""
+POSTURES = 20
+"""Postures of each record over which its inertia is averaged for the noise floor."""
 
 
 @dataclass(frozen=True)
-class RawSignal:
-    """A trace on an even grid of its own sampling, not smoothed. speed: (k, n) where it is measured."""
+class Readings:
+    """A trace on an even grid of its own sampling, not smoothed. speed: (k, n), None where it is not measured."""
 
     name: str
     time: Floats
@@ -37,7 +47,7 @@ class RawSignal:
 
     @property
     def _noise_density(self) -> Floats:
-        """Of speed, or of position where no speed is measured."""
+        """Noise density of the speed, or of the position where no speed is measured."""
         return _quiet_density(self.position if self.speed is None else self.speed, self.period)
 
     def speed_noise(self, cutoff: float) -> Floats:
@@ -62,7 +72,7 @@ class RawSignal:
 
 
 def _quiet_density(signal: Floats, period: float) -> Floats:
-    """One-sided power density (n,) per Hz of the noise of a signal (k, n): of its band without motion."""
+    """One-sided power density (n,) per Hz of the noise of a signal (k, n), from the band that holds no motion."""
     rate = 1 / period
     frequency, density = welch(np.diff(signal, axis=0) / period, rate, nperseg=min(len(signal) - 1, 1024), axis=0)
     band = (frequency > QUIET_BAND[0] * rate) & (frequency < QUIET_BAND[1] * rate)
@@ -70,56 +80,73 @@ def _quiet_density(signal: Floats, period: float) -> Floats:
     return np.asarray(np.median(density[band] / difference[:, None], axis=0))
 
 
-def measured_signal(trace: Trace, machine: Machine) -> RawSignal:
+def readings_of(trace: Trace, machine: Machine) -> Readings:
     """Position, speed and drive of the modelled joints on an even grid.
 
     Where the machine's sensors measure speed, positions are its integral from the first one recorded.
 
-    Raises TraceError for a trace without drive, of another machine, or with fewer than 32 samples.
+    Raises TraceError for a trace without drive, of another machine, with a long gap, or with too few samples.
     """
     name = trace.record.trace_id
     if trace.drive is None:
-        raise TraceError(f"trace {name}: has no recorded drive, which a diagnosis in torques needs")
+        raise TraceError(f"trace {name}: has no recorded drive, without which torques cannot be compared")
     if trace.record.machine is not None and trace.record.machine.name != machine.name:
         raise TraceError(f"trace {name}: made on {trace.record.machine.name}, the model describes {machine.name}")
-    if len(trace) < 32:
-        raise TraceError(f"trace {name}: {len(trace)} samples; a diagnosis in torques needs at least 32")
+    if len(trace) < FEWEST:
+        raise TraceError(f"trace {name}: {len(trace)} samples; a comparison of torques needs at least {FEWEST}")
     columns = [trace.column(j) for j in machine.modelled_joints]
     steps = np.diff(trace.time)
     period = float(np.median(steps))
-    if steps.max() > 10 * period + 0.05:
+    if steps.max() > LONGEST_GAP[0] * period + LONGEST_GAP[1]:
         raise TraceError(f"trace {name}: a gap of {steps.max():.3g} s; use a piece without any")
     time = np.arange(trace.time[0], trace.time[-1], period)
 
-    def even(signal: Floats) -> Floats:
+    def resample(signal: Floats) -> Floats:
         return np.stack([np.interp(time, trace.time, signal[:, c]) for c in columns], axis=1)
 
-    position = even(trace.position)
-    speed = None if trace.velocity is None else even(trace.velocity)
+    position = resample(trace.position)
+    speed = None if trace.velocity is None else resample(trace.velocity)
     sensors = [machine.joint(j).sensor for j in machine.modelled_joints]
     if any(s is not None and s.measures == "velocity" for s in sensors):
         if speed is None:
             raise TraceError(f"trace {name}: has no velocity, which the sensors of {machine.name} measure")
         position = position[0] + cumulative_trapezoid(speed, dx=period, axis=0, initial=0)
-    return RawSignal(name, time, position, speed, even(trace.drive), period)
+    return Readings(name, time, position, speed, resample(trace.drive), period)
 
 
-def chosen_cutoff(traces: Sequence[Trace], machine: Machine) -> float:
-    """The highest cutoff (Hz) at which the acceleration's noise stays below a share of the acceleration, on every joint
+def choose_cutoff(traces: Sequence[Trace], machine: Machine) -> float:
+    """The highest cutoff (Hz) at which the acceleration's noise stays a small share of the acceleration, on every joint
     that moves.
 
     Raises SpecError when there is none: nothing moves beyond the noise of its readings.
     """
-    raw = [measured_signal(t, machine) for t in traces]
+    readings = [readings_of(t, machine) for t in traces]
     found = None
     for cutoff in CUTOFFS:
-        if cutoff > min(0.4 / r.period for r in raw):
+        if cutoff > min(0.4 / r.period for r in readings):
             break
-        noise = np.sqrt(np.mean([r.acceleration_noise(cutoff) ** 2 for r in raw], axis=0))
-        whole = np.sqrt(np.mean([r.acceleration_power(cutoff) ** 2 for r in raw], axis=0))
+        noise = np.sqrt(np.mean([r.acceleration_noise(cutoff) ** 2 for r in readings], axis=0))
+        whole = np.sqrt(np.mean([r.acceleration_power(cutoff) ** 2 for r in readings], axis=0))
         moving = whole > 3 * noise
         if moving.any() and (noise[moving] < NOISE_SHARE * whole[moving]).all():
             found = cutoff
     if found is None:
         raise SpecError("no joint accelerates beyond the noise of its readings: there is nothing to explain")
     return found
+
+
+def torque_noise(model: Model, traces: Sequence[Trace], cutoff: float) -> Floats:
+    """Standard deviation (n,), N·m or N, of a residual torque that holds only what noise of the readings makes of
+    accelerations.
+
+    The recorded drive is taken as exact: its fast part is mostly real, a controller's answer to noise of the readings.
+    """
+    chain = chain_of(model)
+    squares = []
+    for trace in traces:
+        readings = readings_of(trace, model.machine)
+        step = max(1, len(readings.time) // POSTURES)
+        postures = np.ascontiguousarray(readings.position[::step])
+        masses = np.mean([mass_matrix(chain, q) ** 2 for q in postures], axis=0)
+        squares.append(masses @ readings.acceleration_noise(cutoff) ** 2)
+    return np.asarray(np.sqrt(np.mean(squares, axis=0)))

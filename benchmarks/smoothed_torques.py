@@ -1,28 +1,23 @@
-"""A trace in torque space: what the bodies need to move as they did, and what motor and friction supply.
-
-Works without a controller and without integrating anything, so errors do not build up along the record; at 12 bits and
-20 ms the accelerations are noisy, and the smoothing is what decides how far to trust a single sample.
-"""
+"""Torques along a trace by smoothed derivatives, as sparse regression takes them: bodies, motors and friction alone."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
 from model import layout as at
-from model.arrays import Floats
-from model.dynamics import recursive
+from model.inverse_dynamics.supplied_torque import friction_levels, needed_torque
 from model.machine_model.model import Model
 from model.machine_model.nominal import is_rod_arm
 from model.simulation.bodies import chain_body
-from model.simulation.dynamics_of_run import chain_levels
 
-WINDOW = 0.2
-"""s over which position is smoothed by default: 11 samples at 20 ms."""
+Floats = NDArray[np.float64]
+
 ORDER = 3
 """Order of the local polynomial (Savitzky and Golay 1964)."""
 
@@ -49,10 +44,10 @@ class TorquesAlongTrace:
         return None if self.motor is None else self.motor + self.friction - self.required
 
 
-def torque_balance(model: Model, trace: Trace, window: float = WINDOW) -> TorquesAlongTrace:
+def torques_along(model: Model, trace: Trace, window: float) -> TorquesAlongTrace:
     """Inverse dynamics of a trace by a model: bodies, motors, viscous and Coulomb friction.
 
-    Other effects stay in the residual, where a regression is to find them; `model.torque_space` knows them all.
+    All other effects stay in the residual, where the regression is to find them.
 
     Args:
         window: s over which a polynomial of third order is fitted to position (or to the measured velocity).
@@ -68,9 +63,8 @@ def torque_balance(model: Model, trace: Trace, window: float = WINDOW) -> Torque
     settings = np.zeros(at.SETTINGS, dtype=np.int64)
     settings[at.PUBLISHED_LOADS] = int(is_rod_arm(model.machine))
     required, levels = np.empty_like(position), np.empty_like(position)
-    for row in range(len(position)):
-        required[row] = recursive.inverse_dynamics(chain, position[row], velocity[row], acceleration[row])
-        chain_levels(position[row], joints, chain, settings, levels[row])
+    needed_torque(chain, position, velocity, acceleration, required)
+    friction_levels(chain, position, joints, settings, levels)
     gear = joints[:, at.GEAR]
     slow = 0.5 * np.abs(velocity).max(axis=0).clip(1e-9) * 1e-2
     friction = -levels * np.tanh(velocity / slow) - gear**2 * joints[:, at.VISCOUS] * velocity
@@ -90,8 +84,8 @@ def _motion(trace: Trace, columns: list[int], window: float) -> tuple[Floats, Fl
     step = float(np.median(steps))
     if np.abs(steps - step).max() > 0.2 * step:
         raise TraceError(
-            f"trace {trace.record.trace_id}: samples are {steps.min():.4g} to {steps.max():.4g} s apart; torque space "
-            "needs an even spacing: fill the gaps, or use a piece without any"
+            f"trace {trace.record.trace_id}: samples are {steps.min():.4g} to {steps.max():.4g} s apart; the "
+            "regression needs an even spacing: fill the gaps, or use a piece without any"
         )
     length = max(ORDER + 2, round(window / step)) | 1
     if len(trace) < length:

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from daq.contracts.trace import Trace
-from model.discrepancy.inverse_dynamics.judging import held_out_squares
-from model.discrepancy.inverse_dynamics.records import TorqueRecord, torque_records
+from model.discrepancy.inverse_dynamics.holdout import held_out_squares
+from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motions
 from model.machine_model.model import Model, base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 
 CUTOFF = 8.0
 
 
-def records(*traces: Trace) -> tuple[TorqueRecord, ...]:
-    return torque_records(traces, rigs.slide_machine(), CUTOFF)
+def records(*traces: Trace) -> tuple[RecordedMotion, ...]:
+    return recorded_motions(traces, rigs.slide_machine(), CUTOFF)
 
 
 def later(trace: Trace, samples: int) -> Trace:

@@ -15,11 +15,11 @@ from daq.contracts.trace import Trace, TraceRecord
 from daq.traces.csv_table import import_csv
 from model.effects.library import library
 from model.fitting.options import FitOptions
+from model.inverse_dynamics.fit import fit_torques, torque_curves
+from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import Model, base_model
 from model.reports.page import write_report
 from model.reports.torque_report import torque_report
-from model.torque_space.curves import torque_curves
-from model.torque_space.fit import NOT_IN_TORQUES, fit_torques
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 LENGTH, MASS, ROTOR, VISCOUS, COULOMB = 0.3, 0.93, 0.0043, 0.03, 0.05
@@ -60,7 +60,7 @@ def test_the_parameters_of_the_motion_are_found() -> None:
     assert found.model.parameter("joint1.viscous_friction.coefficient").value == pytest.approx(VISCOUS, rel=0.05)
     assert found.model.parameter("joint1.coulomb_friction.torque").value == pytest.approx(COULOMB, rel=0.1)
     assert found.held_out is not None
-    assert found.held_out < 0.03
+    assert found.held_out < 0.002
     assert "link1.mass" in found.identifiability.known
 
 
@@ -172,6 +172,6 @@ def test_a_real_double_pendulum(lab_data: Path) -> None:
         for effect in effects:
             model = model.with_effect(effect, (1, 2))
         left[name] = fit_torques(model, runs[:4], runs[4:], options).held_out
-    assert left["none"] == pytest.approx(0.655, abs=0.02)
-    assert left["friction"] == pytest.approx(0.455, abs=0.02)
-    assert left["gear"] == pytest.approx(0.39, abs=0.02)
+    assert left["none"] == pytest.approx(0.679, abs=0.02)
+    assert left["friction"] == pytest.approx(0.454, abs=0.02)
+    assert left["gear"] == pytest.approx(0.45, abs=0.02)

@@ -1,8 +1,8 @@
-"""Torque of motors, friction and effects along a measured motion. Compiled; the physics is the simulation's."""
+"""Torque that a motion needs, and torque of motors, friction and effects along it. Compiled."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +13,41 @@ from model.dynamics import recursive
 from model.dynamics.compilation import compiled, internal
 from model.kinematics.chain import ChainArrays
 from model.simulation.dynamics_of_run import chain_levels
-from model.simulation.joint_torques import (
-    CURRENT,
-    RISE,
-    STATE,
-    extra_torque,
-    steady_current,
-    winding_functions,
-)
+from model.simulation.joint_torques import CURRENT, RISE, STATE, extra_torque, steady_current, winding_functions
 from model.simulation.own_torque import own_torque
 from model.simulation.period import extra_flags
+
+
+class DrivenMotion(NamedTuple):
+    """A motion of k samples and n joints with what acts on it, as the compiled functions read it."""
+
+    time: NDArray[Any]
+    """(k,) s."""
+    position: NDArray[Any]
+    """(k, n) of the links."""
+    speed: NDArray[Any]
+    """(k, n) of the links."""
+    contact: NDArray[Any]
+    """(k, n) direction of motion as friction has it, in [−1, 1]."""
+    rotor_speed: NDArray[Any]
+    """(k, n) of the motors, seen at the joint."""
+    volts: NDArray[Any]
+    """(k, n) after the amplifier, as they act at `time`."""
+    level: NDArray[Any]
+    """(k, n) levels of Coulomb friction, N·m."""
+    gravity: NDArray[Any]
+    """(k, n) gravity torques, N·m; read by effects of the user's own alone."""
+
+
+class JointNumbers(NamedTuple):
+    """A model's joints as the compiled functions read them."""
+
+    joints: NDArray[Any]
+    """(n, PER_JOINT) the joints' part of the model's vector."""
+    flags: NDArray[Any]
+    """(n,) modes of the joints."""
+    own: NDArray[Any]
+    """Table of effects of the user's own."""
 
 
 @compiled
@@ -37,7 +62,7 @@ def needed_torque(
 
 
 @compiled
-def friction_loads(
+def friction_levels(
     chain: ChainArrays, position: NDArray[Any], joints: NDArray[Any], settings: NDArray[Any], out: NDArray[Any]
 ) -> None:
     """Levels of Coulomb friction (k, n), N·m."""
@@ -55,7 +80,7 @@ def gravity_along(chain: ChainArrays, position: NDArray[Any], out: NDArray[Any])
 
 
 @compiled
-def amplified(drive: NDArray[Any], joints: NDArray[Any], out: NDArray[Any]) -> None:
+def amplify(drive: NDArray[Any], joints: NDArray[Any], out: NDArray[Any]) -> None:
     """Volts at the motors (k, n) for a commanded drive."""
     for k in range(drive.shape[0]):
         for j in range(drive.shape[1]):
@@ -63,31 +88,24 @@ def amplified(drive: NDArray[Any], joints: NDArray[Any], out: NDArray[Any]) -> N
 
 
 @compiled
-def supplied_torque(
-    position: NDArray[Any], speed: NDArray[Any], contact: NDArray[Any], rotor_speed: NDArray[Any],
-    volts: NDArray[Any], time: NDArray[Any], joints: NDArray[Any], flags: NDArray[Any], level: NDArray[Any],
-    load: NDArray[Any], own: NDArray[Any], motor: NDArray[Any], beside: NDArray[Any],
-) -> None:  # fmt: skip
-    """Torques (k, n) on the joints: `motor` of the motors, before any loss; `beside` of friction and all other effects.
-
-    position, speed: of the links; rotor_speed: of the motors, seen at the joint; volts: after the amplifier, as they
-    act at `time`; level, load: friction levels and gravity torques along the motion; contact: direction of motion as
-    friction has it, in [−1, 1].
-    """
-    n = position.shape[1]
-    modes = extra_flags(joints, flags)
-    state = np.zeros((n, STATE), dtype=position.dtype)
-    for k in range(position.shape[0]):
+def supplied_torque(motion: DrivenMotion, numbers: JointNumbers, motor: NDArray[Any], other: NDArray[Any]) -> None:
+    """Torques (k, n) on the joints: `motor` of the motors, before any loss; `other` of friction and other effects."""
+    joints, time = numbers.joints, motion.time
+    n = joints.shape[0]
+    modes = extra_flags(joints, numbers.flags)
+    state = np.zeros((n, STATE), dtype=motion.position.dtype)
+    for k in range(motion.position.shape[0]):
         h = time[k] - time[k - 1] if k > 0 else time[1] - time[0]
         for j in range(n):
-            joint, q, v, w, z = joints[j], position[k, j], speed[k, j], rotor_speed[k, j], contact[k, j]
-            motor[k, j] = _motor_torque(joint, modes[j], state[j], volts[k, j], w, h)
-            torque = -joint[at.GEAR] * joint[at.GEAR] * joint[at.VISCOUS] * w - z * level[k, j]
+            joint, q, v, w = joints[j], motion.position[k, j], motion.speed[k, j], motion.rotor_speed[k, j]
+            z, u = motion.contact[k, j], motion.volts[k, j]
+            motor[k, j] = _motor_torque(joint, modes[j], state[j], u, w, h)
+            torque = -joint[at.GEAR] * joint[at.GEAR] * joint[at.VISCOUS] * w - z * motion.level[k, j]
             if modes[j] != 0:
                 torque += extra_torque(joint, modes[j], time[k], q, v, z, 0.0, 0.0)
             if modes[j] & at.HAS_USER_EFFECT:
-                torque += own_torque(own[j], joint, q, v, volts[k, j], load[k, j], time[k])
-            beside[k, j] = torque
+                torque += own_torque(numbers.own[j], joint, q, v, u, motion.gravity[k, j], time[k])
+            other[k, j] = torque
 
 
 @internal

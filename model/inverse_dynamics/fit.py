@@ -1,9 +1,9 @@
-"""Parameters from recorded torques, with what the records cannot tell, and the torque that is left."""
+"""Parameters from recorded torques: `daq fit --torques`. What the records determine, and the torque that is left."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,36 +24,22 @@ from model.fitting.result import FittedParameter
 from model.fitting.robust import influence
 from model.fitting.unknowns import prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
+from model.inverse_dynamics.problem import TorqueProblem
+from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion
+from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
-from model.torque_space.problem import TorqueProblem
-from model.torque_space.recorded_motion import CUTOFF, RecordedMotion, recorded_motion
 
 Floats = NDArray[np.float64]
 
+CUTOFF = 12.0
+"""Default cutoff of the low-pass, Hz."""
 LONGEST_MEMORY = 40
-"""Samples that the whitening of torques looks back: a low-passed residual is correlated over many."""
-
-
-_SENSOR = "positions are taken as they were recorded"
-_ROTOR = "the rotor's own motion is not recorded"
-_CONTROLLER = "the controller takes no part in it"
-NOT_IN_TORQUES = {
-    "stiction": "whether the joint sticks is not recorded",
-    "backlash": _ROTOR,
-    "joint_compliance": _ROTOR,
-    "motor_inductance": "the current is taken as settled",
-    "resistance_drift": "how warm the winding was is not recorded",
-    "potentiometer_gain": _SENSOR,
-    "potentiometer_offset": _SENSOR,
-    "potentiometer_nonlinearity": _SENSOR,
-    "wrong_gain": _CONTROLLER,
-    "lost_set_points": _CONTROLLER,
-}
-"""Effects that leave no mark in the torque that a recorded motion needs, and why. All others take part."""
+"""Samples over which the whitening of residual torques looks back, at most: a low-passed residual is correlated."""
 
 
 class TorqueError(BaseModel):
-    """One trace: root mean square of what is left of each joint's torque, and as a share of the torque (0 to …)."""
+    """Errors of one trace: root mean square of each joint's residual torque and of its recorded torque; `share` is
+    √(Σ residual² / Σ torque²) over all joints."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -65,8 +51,8 @@ class TorqueError(BaseModel):
 
 
 class TorqueFit(BaseModel):
-    """What a fit of torques found. `in_sample` and `held_out` are relative torque errors over all joints and samples:
-    √(Σ residual² / Σ torque²)."""
+    """The result of a fit of torques. `in_sample` and `held_out` are √(Σ residual² / Σ torque²) over all joints and
+    compared samples."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -81,11 +67,28 @@ class TorqueFit(BaseModel):
     converged: bool
 
 
+@dataclass(frozen=True)
+class TorqueCurves:
+    """Torques along a trace at its compared times (m,), s: recorded and residual (m, n), N·m (N), low-passed alike."""
+
+    trace: str
+    joints: tuple[int, ...]
+    time: Floats
+    recorded: Floats
+    left: Floats
+
+
 def fit_torques(
-    model: Model, traces: Sequence[Trace], held_out: Sequence[Trace] = (), options: FitOptions | None = None, *,
-    cutoff: float = CUTOFF, progress: Progress = silent, cancel: Cancel | None = None,
-) -> TorqueFit:  # fmt: skip
-    """Fit the parameters that the options choose so that the motion needs the torque that was recorded.
+    model: Model,
+    traces: Sequence[Trace],
+    held_out: Sequence[Trace] = (),
+    options: FitOptions | None = None,
+    *,
+    cutoff: float = CUTOFF,
+    progress: Progress = silent,
+    cancel: Cancel | None = None,
+) -> TorqueFit:
+    """Fit the parameters that the options choose, so that the motion needs the torque that was supplied.
 
     Least squares with priors; verdicts and 95 % intervals take the correlation of the residual into account.
 
@@ -98,46 +101,57 @@ def fit_torques(
     records_of([*traces, *held_out], model.machine, "position")
     unknowns = chosen_unknowns(model, options)
     progress(0.0, "low-passing the records")
-    records = tuple(_recorded(model, t, cutoff) for t in traces)
-    judged_by = [_recorded(model, t, cutoff) for t in held_out]
-    problem = TorqueProblem(model, records, unknowns, np.ones(model.joint_count))
+    motions = [_driven_motion(model, trace, cutoff) for trace in (*traces, *held_out)]
+    problem = TorqueProblem(model, tuple(motions[: len(traces)]), unknowns, np.ones(model.joint_count))
     begin = np.array([u.start for u in unknowns])
-    scale = _left(problem, begin)
+    first = np.concatenate([e.residual for e in problem.evaluate(begin, derivatives=False)])
 
-    def tell(count: int, rms: float) -> None:
+    def report_search(count: int, rms: float) -> None:
         progress(0.9 * (1 - float(np.exp(-count / 10))), f"{count} evaluations, residual {rms:.3g} of the first")
 
-    search = Search(options.robust, options.tolerance, options.most_evaluations or 60, tell)
-    found = solve(problem, [white(float(s)) for s in scale], begin, cancel, search)
-    parameters, report = _judged(problem, found.values, options)
+    search = Search(options.robust, options.tolerance, options.most_evaluations or 60, report_search)
+    found = solve(problem, [white(size) for size in _rms(first)], begin, cancel, search)
+    parameters, report = _judge_parameters(problem, found.values, options)
     fitted = model.with_values({u.name: float(v) for u, v in zip(unknowns, found.values, strict=True)})
-    names = tuple(t.record.trace_id for t in traces)
-    errors = [_error(problem, found.values, n, r, held=False) for n, r in zip(names, records, strict=True)]
-    errors += [
-        _error(problem, found.values, t.record.trace_id, r, held=True) for t, r in zip(held_out, judged_by, strict=True)
-    ]
-    own = [u.name for u in unknowns]
-    lineage = Lineage(parent=model.identity, traces=names, fit={"fitted": own, "known": list(report.known)})
+    errors = [_error(fitted, motion, held_out=k >= len(traces)) for k, motion in enumerate(motions)]
+    lineage = Lineage(
+        parent=model.identity,
+        traces=tuple(t.record.trace_id for t in traces),
+        fit={"fitted": [u.name for u in unknowns], "known": list(report.known)},
+    )
     progress(1.0, "done")
     return TorqueFit(
-        model=fitted.with_lineage(lineage), parameters=parameters, identifiability=report,
-        errors=tuple(e for e, _, _ in errors),
-        in_sample=_share(errors[: len(traces)]), held_out=_share(errors[len(traces) :]) if held_out else None,
-        cutoff=cutoff, evaluations=found.evaluations, converged=found.converged,
-    )  # fmt: skip
+        model=fitted.with_lineage(lineage),
+        parameters=parameters,
+        identifiability=report,
+        errors=tuple(error for error, _, _ in errors),
+        in_sample=_share(errors[: len(traces)]),
+        held_out=_share(errors[len(traces) :]) if held_out else None,
+        cutoff=cutoff,
+        evaluations=found.evaluations,
+        converged=found.converged,
+    )
 
 
-def _recorded(model: Model, trace: Trace, cutoff: float) -> RecordedMotion:
-    """The motion of a trace with its torque. Raises TraceError where there is none, which nothing can be a share of."""
-    record = recorded_motion(model, trace, cutoff)
-    if not record.torque[record.kept].any():
-        raise TraceError(f"trace {trace.record.trace_id}: its drive is 0 throughout, so it has no torque to fit to")
-    return record
+def torque_curves(model: Model, trace: Trace, cutoff: float = CUTOFF) -> TorqueCurves:
+    """Recorded and residual torque along a trace, by a model. Raises TraceError and SpecError as `fit_torques` does."""
+    motion = recorded_motion(trace, model.machine, cutoff)
+    balance = TorqueBalance(model, (motion,))
+    return TorqueCurves(
+        trace.record.trace_id,
+        model.machine.modelled_joints,
+        motion.time[motion.rows],
+        balance.supplied_by_drive()[0],
+        balance.residual({})[0],
+    )
 
 
-def _left(problem: TorqueProblem, values: Floats) -> Floats:
-    every = np.concatenate([e.residual for e in problem.evaluate(values, derivatives=False)])
-    return np.asarray(np.sqrt((every**2).mean(axis=0)))
+def _driven_motion(model: Model, trace: Trace, cutoff: float) -> RecordedMotion:
+    """The motion of a trace. Raises TraceError where its drive is zero throughout: there is no torque to fit to."""
+    motion = recorded_motion(trace, model.machine, cutoff)
+    if not TorqueBalance(model, (motion,)).supplied_by_drive()[0].any():
+        raise TraceError(f"trace {motion.name}: its drive is 0 throughout, so it has no torque to fit to")
+    return motion
 
 
 def _check_effects(model: Model) -> None:
@@ -148,10 +162,10 @@ def _check_effects(model: Model) -> None:
             )
 
 
-def _judged(
+def _judge_parameters(
     problem: TorqueProblem, values: Floats, options: FitOptions
 ) -> tuple[tuple[FittedParameter, ...], IdentifiabilityReport]:
-    """Values with intervals, and what the records cannot tell."""
+    """Values with intervals, and what the records do not determine."""
     evaluations = problem.evaluate(values, derivatives=True)
     whiteners = [
         fitted_whitener([e.residual[:, j] for e in evaluations], LONGEST_MEMORY, 1e-9)
@@ -171,17 +185,13 @@ def _judged(
     return parameters, report
 
 
-def _error(
-    problem: TorqueProblem, values: Floats, trace: str, record: RecordedMotion, *, held: bool
-) -> tuple[TorqueError, float, float]:
+def _error(model: Model, motion: RecordedMotion, *, held_out: bool) -> tuple[TorqueError, float, float]:
     """The error of one trace, and the sums of squares of residual and torque."""
-    left = problem.with_records([record]).evaluate(values, derivatives=False)[0].residual
-    torque = record.torque[record.kept]
+    balance = TorqueBalance(model, (motion,))
+    left, torque = balance.residual({})[0], balance.supplied_by_drive()[0]
     squares, whole = float((left**2).sum()), float((torque**2).sum())
-    error = TorqueError(
-        trace=trace, held_out=held, rms=_rms(left), torque=_rms(torque),
-        share=float(np.sqrt(squares / whole)),
-    )  # fmt: skip
+    share = float(np.sqrt(squares / whole))
+    error = TorqueError(trace=motion.name, held_out=held_out, rms=_rms(left), torque=_rms(torque), share=share)
     return error, squares, whole
 
 

@@ -1,0 +1,131 @@
+"""Residual torques on records that were not fitted to, and whether an effect holds there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data, fit
+from model.discrepancy.inverse_dynamics.likelihood import Stretches, stretches_of
+from model.inverse_dynamics.recorded_motion import RecordedMotion
+from model.inverse_dynamics.torque_balance import TorqueBalance
+from model.machine_model.model import Model
+from model.machine_model.parameter import Parameter
+
+Floats = NDArray[np.float64]
+
+FOLDS = 4
+"""Blocks into which the fitted records are cut where none are held out; each is predicted from the others."""
+BLOCK_ROUNDS = 2
+"""Rounds of the fit to all blocks but one."""
+AFFECTED = 0.01
+"""Share by which a joint's mean square must have fallen in the fit to count as one on which the effect acts."""
+MORE_THAN_NOISE = 1.1
+"""Least residual, in noise floors, of a joint on which something may be missing."""
+DISTURBANCE = "periodic_disturbance"
+
+
+def mean_squares(stretches: Stretches, residual: Sequence[Floats]) -> Floats:
+    """Mean square (n,) of residual torques by joint where it moves; NaN for a joint that never does."""
+    return _mean_squares([stretches.of_joint(residual, j) for j in range(len(stretches.by_joint))])
+
+
+def _mean_squares(by_joint: Sequence[Sequence[Floats]]) -> Floats:
+    return np.array([float(np.mean(np.concatenate(p) ** 2)) if p else np.nan for p in by_joint])
+
+
+def held_out_squares(model: Model, values: Mapping[str, float], records: tuple[RecordedMotion, ...]) -> Floats:
+    """Mean squares (n,) of a fitted model on other records."""
+    return mean_squares(stretches_of(records), _residuals(model, values, records))
+
+
+def block_squares(now: BalanceFit, data: Data) -> Floats:
+    """Mean squares (n,) that a fit leaves on quarters of its own records, each predicted from the others."""
+    known = now.slopes()
+    whole: list[list[Floats]] = [[] for _ in range(len(data.floor))]
+    for fold in range(FOLDS):
+        inside = [_fold(len(r), fold) for r in now.residual]
+        others = Data(data.stretches.within([~m for m in inside]), data.floor)
+        found = fit(now.balance, now.unknowns, now.values, others, now.noise.memory, known, BLOCK_ROUNDS)
+        left = data.stretches.within(inside)
+        for j in range(len(data.floor)):
+            whole[j] += left.of_joint(found.residual, j)
+    return _mean_squares(whole)
+
+
+def _fold(count: int, fold: int) -> NDArray[np.bool_]:
+    edges = np.linspace(0, count, FOLDS + 1).astype(int)
+    mask = np.zeros(count, dtype=bool)
+    mask[edges[fold] : edges[fold + 1]] = True
+    return mask
+
+
+def relative_torque_error(model: Model, records: tuple[RecordedMotion, ...]) -> float:
+    """√(Σ residual² / Σ torque²) over all joints and compared samples, joints at rest included."""
+    left = sum(float((r**2).sum()) for r in _residuals(model, {}, records))
+    driven = TorqueBalance(model, records).supplied_by_drive()
+    return float(np.sqrt(left / sum(float((r**2).sum()) for r in driven)))
+
+
+def share_removed(fitted_before: Floats, fitted_after: Floats, before: Floats, after: Floats) -> float:
+    """Share of the mean square that is gone on records not fitted to, over the joints on which the fit fell."""
+    with np.errstate(invalid="ignore"):
+        affected = (fitted_after < (1 - AFFECTED) * fitted_before) & np.isfinite(before) & np.isfinite(after)
+    if not affected.any():
+        return 0.0
+    return float(1 - np.mean(after[affected] / before[affected]))
+
+
+def is_beyond_noise(before: Floats, after: Floats, floor: Floats) -> bool:
+    """Whether a joint on which the fit fell had more to explain than the noise of its readings."""
+    with np.errstate(invalid="ignore"):
+        return bool(((after < (1 - AFFECTED) * before) & (before > (MORE_THAN_NOISE * floor) ** 2)).any())
+
+
+def _residuals(model: Model, values: Mapping[str, float], records: Sequence[RecordedMotion]) -> list[Floats]:
+    """Residual torques (m, n) of each record, N·m or N, with fitted values but for the phases of disturbances.
+
+    A phase belongs to the record: no other record can tell it. The amplitude is kept, so that a spurious disturbance
+    cannot be fitted away.
+    """
+    found = []
+    for record in records:
+        balance = TorqueBalance(model, (record,))
+        found += balance.residual(_with_own_phases(balance, values))
+    return found
+
+
+def _with_own_phases(balance: TorqueBalance, values: Mapping[str, float]) -> dict[str, float]:
+    """The values with the sine and cosine of every disturbance turned to the phase that explains most."""
+    turned = dict(values)
+    parts = [p for p in balance.model.parameters if p.effect == DISTURBANCE]
+    for sine in (p for p in parts if p.part == "sine"):
+        cosine = next((p for p in parts if p.part == "cosine" and p.joints == sine.joints), None)
+        if cosine is None:  # shared under another name: what is said of it there holds everywhere
+            continue
+        size = math.hypot(*(values.get(p.name, p.value) for p in (sine, cosine)))
+        if size > 0.0:
+            turned |= _turned(balance, turned, (sine, cosine), size)
+    return turned
+
+
+def _turned(
+    balance: TorqueBalance, values: Mapping[str, float], pair: tuple[Parameter, Parameter], size: float
+) -> dict[str, float]:
+    """The pair of that size that leaves least of its joints' torque where they move; unchanged where none moves."""
+    sine, cosine = (p.name for p in pair)
+    none = {sine: 0.0, cosine: 0.0}
+    tried = [balance.residual({**values, **none, **only}) for only in ({}, {sine: size}, {cosine: size})]
+    stretches = stretches_of(balance.records)
+    columns = [j - 1 for j in pair[0].joints]
+    left, by_sine, by_cosine = (
+        np.concatenate([np.zeros(0), *(part for j in columns for part in stretches.of_joint(one, j))]) for one in tried
+    )
+    if not len(left):
+        return {}
+    shares = np.linalg.lstsq(np.stack([by_sine - left, by_cosine - left], axis=1), -left, rcond=None)[0]
+    angle = math.atan2(shares[1], shares[0])
+    return {sine: size * math.cos(angle), cosine: size * math.sin(angle)}

@@ -1,0 +1,189 @@
+"""Where residual torques exceed noise, and the shape of what no effect explains."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.discrepancy.diagnosis import (
+    UNWRITTEN,
+    AgainstWhat,
+    Dependence,
+    Phase,
+    PhaseCell,
+    RemainingShape,
+    Where,
+    WorstPlace,
+)
+from model.discrepancy.inverse_dynamics.case import Case
+from model.discrepancy.inverse_dynamics.estimates import torque_unit
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit
+from model.discrepancy.localisation.dependence import AGAINST, Quantities, dependence
+from model.discrepancy.localisation.statistics import Bins, correlation_of, significance_of_chi_square
+from model.inverse_dynamics.recorded_motion import RecordedMotion
+
+Floats = NDArray[np.float64]
+
+WINDOW = 0.5
+"""Duration of one cell of the map, s."""
+LEAST = 0.3
+"""Least deviation of a residual from which its correlation is taken, in deviations of noise."""
+FAST = 0.5
+"""Acceleration above which a joint starts to move or turns, as a share of its larger ones (95 % quantile)."""
+SLOW = 0.15
+"""Speed below which a joint creeps, as a share of its larger ones (95 % quantile)."""
+SHAPE_SIGNIFICANCE = 6.0
+"""Least significance of a shape of the remaining torque, in standard deviations."""
+SHAPE_SHARE = 0.15
+"""Least share of the remaining torque's variance that a shape must explain."""
+BEYOND_NOISE = 1.5
+"""Least remaining torque that is given a shape, in noise floors."""
+
+
+def phases(record: RecordedMotion, joint: int) -> list[Phase]:
+    """Phase of motion of a joint (index) at each compared sample."""
+    speed, change = record.speed[record.rows, joint], record.acceleration[record.rows, joint]
+    fast = FAST * float(np.quantile(np.abs(change), 0.95)) + 1e-12
+    slow = SLOW * float(np.quantile(np.abs(speed), 0.95)) + 1e-12
+    found: list[Phase] = []
+    for v, a, moves in zip(speed, change, record.moving[:, joint], strict=True):
+        if not moves:
+            found.append("hold")
+        elif abs(v) < slow:
+            found.append("reversal" if abs(a) > fast else "creep")
+        else:
+            found.append("ramp_start" if abs(a) > fast else "steady_ramp")
+    return found
+
+
+def locate(now: BalanceFit, case: Case) -> Where:
+    """Map of the residual, in units of its noise, and the quantities that it depends on."""
+    model, records, residual, floor = now.balance.model, now.balance.records, now.residual, case.noise
+    cells: list[PhaseCell] = []
+    dependences: list[Dependence] = []
+    worst: tuple[float, int, Phase] | None = None
+    for j, joint in enumerate(model.machine.modelled_joints):
+        pieces = case.stretches.of_joint(residual, j)
+        if not pieces:
+            continue
+        correlation = correlation_of([p / floor[j] for p in pieces], LEAST)
+        squares: dict[Phase, float] = {}
+        for i, rows in case.stretches.by_joint[j]:
+            record = records[i]
+            named = phases(record, j)
+            size = max(1, round(WINDOW / (record.period * record.every)))
+            for begin in range(rows.start, rows.stop, size):
+                window = slice(begin, min(begin + size, rows.stop))
+                square = float(np.mean((residual[i][window, j] / floor[j]) ** 2))
+                count = window.stop - window.start
+                phase = max(dict.fromkeys(named[window]), key=named[window].count)
+                squares[phase] = squares.get(phase, 0.0) + square * count
+                significance = significance_of_chi_square(square, correlation.samples_of_square(count))
+                cells.append(
+                    PhaseCell(
+                        joint=joint,
+                        start=_time(record, window.start),
+                        end=_time(record, window.stop),
+                        phase=phase,
+                        mean_square=square,
+                        significance=float(significance),
+                        trace=i,
+                    )
+                )
+        dependences += [_dependence(joint, a, b, u) for a, b, u in _bins(now, case, j)]
+        phase = max(squares, key=lambda p: squares[p])
+        relative = float(np.sqrt(np.mean(np.concatenate(pieces) ** 2))) / floor[j]
+        if worst is None or relative > worst[0]:
+            worst = relative, joint, phase
+    if worst is None:
+        return Where(joint=None, phase=None, summary=UNWRITTEN, cells=(), dependences=())
+    ratio, joint, where = worst
+    unit = torque_unit(model, joint)
+    rms = ratio * floor[model.machine.modelled_joints.index(joint)]
+    place = WorstPlace(joint=joint, phase=where, ratio=ratio, rms=rms, unit=unit, whole_record=True)
+    return Where(
+        joint=joint, phase=where, summary=UNWRITTEN, cells=tuple(cells), dependences=tuple(dependences), worst=place
+    )
+
+
+def remaining_shapes(now: BalanceFit, case: Case) -> tuple[RemainingShape, ...]:
+    """Per joint, the dependence that explains most of a torque beyond noise, where there is a significant one."""
+    model, found = now.balance.model, []
+    for j, joint in enumerate(model.machine.modelled_joints):
+        pieces = case.stretches.of_joint(now.residual, j)
+        if not pieces or float(np.sqrt(np.mean(np.concatenate(pieces) ** 2))) < BEYOND_NOISE * case.noise[j]:
+            continue
+        every = [
+            (b.explained, a, b, u)
+            for a, b, u in _bins(now, case, j)
+            if b.significance > SHAPE_SIGNIFICANCE and b.explained > SHAPE_SHARE
+        ]
+        if every:
+            explained, against, bins, unit = max(every, key=lambda e: e[0])
+            found.append(
+                RemainingShape(
+                    joint=joint,
+                    against=against,
+                    unit=unit,
+                    torque_unit=torque_unit(model, joint),
+                    centres=tuple(map(float, bins.centres)),
+                    torque=_optional(bins.mean),
+                    deviation=_optional(bins.deviation),
+                    explained=explained,
+                )
+            )
+    return tuple(found)
+
+
+def _time(record: RecordedMotion, row: int) -> float:
+    return round(float(record.time[record.edge] + row * record.every * record.period - record.time[0]), 4)
+
+
+def _bins(now: BalanceFit, case: Case, j: int) -> list[tuple[AgainstWhat, Bins, str]]:
+    """Dependences of the residual of joint index `j`: quantity, bins, unit of the quantity."""
+    model, records, residual = now.balance.model, now.balance.records, now.residual
+    joint = model.machine.joint(model.machine.modelled_joints[j])
+    angle = "rad" if joint.kind == "revolute" else "m"
+    drive = "V" if joint.drive.kind == "dc_motor" else torque_unit(model, model.machine.modelled_joints[j])
+    begins = np.cumsum([0, *(len(r) for r in residual)])
+    own = tuple(slice(int(begins[i]) + s.start, int(begins[i]) + s.stop) for i, s in case.stretches.by_joint[j])
+    count = residual[0].shape[1]
+    speed = np.concatenate([r.speed[r.rows] for r in records])
+    times = [np.repeat((r.time[r.rows] - r.time[0])[:, None], count, axis=1) for r in records]
+    quantities: dict[AgainstWhat, tuple[Floats, str]] = {
+        "time": (np.concatenate(times), "s"),
+        "position": (np.concatenate([r.position[r.rows] for r in records]), angle),
+        "speed": (speed, f"{angle}/s"),
+        "direction": (np.sign(speed), "1"),
+        "drive": (np.concatenate([r.drive[r.rows] for r in records]), drive),
+    }
+    known = Quantities(
+        {name: values for name, (values, _) in quantities.items()},
+        {name: (unit,) * count for name, (_, unit) in quantities.items()},
+        own,
+    )
+    signal = np.concatenate(list(residual))[:, j]
+    found = []
+    for against in AGAINST:
+        bins = dependence(signal, j, against, known, LEAST * float(case.noise[j]))
+        if bins is not None:
+            found.append((against, bins, known.units[against][j]))
+    return found
+
+
+def _dependence(joint: int, against: AgainstWhat, bins: Bins, unit: str) -> Dependence:
+    return Dependence(
+        joint=joint,
+        against=against,
+        unit=unit,
+        centres=tuple(map(float, bins.centres)),
+        residual=_optional(bins.mean),
+        deviation=_optional(bins.deviation),
+        significance=bins.significance,
+    )
+
+
+def _optional(values: Floats) -> tuple[float | None, ...]:
+    return tuple(None if math.isnan(v) else float(v) for v in values)

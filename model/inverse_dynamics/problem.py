@@ -1,0 +1,47 @@
+"""A fit of torques as the numerics of fitting see it: residual torques and their derivatives by the unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model.fitting.problem import Evaluation
+from model.fitting.unknowns import Unknown
+from model.inverse_dynamics.recorded_motion import RecordedMotion
+from model.inverse_dynamics.torque_balance import TorqueBalance
+from model.machine_model.model import Model
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TorqueProblem:
+    """Torque that the motion needs less torque that was supplied, N·m (N), for records of one machine."""
+
+    model: Model
+    records: tuple[RecordedMotion, ...]
+    unknowns: tuple[Unknown, ...]
+    floor: Floats
+
+    @cached_property
+    def balance(self) -> TorqueBalance:
+        """The torque balance of all records."""
+        return TorqueBalance(self.model, self.records)
+
+    @property
+    def runs(self) -> Sequence[Sequence[slice]]:
+        """Per record, all of its compared samples."""
+        return [[slice(0, len(record.moving))] for record in self.records]
+
+    def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
+        """Residuals of every record, with their derivatives when asked for."""
+        named = {u.name: float(v) for u, v in zip(self.unknowns, values, strict=True)}
+        residual = self.balance.residual(named)
+        if not derivatives:
+            return [Evaluation(r, None) for r in residual]
+        slopes = [self.balance.slope(named, residual, u) for u in self.unknowns]
+        return [Evaluation(r, np.stack([slope[i] for slope in slopes])) for i, r in enumerate(residual)]

@@ -1,0 +1,191 @@
+"""A recorded motion on an even grid: position, speed, acceleration and drive, low-passed alike and without delay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from daq.contracts.errors import SpecError, TraceError
+from daq.contracts.machine import Machine, NoController
+from daq.contracts.trace import Trace
+from model.inverse_dynamics.readings import Readings, readings_of
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+ORDER = 4
+"""Order of the Butterworth low-pass, which runs forwards and backwards."""
+WIDER = 3.0
+"""Cutoff of the motion's low-pass, in cutoffs of the torques. Wider, so that a torque that changes with direction is
+formed of a motion whose reversals are still sharp; the torque is then low-passed to the cutoff."""
+GRID = 10.0
+"""Samples per period of the cutoff on which torques are formed."""
+KEPT = 3.0
+"""Samples per period of the cutoff that are compared: closer ones are not independent."""
+EDGE = 1.0
+"""Periods of the cutoff at both ends that are left out, where the low-pass lacks samples on one side."""
+SHORTEST = 1.0
+"""Shortest duration of a record, s."""
+TURNING_NOISE = 2.0
+"""Speed within which friction changes direction, in standard deviations of the speed's noise."""
+RESOLVED = 5.0
+"""Speed from which a joint is known to move, in speeds within which friction changes direction."""
+REST_NOISE = 4.0
+"""Speed below which a joint may be at rest, in standard deviations of the speed's noise."""
+REST_SHARE = 0.02
+"""Least value of that speed, as a share of the joint's larger speeds (95 % quantile)."""
+LEAST_REST = 0.15
+"""Time for which a joint must be that slow to count as resting, s; a shorter passage through zero speed is motion."""
+
+
+@dataclass(frozen=True)
+class RecordedMotion:
+    """A record of k samples on an even grid, of which m are compared.
+
+    Args:
+        time: (k,) s. position, speed, acceleration, drive: (k, n) in SI.
+        contact: (k, n) direction of motion as friction has it, in [−1, 1].
+        turning: (n,) speed within which the direction changes: a few standard deviations of the speed's noise, or one
+            sample.
+        period, sampled: time between samples of the grid, and of the record itself, s.
+        cutoff: of the torques' low-pass, Hz.
+        edge, every: samples of the grid left out at both ends, and distance of the compared ones.
+        moving: (m, n) False where a joint rests: friction then takes whatever value holds it, so the torque says
+            nothing.
+    """
+
+    name: str
+    time: Floats
+    position: Floats
+    speed: Floats
+    acceleration: Floats
+    drive: Floats
+    contact: Floats
+    turning: Floats
+    period: float
+    sampled: float
+    cutoff: float
+    edge: int
+    every: int
+    moving: Mask
+
+    def compared(self, torque: Floats) -> Floats:
+        """Torques (k, …) low-passed at the cutoff, at the samples that are compared (m, …)."""
+        smooth = low_pass(torque, self.cutoff, self.period)
+        return np.ascontiguousarray(smooth[self.rows])
+
+    @property
+    def turns(self) -> Mask:
+        """(k, n) where a joint is so slow that its smoothed speed does not tell whether it stands."""
+        return np.abs(self.speed) < RESOLVED * self.turning
+
+    @property
+    def rows(self) -> slice:
+        """The samples of the grid that are compared."""
+        return slice(self.edge, len(self.time) - self.edge, self.every)
+
+
+def low_pass(signal: Floats, cutoff: float, period: float) -> Floats:
+    """Butterworth's low-pass forwards and backwards along the first axis, so without delay, in second-order sections.
+
+    The signal is unchanged where the sampling ends below the cutoff.
+    """
+    if cutoff >= 0.45 / period:
+        return signal
+    sections = butter(ORDER, 2 * cutoff * period, output="sos")
+    padding = min(len(signal) - 1, int(3 / (cutoff * period)))
+    return np.asarray(sosfiltfilt(sections, signal, axis=0, padlen=padding))
+
+
+def recorded_motions(traces: Sequence[Trace], machine: Machine, cutoff: float) -> tuple[RecordedMotion, ...]:
+    """The motions of several traces. Raises TraceError and SpecError as `recorded_motion` does."""
+    return tuple(recorded_motion(trace, machine, cutoff) for trace in traces)
+
+
+def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMotion:
+    """The motion of a trace, whose torques are to be compared below `cutoff` (Hz).
+
+    Raises:
+        TraceError: for a trace without drive, of another machine, without motion, or too short.
+        SpecError: for a cutoff that the sampling cannot carry.
+    """
+    readings = readings_of(trace, machine)
+    _check_length(readings, cutoff)
+    thin = max(1, int(1 / (GRID * cutoff * readings.period)))
+    wide = min(WIDER * cutoff, 0.4 / readings.period)
+    position, speed = _smooth_motion(readings, wide)
+    acceleration = np.gradient(speed, readings.period, axis=0)
+    drive = low_pass(readings.drive, wide, readings.period)
+    time, position, speed, acceleration, drive = (
+        np.ascontiguousarray(s[::thin]) for s in (readings.time, position, speed, acceleration, drive)
+    )
+    period = readings.period * thin
+    every = max(1, int(1 / (KEPT * cutoff * period)))
+    edge = max(1, int(EDGE / cutoff / period))
+    noise = readings.speed_noise(wide)
+    turning = np.maximum(TURNING_NOISE * noise, 0.5 * period * np.median(np.abs(acceleration), axis=0)) + 1e-12
+    moving = _moving(speed, noise, period)[edge : len(time) - edge : every]
+    if not moving.any():
+        raise TraceError(f"trace {readings.name}: no joint moves beyond the noise of its readings")
+    return RecordedMotion(
+        name=readings.name,
+        time=time,
+        position=position,
+        speed=speed,
+        acceleration=acceleration,
+        drive=drive,
+        contact=np.clip(speed / turning, -1.0, 1.0),
+        turning=turning,
+        period=period,
+        sampled=readings.period,
+        cutoff=cutoff,
+        edge=edge,
+        every=every,
+        moving=moving,
+    )
+
+
+def holds_drive_between_samples(machine: Machine) -> bool:
+    """Whether a recorded drive is that of a controller, which holds it for a period after its sample."""
+    return not isinstance(machine.controller, NoController)
+
+
+def _check_length(readings: Readings, cutoff: float) -> None:
+    """Raises SpecError for a cutoff that the sampling cannot carry, TraceError for a record too short for it."""
+    highest = 0.4 / readings.period
+    if not 0 < cutoff <= highest:
+        raise SpecError(
+            f"cutoff {cutoff:g} Hz: trace {readings.name} is sampled every {readings.period:.4g} s, which carries up "
+            f"to {highest:.3g} Hz"
+        )
+    duration, least = float(readings.time[-1] - readings.time[0]), max(SHORTEST, 4 * EDGE / cutoff)
+    if duration < least:
+        raise TraceError(
+            f"trace {readings.name}: lasts {duration:.3g} s; a comparison of torques below {cutoff:g} Hz needs "
+            f"{least:.3g} s"
+        )
+
+
+def _smooth_motion(readings: Readings, wide: float) -> tuple[Floats, Floats]:
+    """Smoothed position and speed, from whatever is measured."""
+    position = low_pass(readings.position, wide, readings.period)
+    if readings.speed is None:
+        return position, np.gradient(position, readings.period, axis=0)
+    return position, low_pass(readings.speed, wide, readings.period)
+
+
+def _moving(speed: Floats, noise: Floats, period: float) -> Mask:
+    """Where joints move (k, n); a short passage through zero speed is motion."""
+    least = np.maximum(REST_NOISE * noise, REST_SHARE * np.quantile(np.abs(speed), 0.95, axis=0))
+    moving = np.abs(speed) > least
+    longest = max(1, round(LEAST_REST / period))
+    for column in moving.T:
+        edges = np.flatnonzero(np.diff(np.concatenate(([True], column, [True])).astype(int)))
+        for begin, end in zip(edges[::2], edges[1::2], strict=True):
+            if end - begin < longest:
+                column[begin:end] = True
+    return moving

@@ -1,0 +1,250 @@
+"""Torque that a recorded motion needs of the motors less torque that they were driven with, for any parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from model import layout as at
+from model.fitting.unknowns import Unknown
+from model.inverse_dynamics import supplied_torque as kernel
+from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
+from model.kinematics.chain import ChainArrays
+from model.machine_model.model import Model
+from model.machine_model.nominal import is_rod_arm
+from model.simulation.bodies import chain_body
+from model.simulation.own_table import own_table
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+NOT_IN_TORQUES = {
+    "wrong_gain": "acts before the drive that is recorded",
+    "lost_set_points": "acts before the drive that is recorded",
+    "stiction": "shows in the moment of breaking away, which low-passed torques do not resolve",
+}
+"""Effects that leave no mark in low-passed torques of the recorded drive, and why. All others take part."""
+DIFFERENCE = 1e-3
+"""Step of the finite differences, as a share of a parameter's natural size: torques are smooth or piecewise linear."""
+CONTACT_SHARE = 0.02
+"""Torque through a transmission over which play changes sides, as a share of the torque's root mean square."""
+BODY_COLUMNS = (*range(at.A, at.SHIFT + 1), at.ROTOR_INERTIA, at.GEAR, at.PRISMATIC, at.SHAPE)
+SENSOR_COLUMNS = (at.POTENTIOMETER_GAIN, at.POTENTIOMETER_OFFSET, *at.BENDS)
+FRICTION_COLUMNS = (at.COULOMB, at.COULOMB_ARM)
+
+
+@dataclass(frozen=True)
+class LinkMotion:
+    """The links' own motion (k, n), sensor errors taken out. contact: its direction as friction has it, in [−1, 1]."""
+
+    position: Floats
+    speed: Floats
+    acceleration: Floats
+    contact: Floats
+
+
+@dataclass
+class TorqueBalance:
+    """Residual torques of records for one structure of model, compared samples only: one array (m, n) a record.
+
+    What does not depend on the parameters that changed since the last call is not computed again.
+    """
+
+    model: Model
+    records: tuple[RecordedMotion, ...]
+    _kept: dict[str, tuple[bytes, list[Any]]] = field(default_factory=dict, repr=False)
+
+    def residual(self, values: Mapping[str, float]) -> list[Floats]:
+        """Torque needed of the motors less torque that they were driven with, N·m (N), low-passed, compared samples.
+
+        It is the drive that is predicted from the motion, and not the motion from the drive: an effect that makes the
+        drive act less would otherwise make the residual smaller by itself.
+        """
+        vector = self._vector(values)
+        joints = _joints_of(vector, self.model)
+        chain = chain_body(np.ascontiguousarray(vector[: at.SHARED]), joints, self.model.flags)
+        bodies = vector[: at.SHARED].tobytes() + joints[:, list(BODY_COLUMNS)].tobytes()
+        sensors = joints[:, list(SENSOR_COLUMNS)].tobytes()
+        friction = joints[:, list(FRICTION_COLUMNS)].tobytes()
+        motions = self._cached("motion", sensors, lambda i: link_motion(self.records[i], joints, self.model))
+        needed = self._cached("needed", sensors + bodies, lambda i: _needed(chain, motions[i]))
+        levels = self._cached(
+            "levels", sensors + bodies + friction, lambda i: _levels(self.model, chain, motions[i].position, joints)
+        )
+        gravity = levels
+        if self._own.shape[1] > 0:
+            gravity = self._cached("gravity", sensors + bodies, lambda i: _gravity(chain, motions[i]))
+        result = []
+        for i, record in enumerate(self.records):
+            motion = motions[i]
+            driven = kernel.DrivenMotion(
+                record.time,
+                motion.position,
+                motion.speed,
+                motion.contact,
+                motion.speed,
+                self._volts(record, vector, joints),
+                levels[i],
+                gravity[i],
+            )
+            torque = self._missing(driven, motion.acceleration, needed[i], joints)
+            torque = _held_by_friction(torque, levels[i], motion.contact, record.turns)
+            result.append(record.compared(torque))
+        return result
+
+    def slope(self, values: Mapping[str, float], residual: Sequence[Floats], unknown: Unknown) -> list[Floats]:
+        """Derivative (m, n) of every record's residual by one unknown: a difference towards the inside of its bounds.
+
+        residual: what `residual` gives for the same values.
+        """
+        step = DIFFERENCE * unknown.scale
+        if values[unknown.name] + step > unknown.high:
+            step = -step
+        moved = self.residual({**values, unknown.name: values[unknown.name] + step})
+        return [(after - before) / step for after, before in zip(moved, residual, strict=True)]
+
+    def supplied_by_drive(self) -> list[Floats]:
+        """Torque of the drive alone (m, n), as recorded, of motors at standstill: what residuals are shares of."""
+        joints = _joints_of(self.model.vector, self.model)
+        gain = joints[:, at.GEAR] * joints[:, at.TORQUE_CONSTANT] / joints[:, at.RESISTANCE]
+        return [record.compared(record.drive * gain) for record in self.records]
+
+    @cached_property
+    def _own(self) -> NDArray[np.int64]:
+        return own_table(self.model, np.float64)
+
+    def _vector(self, values: Mapping[str, float]) -> Floats:
+        """The model's flat vector with other values of some parameters."""
+        vector = self.model.vector.copy()
+        for name, value in values.items():
+            vector[list(self.model.parameter(name).slots)] = value
+        return vector
+
+    def _cached(self, what: str, key: bytes, compute: Callable[[int], Any]) -> list[Any]:
+        """One result a record, computed again only where `key` has changed since the last call."""
+        kept = self._kept.get(what)
+        if kept is None or kept[0] != key:
+            kept = key, [compute(i) for i in range(len(self.records))]
+            self._kept[what] = kept
+        return kept[1]
+
+    def _volts(self, record: RecordedMotion, vector: Floats, joints: Floats) -> Floats:
+        """Volts at the motors at the grid's times, after delay and limit."""
+        late = vector[at.DELAY] + joints[:, at.EXTRA_DELAY]
+        if holds_drive_between_samples(self.model.machine):
+            late = late + 0.5 * vector[at.PERIOD]
+        drive = record.drive
+        if late.any():
+            columns = [np.interp(record.time - late[j], record.time, drive[:, j]) for j in range(len(late))]
+            drive = np.stack(columns, axis=1)
+        out, without_zone = np.empty_like(drive), joints.copy()
+        without_zone[:, at.DEAD_ZONE] = 0.0  # `_lost_in_dead_zone` has it
+        kernel.amplify(np.ascontiguousarray(drive), without_zone, out)
+        return out
+
+    def _missing(self, driven: kernel.DrivenMotion, acceleration: Floats, needed: Floats, joints: Floats) -> Floats:
+        """Torque needed of the motors less torque that they were driven with (k, n)."""
+        flags, speed, time = self.model.flags, driven.speed, driven.time
+        numbers = kernel.JointNumbers(joints, flags, self._own)
+        motor, other = np.empty_like(needed), np.empty_like(needed)
+        kernel.supplied_torque(driven, numbers, motor, other)
+        asked = needed - other
+        if flexible := [j for j in range(len(flags)) if flags[j] & at.HAS_FLEXIBILITY]:
+            rotor_speed, needed = speed.copy(), needed.copy()
+            for j in flexible:
+                extra = _twist_rate(asked[:, j], joints[j], time)
+                rotor_speed[:, j] += extra
+                inertia = joints[j, at.ROTOR_INERTIA] * joints[j, at.GEAR] ** 2
+                needed[:, j] += inertia * (acceleration[:, j] + np.gradient(extra, time))
+            kernel.supplied_torque(driven._replace(rotor_speed=rotor_speed), numbers, motor, other)
+            asked = needed - other
+        loss = joints[:, at.GEAR_LOSS]
+        if loss.any():
+            asked = asked / (1 - loss * driven.contact * np.sign(asked))
+        return asked - motor + _lost_in_dead_zone(asked, speed, joints)
+
+
+def link_motion(record: RecordedMotion, joints: Floats, model: Model) -> LinkMotion:
+    """The motion for which sensors with these errors would have given the readings."""
+    wrong = joints[:, list(SENSOR_COLUMNS)]
+    if not wrong.any():
+        return LinkMotion(record.position, record.speed, record.acceleration, record.contact)
+    position, slope = record.position.copy(), np.ones_like(record.position)
+    for j in range(model.joint_count):
+        gain, offset, *bends = wrong[j]
+        range_, zero = joints[j, at.RANGE], joints[j, at.AT_ZERO]
+        q = record.position[:, j]
+        error, rate = gain * (q - zero - 0.5 * range_) + offset, np.full_like(q, gain)
+        for k, bend in enumerate(bends, start=1):
+            wave = k * np.pi / range_
+            error += bend * np.sin(wave * (q - zero))
+            rate += bend * wave * np.cos(wave * (q - zero))
+        position[:, j] -= error
+        slope[:, j] -= rate
+    speed = record.speed * slope
+    return LinkMotion(position, speed, np.gradient(speed, record.period, axis=0), record.contact)
+
+
+def levels_along(model: Model, record: RecordedMotion) -> Floats:
+    """Levels of Coulomb friction (k, n), N·m, along a record."""
+    joints = _joints_of(model.vector, model)
+    chain = chain_body(np.ascontiguousarray(model.vector[: at.SHARED]), joints, model.flags)
+    return _levels(model, chain, record.position, joints)
+
+
+def _joints_of(vector: Floats, model: Model) -> Floats:
+    """The joints' part (n, PER_JOINT) of a model's vector."""
+    return np.ascontiguousarray(vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT))
+
+
+def _levels(model: Model, chain: ChainArrays, position: Floats, joints: Floats) -> Floats:
+    out, settings = np.zeros_like(position), np.zeros(at.SETTINGS, dtype=np.int64)
+    settings[at.PUBLISHED_LOADS] = int(is_rod_arm(model.machine))
+    if joints[:, list(FRICTION_COLUMNS)].any():
+        kernel.friction_levels(chain, position, joints, settings, out)
+    return out
+
+
+def _needed(chain: ChainArrays, motion: LinkMotion) -> Floats:
+    out = np.empty_like(motion.position)
+    kernel.needed_torque(chain, motion.position, motion.speed, motion.acceleration, out)
+    return out
+
+
+def _gravity(chain: ChainArrays, motion: LinkMotion) -> Floats:
+    out = np.empty_like(motion.position)
+    kernel.gravity_along(chain, motion.position, out)
+    return out
+
+
+def _held_by_friction(left: Floats, level: Floats, contact: Floats, turns: Mask) -> Floats:
+    """Residual torque (k, n) with Coulomb friction set-valued where a joint turns or stops for a moment: there it takes
+    any torque up to its level (k, n) that holds the joint, in place of a share that follows the speed."""
+    without = left - contact * level
+    return np.where(turns, without + np.clip(-without, -level, level), left)
+
+
+def _lost_in_dead_zone(asked: Floats, speed: Floats, joints: Floats) -> Floats:
+    """Torque (k, n) that the amplifier's dead zone takes away, of the sign of the volts that the motor needs."""
+    width = joints[:, at.DEAD_ZONE]
+    if not width.any():
+        return np.zeros_like(asked)
+    gain = joints[:, at.GEAR] * joints[:, at.TORQUE_CONSTANT] / joints[:, at.RESISTANCE]
+    back_emf = joints[:, at.GEAR] * joints[:, at.BACK_EMF] * (1 + joints[:, at.BACK_EMF_ERROR])
+    volts = asked / gain + back_emf * speed
+    soft = CONTACT_SHARE * np.sqrt(np.mean(volts**2, axis=0)) + 1e-12
+    return np.asarray(gain * width * np.tanh(volts / soft))
+
+
+def _twist_rate(through: Floats, joint: Floats, time: Floats) -> Floats:
+    """Rate (k,) at which rotor and link move apart for a torque through a transmission with compliance and play."""
+    twist = (joint[at.COMPLIANCE] + joint[at.CONTACT_COMPLIANCE]) * through
+    if joint[at.GAP] > 0:
+        soft = CONTACT_SHARE * float(np.sqrt(np.mean(through**2))) + 1e-12
+        twist = twist + 0.5 * joint[at.GAP] * np.tanh(through / soft)
+    return np.gradient(twist, time)

@@ -1,0 +1,68 @@
+"""The torque balance: on simulated records whose torques are known, and its derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from daq.contracts.errors import SpecError, TraceError
+from daq.contracts.machine import load_machine
+from model.fitting.choice import chosen_unknowns
+from model.fitting.options import FitOptions
+from model.inverse_dynamics.recorded_motion import low_pass, recorded_motion
+from model.inverse_dynamics.torque_balance import TorqueBalance
+from model.machine_model.model import base_model
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
+from tests.model.inverse_dynamics.test_fit_torques import rod, swinging
+from tests.model.simulation.records import trace_of
+
+
+def test_required_torque_along_a_simulated_trace_is_what_the_motor_supplied() -> None:
+    """Each joint on a sine of its own: inertia, speed, gravity and back-EMF all take part."""
+    model = base_model(load_machine("ma2000"), friction=False).with_values({"controller.delay": 0.0})
+    time = 0.002 * np.arange(1500)
+
+    def drive(t: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.stack([3 * np.sin(5 * t), 4 * np.sin(4 * t + 0.5) + 2, 3 * np.sin(7 * t)], axis=1)
+
+    at_start = np.tile([np.pi, 0.8, -0.5], (len(time), 1))
+    run = simulate(model, trace_of(at_start, 0.002, drive=drive(time)), Options(quantise=False, loop="drive"))
+    # The board holds a drive for 20 ms, so 10 ms late on average, and this simulation for 2 ms.
+    recorded = drive(time + 0.009)
+    measured = trace_of(at_start, 0.002, position=run.position, velocity=run.velocity, drive=recorded)
+    balance = TorqueBalance(model, (recorded_motion(measured, model.machine, 12.0),))
+    left, supplied = balance.residual({})[0], balance.supplied_by_drive()[0]
+    assert (np.abs(left).max(axis=0) < (0.06, 0.03, 0.03) * np.abs(supplied).max(axis=0)).all()
+
+
+def test_derivatives_are_those_of_the_residual() -> None:
+    """Without Coulomb friction the residual is linear in mass and viscous friction."""
+    model = rod().without_effect("coulomb_friction")
+    balance = TorqueBalance(model, (recorded_motion(swinging(1), model.machine, 12.0),))
+    unknowns = chosen_unknowns(model, FitOptions(parameters=("link1.mass", "*viscous*"), use_priors=False))
+    values = {u.name: u.start for u in unknowns}
+    here = balance.residual(values)
+    for u in unknowns:
+        far = balance.residual({**values, u.name: 2 * u.start})
+        np.testing.assert_allclose(balance.slope(values, here, u)[0] * u.start, far[0] - here[0], atol=1e-9)
+
+
+def test_the_low_pass_keeps_what_is_slow_takes_what_is_fast_and_delays_nothing() -> None:
+    time = 0.001 * np.arange(4000)
+    slow, fast = np.sin(2 * np.pi * 1.0 * time), np.sin(2 * np.pi * 60.0 * time)
+    inside = slice(300, -300)
+    np.testing.assert_allclose(low_pass(slow + fast, 12.0, 0.001)[inside], slow[inside], atol=1e-3)
+
+
+def test_records_that_cannot_be_compared_are_refused() -> None:
+    model, trace = rod(), swinging(1)
+    parts = {name: getattr(trace, name)[:126] for name in ("time", "position", "velocity", "drive", "set_point")}
+    short = replace(trace, **parts)
+    with pytest.raises(TraceError, match=r"lasts 0\.\d+ s; a comparison of torques below 12 Hz needs 1 s"):
+        recorded_motion(short, model.machine, 12.0)
+    with pytest.raises(SpecError, match=r"cutoff 200 Hz: trace swing1 is sampled every 0\.004 s"):
+        recorded_motion(trace, model.machine, 200.0)
