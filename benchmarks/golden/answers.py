@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from hashlib import sha256
 from typing import Any
 
 TIMES = frozenset({"seconds", "created", "duration_s", "age", "time_s", "software", "elapsed", "utc"})
@@ -12,6 +13,10 @@ PROSE = frozenset(
     {"description", "summary", "title", "reason", "note", "notes", "text", "rejected_because", "why", "words"}
 )
 RANDOM = re.compile(r"\b([0-9a-f]{6,64}|\d{4}-\d\d-\d\dT[0-9:.\-]+Z?)\b|\S+\.mcap|/\S+/")
+
+NUMBERED = re.compile(r"\[\d+\]")
+LONG = 60
+"""Entries of a list up to which every value is kept; a column that differs is looked at in the answer itself."""
 
 Leaf = str | int | float | bool | None
 
@@ -36,8 +41,28 @@ def leaves(answer: Any, path: str = "") -> Iterator[tuple[str, Leaf]]:
 
 
 def of_json(text: str) -> dict[str, Leaf]:
-    """The leaves of an answer in JSON."""
-    return dict(leaves(json.loads(text)))
+    """The leaves of an answer in JSON; of a long list, one digest for each of its columns."""
+    return condense(dict(leaves(json.loads(text))))
+
+
+def condense(found: dict[str, Leaf]) -> dict[str, Leaf]:
+    """The same leaves, where each column of a list of more than `LONG` entries has become its SHA-256."""
+    short: dict[str, Leaf] = {}
+    columns: dict[str, list[tuple[list[int], str]]] = {}
+    long = {path[:-2] for path, value in found.items() if path.endswith("[]") and int(value or 0) > LONG}
+    for path, value in found.items():
+        for match in NUMBERED.finditer(path):
+            if path[: match.start()] in long:
+                place = [int(number[1:-1]) for number in NUMBERED.findall(path)]
+                column = f"{path[: match.start()]}[*]{NUMBERED.sub('[*]', path[match.end() :])}"
+                columns.setdefault(column, []).append((place, repr(value)))
+                break
+        else:
+            short[path] = value
+    return short | {
+        path: sha256("\n".join(value for _, value in sorted(values)).encode()).hexdigest()
+        for path, values in columns.items()
+    }
 
 
 def of_help(text: str) -> dict[str, Leaf]:
