@@ -19,6 +19,7 @@ REGISTERED = (
     "model/arrays.py",
     "model/layout.py",
     "model/effects",
+    "model/inverse_dynamics",
     "model/simulation",
     "model/fitting",
     "model/machine_model",

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from model.dynamics.compilation import inlined
 from model.dynamics.dual import sin_cos
 
-SOURCE_HASH = "c043d838f3e7232d"
+SOURCE_HASH = "c33b6878c87088ab"
 TEXT_HASH = "797dba5308c6034e"
 
 

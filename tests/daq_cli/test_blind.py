@@ -339,4 +339,4 @@ def test_a_registered_trial_runs_only_committed_and_with_the_code_that_was_regis
     file.write_text(text.replace(digest, "0" * 64), "utf-8")
     daq(*words).complains(2, f"{path}: not as registered")
     file.write_text(begun + f'hashes."{path}" = "{digest}"\n', "utf-8")
-    daq(*words).complains(2, "lacks model/discrepancy/thresholds.py, model/discrepancy, model/effects and")
+    daq(*words).complains(2, "lacks model/discrepancy/thresholds.py, model/discrepancy, model/arrays.py and")
