@@ -50,22 +50,44 @@ def an_answer(seconds: float = 20.0) -> tuple[Diagnosis, Comparison]:
     speaks = reason(EFFECT, (2,), {NAME: value}, model=after, before=before, records=records, rival=candidates[1])
     comparison = compare([("before", before), ("after", after)], [fit, held], [held.record.trace_id])
     step = Step(
-        effect=EFFECT, joints=(2,), parameters={NAME: value}, evidence=2410.0, margin=520.0, candidates=candidates,
-        rmse_fit=_errors(comparison, "in_sample"), rmse_holdout=_errors(comparison, "held_out"),
-        excess_removed_holdout=0.982, sum_lambda2_before=0.31, sum_lambda2_after=1.42,
-        where=locate(left), reason=UNWRITTEN, reason_data=speaks, adopted=True,
-    )  # fmt: skip
+        effect=EFFECT,
+        joints=(2,),
+        parameters={NAME: value},
+        evidence=2410.0,
+        margin=520.0,
+        candidates=candidates,
+        rmse_fit=_errors(comparison, "in_sample"),
+        rmse_holdout=_errors(comparison, "held_out"),
+        excess_removed_holdout=0.982,
+        sum_lambda2_before=0.31,
+        sum_lambda2_after=1.42,
+        where=locate(left),
+        reason=UNWRITTEN,
+        reason_data=speaks,
+        adopted=True,
+    )
     asked = NextExperiment(
-        name="slow reversals on joint 2", spec=ExperimentSpec(trajectory=SlowRamp(), joints=(2,)), duration=12.0,
-        separates=("stiction", "stribeck_friction"), predicted_separation=6.4,
+        name="slow reversals on joint 2",
+        spec=ExperimentSpec(trajectory=SlowRamp(), joints=(2,)),
+        duration=12.0,
+        separates=("stiction", "stribeck_friction"),
+        predicted_separation=6.4,
         reason="At 2 °/s stiction jerks and Stribeck friction does not.",
-    )  # fmt: skip
+    )
     answer = Diagnosis(
-        verdict="named", summary=UNWRITTEN, steps=(step,),
-        remaining=remaining_shapes(left), next_experiment=asked, model_before=before,
-        model_after=after, traces=(fit.record.trace_id,), holdout=(held.record.trace_id,), seconds=4.2,
-        robot_seconds=2 * seconds, notes=("The recorded drive was used.",),
-    )  # fmt: skip
+        verdict="named",
+        summary=UNWRITTEN,
+        steps=(step,),
+        remaining=remaining_shapes(left),
+        next_experiment=asked,
+        model_before=before,
+        model_after=after,
+        traces=(fit.record.trace_id,),
+        holdout=(held.record.trace_id,),
+        seconds=4.2,
+        robot_seconds=2 * seconds,
+        notes=("The recorded drive was used.",),
+    )
     return with_sentences(answer), comparison
 
 

@@ -29,10 +29,25 @@ def every_phase(seconds: float = 20.0) -> Floats:
     """Set points (k, 3): rest, ramps there and back, slow reversals, fast reversals, the joints shifted in time."""
     slow, fast = 0.1, 0.36
     own = legs(
-        (0.6, 0.0), (0.65, 0.377), (0.8, 0.0), (0.65, -0.377), (0.8, 0.0),
-        (2.0, slow), (2.0, -slow), (2.0, slow), (2.0, -slow), (0.6, 0.0),
-        (0.5, fast), (0.5, -fast), (0.5, fast), (0.5, -fast), (0.8, 0.0), (0.6, -0.3), (0.6, 0.0), (0.6, 0.3),
-    )  # fmt: skip
+        (0.6, 0.0),
+        (0.65, 0.377),
+        (0.8, 0.0),
+        (0.65, -0.377),
+        (0.8, 0.0),
+        (2.0, slow),
+        (2.0, -slow),
+        (2.0, slow),
+        (2.0, -slow),
+        (0.6, 0.0),
+        (0.5, fast),
+        (0.5, -fast),
+        (0.5, fast),
+        (0.5, -fast),
+        (0.8, 0.0),
+        (0.6, -0.3),
+        (0.6, 0.0),
+        (0.6, 0.3),
+    )
     count = round(seconds / PERIOD)
     columns = [np.concatenate([np.zeros(shift), own])[:count] for shift in (0, 25, 50)]
     padded = [np.concatenate([c, np.full(count - len(c), c[-1])]) for c in columns]

@@ -21,9 +21,17 @@ def step(effect: str, joints: tuple[int, ...]) -> Step:
     """A step that was taken into the model."""
     nowhere = Where(joint=None, phase=None, summary="", cells=(), dependences=())
     return Step(
-        effect=effect, joints=joints, parameters={}, evidence=50.0, margin=50.0, candidates=(), rmse_fit=(),
-        where=nowhere, reason="", adopted=True,
-    )  # fmt: skip
+        effect=effect,
+        joints=joints,
+        parameters={},
+        evidence=50.0,
+        margin=50.0,
+        candidates=(),
+        rmse_fit=(),
+        where=nowhere,
+        reason="",
+        adopted=True,
+    )
 
 
 def test_errors_at_the_noise_floor_are_explained() -> None:

@@ -38,13 +38,22 @@ def swinging(seed: int, *, torque: bool = True) -> Trace:
     needed += VISCOUS * speed + COULOMB * np.sign(speed)
     drive = np.interp(time + 0.003, time, needed) / 0.5  # it acts after 1 ms and is held for 4 ms
     record = TraceRecord(
-        trace_id=f"swing{seed}", created=datetime(2024, 1, 1, tzinfo=UTC), software="test", source="imported",
-        period=0.004, drive_unit="N·m",
-    )  # fmt: skip
+        trace_id=f"swing{seed}",
+        created=datetime(2024, 1, 1, tzinfo=UTC),
+        software="test",
+        source="imported",
+        period=0.004,
+        drive_unit="N·m",
+    )
     return Trace(
-        record, (1,), time, angle[:, None], set_point=angle[:, None], velocity=speed[:, None],
+        record,
+        (1,),
+        time,
+        angle[:, None],
+        set_point=angle[:, None],
+        velocity=speed[:, None],
         drive=drive[:, None] if torque else None,
-    )  # fmt: skip
+    )
 
 
 def rod() -> Model:
@@ -91,9 +100,12 @@ def test_a_drive_that_is_0_throughout_is_refused_before_the_search(held: bool) -
     said: list[str] = []
     with pytest.raises(TraceError, match="trace swing5: its drive is 0 throughout"):
         fit_torques(
-            rod(), [good] if held else [good, still], [still] if held else [], OPTIONS,
+            rod(),
+            [good] if held else [good, still],
+            [still] if held else [],
+            OPTIONS,
             progress=lambda _, text: said.append(text),
-        )  # fmt: skip
+        )
     assert said == ["low-passing the records"]
 
 
@@ -127,8 +139,9 @@ def test_every_other_effect_changes_the_torque_that_is_needed(name: str) -> None
         for p in wider.parameters
         if p.effect == name and p.null is not None and p.deviation is not None
     }
-    changed = wider.with_values({n: float(np.clip(v, wider.parameter(n).low, wider.parameter(n).high))
-                                 for n, v in size.items()})  # fmt: skip
+    changed = wider.with_values(
+        {n: float(np.clip(v, wider.parameter(n).low, wider.parameter(n).high)) for n, v in size.items()}
+    )
     before, after = (torque_curves(m, swinging(1)).left for m in (wider, changed))
     assert np.abs(after - before).max() > 1e-6
 

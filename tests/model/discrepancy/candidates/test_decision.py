@@ -54,9 +54,10 @@ def test_an_effect_on_another_joint_raises_the_threshold_less() -> None:
 
 def test_a_candidate_below_its_threshold_is_skipped_for_one_on_another_joint() -> None:
     said = decide(
-        ranking(("dead_zone", 2, 100.0), ("backlash", 1, 60.0), ("stiction", 1, 20.0)), LINES,
+        ranking(("dead_zone", 2, 100.0), ("backlash", 1, 60.0), ("stiction", 1, 20.0)),
+        LINES,
         [Added("coulomb_friction", (2,), 2000.0)],
-    )  # fmt: skip
+    )
     assert said.best is not None
     assert (said.kind, said.best.hypothesis.name, said.margin) == ("named", "backlash", pytest.approx(40.0))
 

@@ -45,34 +45,60 @@ def waves(seed: int, rates: tuple[float, ...], size: float) -> Wanted:
 
     def wanted(t: float) -> tuple[float, float, float]:
         s, c = np.sin(angular * t + phases), np.cos(angular * t + phases)
-        return (
-            float(amplitudes @ s), float((amplitudes * angular) @ c), float(-(amplitudes * angular**2) @ s)
-        )  # fmt: skip
+        return (float(amplitudes @ s), float((amplitudes * angular) @ c), float(-(amplitudes * angular**2) @ s))
 
     return wanted
 
 
 # ---- a sliding servo axis whose controller nobody knows; the force of its drive is recorded
 
-SLIDE = {"mass": 12.0, "viscous": 0.0, "coulomb": 0.0, "stribeck": 0.0, "stribeck_speed": 0.05, "spring": 0.0,
-         "ripple": 0.0, "cycles": 300.0, "hum": 0.0, "hertz": 1.7, "loss": 0.0}  # fmt: skip
+SLIDE = {
+    "mass": 12.0,
+    "viscous": 0.0,
+    "coulomb": 0.0,
+    "stribeck": 0.0,
+    "stribeck_speed": 0.05,
+    "spring": 0.0,
+    "ripple": 0.0,
+    "cycles": 300.0,
+    "hum": 0.0,
+    "hertz": 1.7,
+    "loss": 0.0,
+}
 ENCODER = 5e-6
 
 
 def slide_machine() -> Machine:
     """One prismatic joint along the horizontal, 0.6 m of travel."""
-    return Machine.model_validate({
-        "version": 1, "name": "slide", "title": "Sliding axis", "gravity": [0.0, -9.81, 0.0], "modelled_joints": [1],
-        "controller": {"kind": "none"},
-        "joints": [{
-            "name": "slide", "kind": "prismatic",
-            "geometry": {"a": quantity(0.0, "m"), "alpha": quantity(0.0, "rad"), "d": quantity(0.0, "m"),
-                         "theta": quantity(0.0, "rad")},
-            "link": {"shape": "body", "mass": quantity(12.0, "kg", low=0.1, deviation=0.6),
-                     "centre": [quantity(0.0, "m")] * 3, "inertia": [quantity(0.0, "kg·m²")] * 6},
-            "drive": {"kind": "gain", "gain": quantity(1.0, "N/N")},
-        }],
-    })  # fmt: skip
+    return Machine.model_validate(
+        {
+            "version": 1,
+            "name": "slide",
+            "title": "Sliding axis",
+            "gravity": [0.0, -9.81, 0.0],
+            "modelled_joints": [1],
+            "controller": {"kind": "none"},
+            "joints": [
+                {
+                    "name": "slide",
+                    "kind": "prismatic",
+                    "geometry": {
+                        "a": quantity(0.0, "m"),
+                        "alpha": quantity(0.0, "rad"),
+                        "d": quantity(0.0, "m"),
+                        "theta": quantity(0.0, "rad"),
+                    },
+                    "link": {
+                        "shape": "body",
+                        "mass": quantity(12.0, "kg", low=0.1, deviation=0.6),
+                        "centre": [quantity(0.0, "m")] * 3,
+                        "inertia": [quantity(0.0, "kg·m²")] * 6,
+                    },
+                    "drive": {"kind": "gain", "gain": quantity(1.0, "N/N")},
+                }
+            ],
+        }
+    )
 
 
 def slide_trace(seed: int, hidden: Mapping[str, float], duration: float = 16.0) -> Trace:
@@ -107,32 +133,67 @@ def slide_trace(seed: int, hidden: Mapping[str, float], duration: float = 16.0) 
 
 # ---- a DC motor on a bench: volts in, speed out
 
-BENCH = {"resistance": 2.0, "constant": 0.05, "back_emf": 0.05, "inertia": 2e-4, "viscous": 1e-5, "coulomb": 0.0,
-         "dead_zone": 0.0, "delay": 0.0, "limit": 1e9}  # fmt: skip
+BENCH = {
+    "resistance": 2.0,
+    "constant": 0.05,
+    "back_emf": 0.05,
+    "inertia": 2e-4,
+    "viscous": 1e-5,
+    "coulomb": 0.0,
+    "dead_zone": 0.0,
+    "delay": 0.0,
+    "limit": 1e9,
+}
 
 
 def bench_machine() -> Machine:
     """A motor with a flywheel; the sensor measures speed."""
-    return Machine.model_validate({
-        "version": 1, "name": "bench", "title": "Motor bench", "gravity": [0.0, 0.0, -9.81], "modelled_joints": [1],
-        "controller": {"kind": "none"},
-        "joints": [{
-            "name": "shaft", "kind": "revolute",
-            "geometry": {"a": quantity(0.0, "m"), "alpha": quantity(0.0, "rad"), "d": quantity(0.0, "m"),
-                         "theta": quantity(0.0, "rad")},
-            "link": {"shape": "body", "mass": quantity(0.1, "kg"), "centre": [quantity(0.0, "m")] * 3,
-                     "inertia": [quantity(0.0, "kg·m²")] * 6},
-            "drive": {"kind": "dc_motor", "resistance": quantity(2.0, "Ω"), "inductance": quantity(1e-3, "H"),
-                      "torque_constant": quantity(0.05, "N·m/A"),
-                      "back_emf_constant": quantity(0.05, "V·s/rad", deviation=0.001),
-                      "rotor_inertia": quantity(2e-4, "kg·m²", low=0.0, deviation=1e-5),
-                      "gear_ratio": quantity(1.0, "1"), "amplifier_gain": quantity(1.0, "1"),
-                      "dac_full_scale": quantity(12.0, "V")},
-            "friction": {"viscous_motor_side": quantity(1e-5, "N·m·s/rad", low=0.0, deviation=1e-5)},
-            "sensor": {"bits": 16, "range": quantity(800.0, "rad"), "at_zero": quantity(-400.0, "rad"),
-                       "measures": "velocity"},
-        }],
-    })  # fmt: skip
+    return Machine.model_validate(
+        {
+            "version": 1,
+            "name": "bench",
+            "title": "Motor bench",
+            "gravity": [0.0, 0.0, -9.81],
+            "modelled_joints": [1],
+            "controller": {"kind": "none"},
+            "joints": [
+                {
+                    "name": "shaft",
+                    "kind": "revolute",
+                    "geometry": {
+                        "a": quantity(0.0, "m"),
+                        "alpha": quantity(0.0, "rad"),
+                        "d": quantity(0.0, "m"),
+                        "theta": quantity(0.0, "rad"),
+                    },
+                    "link": {
+                        "shape": "body",
+                        "mass": quantity(0.1, "kg"),
+                        "centre": [quantity(0.0, "m")] * 3,
+                        "inertia": [quantity(0.0, "kg·m²")] * 6,
+                    },
+                    "drive": {
+                        "kind": "dc_motor",
+                        "resistance": quantity(2.0, "Ω"),
+                        "inductance": quantity(1e-3, "H"),
+                        "torque_constant": quantity(0.05, "N·m/A"),
+                        "back_emf_constant": quantity(0.05, "V·s/rad", deviation=0.001),
+                        "rotor_inertia": quantity(2e-4, "kg·m²", low=0.0, deviation=1e-5),
+                        "gear_ratio": quantity(1.0, "1"),
+                        "amplifier_gain": quantity(1.0, "1"),
+                        "dac_full_scale": quantity(12.0, "V"),
+                    },
+                    "friction": {"viscous_motor_side": quantity(1e-5, "N·m·s/rad", low=0.0, deviation=1e-5)},
+                    "sensor": {
+                        "bits": 16,
+                        "range": quantity(800.0, "rad"),
+                        "at_zero": quantity(-400.0, "rad"),
+                        "measures": "velocity",
+                    },
+                }
+            ],
+        }
+    )
 
 
 def bench_trace(seed: int, hidden: Mapping[str, float], duration: float = 20.0) -> Trace:
@@ -164,22 +225,41 @@ GEARED = {"link": 0.05, "rotor": 0.04, "weight": 1.2, "stiffness": 0.0, "damping
 def geared_machine() -> Machine:
     """A revolute joint with a rotor behind a gear, and a link that hangs at zero."""
     mass, centre = 0.6116, 0.2
-    return Machine.model_validate({
-        "version": 1, "name": "geared", "title": "Geared arm", "gravity": [9.81, 0.0, 0.0], "modelled_joints": [1],
-        "controller": {"kind": "none"},
-        "joints": [{
-            "name": "arm", "kind": "revolute",
-            "geometry": {"a": quantity(centre, "m"), "alpha": quantity(0.0, "rad"), "d": quantity(0.0, "m"),
-                         "theta": quantity(0.0, "rad")},
-            "link": {"shape": "body", "mass": quantity(mass, "kg", low=0.01, deviation=0.03),
-                     "centre": [quantity(0.0, "m")] * 3,
-                     "inertia": [quantity(0.0, "kg·m²")] * 2
-                     + [quantity(0.05 - mass * centre**2, "kg·m²", low=0.0, deviation=0.002)]
-                     + [quantity(0.0, "kg·m²")] * 3},
-            "drive": {"kind": "gain", "gain": quantity(1.0, "N·m/N·m"),
-                      "inertia": quantity(0.04, "kg·m²", low=0.0, deviation=0.002)},
-        }],
-    })  # fmt: skip
+    return Machine.model_validate(
+        {
+            "version": 1,
+            "name": "geared",
+            "title": "Geared arm",
+            "gravity": [9.81, 0.0, 0.0],
+            "modelled_joints": [1],
+            "controller": {"kind": "none"},
+            "joints": [
+                {
+                    "name": "arm",
+                    "kind": "revolute",
+                    "geometry": {
+                        "a": quantity(centre, "m"),
+                        "alpha": quantity(0.0, "rad"),
+                        "d": quantity(0.0, "m"),
+                        "theta": quantity(0.0, "rad"),
+                    },
+                    "link": {
+                        "shape": "body",
+                        "mass": quantity(mass, "kg", low=0.01, deviation=0.03),
+                        "centre": [quantity(0.0, "m")] * 3,
+                        "inertia": [quantity(0.0, "kg·m²")] * 2
+                        + [quantity(0.05 - mass * centre**2, "kg·m²", low=0.0, deviation=0.002)]
+                        + [quantity(0.0, "kg·m²")] * 3,
+                    },
+                    "drive": {
+                        "kind": "gain",
+                        "gain": quantity(1.0, "N·m/N·m"),
+                        "inertia": quantity(0.04, "kg·m²", low=0.0, deviation=0.002),
+                    },
+                }
+            ],
+        }
+    )
 
 
 def geared_trace(seed: int, hidden: Mapping[str, float], duration: float = 16.0) -> Trace:
@@ -203,8 +283,9 @@ def geared_trace(seed: int, hidden: Mapping[str, float], duration: float = 16.0)
 
     time = np.arange(0.0, duration, 0.002)
     w, dw, _ = wanted(0.0)
-    found = solve_ivp(motion, (0.0, duration), [w, dw, w, dw], t_eval=time, method="LSODA", rtol=1e-7, atol=1e-9,
-                      max_step=0.005)  # fmt: skip
+    found = solve_ivp(
+        motion, (0.0, duration), [w, dw, w, dw], t_eval=time, method="LSODA", rtol=1e-7, atol=1e-9, max_step=0.005
+    )
     noise = np.random.default_rng(seed + 100)
     drive = np.array([torque(t, m, r) for t, m, r in zip(time, found.y[2], found.y[3], strict=True)])
     read = 2e-5 * np.round(found.y[0] / 2e-5 + noise.normal(0.0, 0.5, len(time)))
@@ -213,8 +294,14 @@ def geared_trace(seed: int, hidden: Mapping[str, float], duration: float = 16.0)
 
 # ---- a six-joint arm: every link a few points of mass
 
-SIX = ((0.0, np.pi / 2, 0.4), (0.45, 0.0, 0.0), (0.1, np.pi / 2, 0.0), (0.0, -np.pi / 2, 0.4), (0.0, np.pi / 2, 0.0),
-       (0.05, 0.0, 0.1))  # fmt: skip
+SIX = (
+    (0.0, np.pi / 2, 0.4),
+    (0.45, 0.0, 0.0),
+    (0.1, np.pi / 2, 0.0),
+    (0.0, -np.pi / 2, 0.4),
+    (0.0, np.pi / 2, 0.0),
+    (0.05, 0.0, 0.1),
+)
 """a, α, d of each link (m, rad, m)."""
 MASSES = (8.0, 6.0, 4.0, 2.5, 1.5, 0.6)
 ROTORS = (0.8, 0.8, 0.4, 0.1, 0.1, 0.05)
@@ -237,22 +324,44 @@ def six_machine(deviation: float = 0.04) -> Machine:
     joints = []
     for k, (a, alpha, d) in enumerate(SIX):
         centre = _centre(k) + POINTS.mean(axis=0)
-        joints.append({
-            "name": f"axis {k + 1}", "kind": "revolute",
-            "geometry": {"a": quantity(a, "m"), "alpha": quantity(alpha, "rad"), "d": quantity(d, "m"),
-                         "theta": quantity(0.0, "rad")},
-            "link": {"shape": "body", "mass": quantity(MASSES[k], "kg", low=0.0, deviation=deviation * MASSES[k]),
-                     "centre": [quantity(float(c), "m") for c in centre],
-                     "inertia": [quantity(float(v), "kg·m²") for v in moments[k]]},
-            "drive": {"kind": "gain", "gain": quantity(1.0, "N·m/N·m"),
-                      "inertia": quantity(ROTORS[k], "kg·m²", low=0.0, deviation=deviation * ROTORS[k])},
-            "friction": {"viscous": quantity(2.0, "N·m·s/rad", low=0.0, deviation=1.0),
-                         "coulomb": quantity(3.0, "N·m", low=0.0, deviation=1.5)},
-        })  # fmt: skip
-    return Machine.model_validate({
-        "version": 1, "name": "six", "title": "Six-joint arm", "gravity": [0.0, 0.0, -9.81],
-        "modelled_joints": [1, 2, 3, 4, 5, 6], "controller": {"kind": "none"}, "joints": joints,
-    })  # fmt: skip
+        joints.append(
+            {
+                "name": f"axis {k + 1}",
+                "kind": "revolute",
+                "geometry": {
+                    "a": quantity(a, "m"),
+                    "alpha": quantity(alpha, "rad"),
+                    "d": quantity(d, "m"),
+                    "theta": quantity(0.0, "rad"),
+                },
+                "link": {
+                    "shape": "body",
+                    "mass": quantity(MASSES[k], "kg", low=0.0, deviation=deviation * MASSES[k]),
+                    "centre": [quantity(float(c), "m") for c in centre],
+                    "inertia": [quantity(float(v), "kg·m²") for v in moments[k]],
+                },
+                "drive": {
+                    "kind": "gain",
+                    "gain": quantity(1.0, "N·m/N·m"),
+                    "inertia": quantity(ROTORS[k], "kg·m²", low=0.0, deviation=deviation * ROTORS[k]),
+                },
+                "friction": {
+                    "viscous": quantity(2.0, "N·m·s/rad", low=0.0, deviation=1.0),
+                    "coulomb": quantity(3.0, "N·m", low=0.0, deviation=1.5),
+                },
+            }
+        )
+    return Machine.model_validate(
+        {
+            "version": 1,
+            "name": "six",
+            "title": "Six-joint arm",
+            "gravity": [0.0, 0.0, -9.81],
+            "modelled_joints": [1, 2, 3, 4, 5, 6],
+            "controller": {"kind": "none"},
+            "joints": joints,
+        }
+    )
 
 
 def _frames(q: Floats) -> list[tuple[Floats, Floats]]:
@@ -264,10 +373,14 @@ def _frames(q: Floats) -> list[tuple[Floats, Floats]]:
         c, s = np.cos(q[:, j]), np.sin(q[:, j])
         ca, sa = np.cos(alpha), np.sin(alpha)
         zero, one = np.zeros(count), np.ones(count)
-        turn = np.stack([
-            np.stack([c, -s * ca, s * sa], -1), np.stack([s, c * ca, -c * sa], -1),
-            np.stack([zero, one * sa, one * ca], -1),
-        ], 1)  # fmt: skip
+        turn = np.stack(
+            [
+                np.stack([c, -s * ca, s * sa], -1),
+                np.stack([s, c * ca, -c * sa], -1),
+                np.stack([zero, one * sa, one * ca], -1),
+            ],
+            1,
+        )
         o = o + np.einsum("kij,kj->ki", R, np.stack([a * c, a * s, one * d], -1))
         R = R @ turn
         found.append((R, o))

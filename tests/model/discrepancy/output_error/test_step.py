@@ -70,9 +70,17 @@ def test_an_effect_that_a_later_one_explains_is_removed(monkeypatch: pytest.Monk
 
     def step(effect: str) -> Step:
         return Step(
-            effect=effect, joints=(1,), parameters={effect: value}, evidence=50.0, margin=50.0, candidates=(),
-            rmse_fit=(), where=nowhere, reason="", adopted=True,
-        )  # fmt: skip
+            effect=effect,
+            joints=(1,),
+            parameters={effect: value},
+            evidence=50.0,
+            margin=50.0,
+            candidates=(),
+            rmse_fit=(),
+            where=nowhere,
+            reason="",
+            adopted=True,
+        )
 
     def parameter(name: str, null: float, low: float = -1.0) -> Any:
         return SimpleNamespace(name=name, null=null, low=low, effect=name, joints=(1,))
@@ -99,9 +107,17 @@ def test_the_parameters_of_a_step_are_those_of_the_last_fit(monkeypatch: pytest.
         for value, low, high in ((0.747, 0.724, 0.77), (0.7475, 0.6732, 0.8217))
     )
     step = Step(
-        effect="dead_zone", joints=(2,), parameters={name: before}, evidence=50.0, margin=50.0, candidates=(),
-        rmse_fit=(), where=Where(joint=2, phase=None, summary="", cells=(), dependences=()), reason="", adopted=True,
-    )  # fmt: skip
+        effect="dead_zone",
+        joints=(2,),
+        parameters={name: before},
+        evidence=50.0,
+        margin=50.0,
+        candidates=(),
+        rmse_fit=(),
+        where=Where(joint=2, phase=None, summary="", cells=(), dependences=()),
+        reason="",
+        adopted=True,
+    )
     refused = step.model_copy(update={"adopted": False})
     known = {name: SimpleNamespace(name=name, null=0.0, low=0.0)}
     current = cast(Any, SimpleNamespace(point=SimpleNamespace(model=SimpleNamespace(by_name=known))))
