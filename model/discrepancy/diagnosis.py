@@ -1,4 +1,4 @@
-"""The answer of a diagnosis: stable, typed, and JSON as it stands. docs/diagnosis.md describes every field."""
+"""The answer of a diagnosis: stable, typed, and JSON as it stands. docs/diagnosis-json.md describes every field."""
 
 from __future__ import annotations
 

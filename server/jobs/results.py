@@ -86,7 +86,7 @@ class GivenWhere(_Part):
 
 
 class DiagnosisData(Diagnosis):
-    """A diagnosis (docs/diagnosis.md), and the models before and after it beside the traces where those can be
+    """A diagnosis (docs/diagnosis-json.md), and the models before and after it beside the traces where those can be
     simulated. `differences` are the parameters that moved, those of added effects among them; `given` is where the
     model disagreed with the traces as it was given, before anything was fitted."""
 

@@ -15,6 +15,7 @@ from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.models.conftest import ROOT, SINGLE_AXIS
 
 AIR_DRAG = ROOT / "examples" / "air_drag.py"
+EFFECT_FILE = ("--effect-file", AIR_DRAG)
 DRAG, COULOMB, VISCOUS, MASS = 0.015, 0.06, 0.035, 0.87
 
 
@@ -54,22 +55,30 @@ def beginning(swing: Path) -> Path:
     return path
 
 
-@pytest.mark.timeout(300)
-def test_an_effect_file_is_used_by_every_command(
-    daq: CommandLine, tmp_path: Path, swing: Path, beginning: Path
-) -> None:
-    model, file = tmp_path / "drag.json", ("--effect-file", AIR_DRAG)
+@pytest.fixture
+def dragged(daq: CommandLine, tmp_path: Path, swing: Path) -> Path:
+    """The model with the user's effect, fitted to the swing."""
+    model = tmp_path / "drag.json"
     effects = ("--effects", "viscous,coulomb,air_drag", "--hold", "controller.delay", "--no-priors")
-    said = daq("fit", swing, "--torques", "--machine", SINGLE_AXIS, "-o", model, "--json", *effects, *file)
+    said = daq("fit", swing, "--torques", "--machine", SINGLE_AXIS, "-o", model, "--json", *effects, *EFFECT_FILE)
     found = {p["name"]: p["value"] for p in json.loads(said.out)["parameters"]}
     assert found["link1.mass"] == pytest.approx(MASS, rel=0.01)
     assert found["joint1.air_drag.coefficient"] == pytest.approx(DRAG, rel=0.1)
+    return model
 
-    simulated = daq("simulate", model, beginning, "--json", *file)
+
+@pytest.mark.timeout(300)
+def test_an_effect_file_is_used_by_fit_and_simulate(daq: CommandLine, dragged: Path, beginning: Path) -> None:
+    simulated = daq("simulate", dragged, beginning, "--json", *EFFECT_FILE)
     assert math.isfinite(json.loads(simulated.out)["agreement"]["in_sample"][0]["rmse"])
-    compared = json.loads(daq("compare", model, SINGLE_AXIS, beginning, "--json", *file).out)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_an_effect_file_is_used_by_compare_and_validate(daq: CommandLine, dragged: Path, beginning: Path) -> None:
+    compared = json.loads(daq("compare", dragged, SINGLE_AXIS, beginning, "--json", *EFFECT_FILE).out)
     assert "joint1.air_drag.coefficient" in {d["name"] for d in compared["differences"]}
-    words = ("validate", model, beginning, "--parameters", "*air_drag*", "--json", *file)
+    words = ("validate", dragged, beginning, "--parameters", "*air_drag*", "--json", *EFFECT_FILE)
     assert [p["name"] for p in json.loads(daq(*words).out)["fidelity"]["parameters"]] == ["joint1.air_drag.coefficient"]
 
 

@@ -80,6 +80,8 @@ def friction(ramp_step: Trace) -> tuple[CandidateFit, ...]:
     return tuple(converge_rivals(ranking(ramp_step, FRICTION).fitted))
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(400)
 def test_a_record_of_what_is_asked_for_separates_as_predicted(
     ramp_step: Trace, friction: tuple[CandidateFit, ...]
 ) -> None:

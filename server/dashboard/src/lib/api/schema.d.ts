@@ -1730,7 +1730,7 @@ export interface components {
         };
         /**
          * DiagnosisData
-         * @description A diagnosis (docs/diagnosis.md), and the models before and after it beside the traces where those can be
+         * @description A diagnosis (docs/diagnosis-json.md), and the models before and after it beside the traces where those can be
          *     simulated. `differences` are the parameters that moved, those of added effects among them; `given` is where the
          *     model disagreed with the traces as it was given, before anything was fitted.
          */
