@@ -80,10 +80,9 @@ def test_an_example_of_a_problem_says_what_to_do() -> None:
         assert example.details.advice
 
 
-def test_the_service_takes_every_example_of_a_body(described: dict[str, Any], service: Service) -> None:
+def test_the_service_takes_every_example_of_a_body(described: dict[str, Any], service_with_gains: Service) -> None:
     """What is named in one need not be there; whatever else speaks against it would make it a bad example."""
-    gains = service.robot.get("/gains").json()
-    sent = 0
+    service, sent = service_with_gains, 0
     effects = {effect["name"] for effect in service.robot.get("/effects").json()}
     for operation, part, content in _bodies(described):
         for name, example in content["examples"].items() if part == "request" else ():
@@ -95,9 +94,24 @@ def test_the_service_takes_every_example_of_a_body(described: dict[str, Any], se
             assert {one["name"] for one in chosen} <= effects, (operation, name)
             sent += 1
     assert sent >= 23
-    lease = {"Control-Lease": service.robot.post("/control", json={}).json()["lease"]}
-    assert service.robot.put("/gains", json=gains, headers=lease).status_code == 200  # as other tests expect them
+
+
+@pytest.fixture
+def service_with_gains(service: Service) -> Iterator[Service]:
+    """The shared service; its arm gets its gains back, because one example sets them to zero."""
+    gains = service.robot.get("/gains").json()
+    yield service
+    service.until_connected()
+    lease = {"Control-Lease": _lease(service)}
+    assert service.robot.put("/gains", json=gains, headers=lease).status_code == 200
     assert service.robot.delete("/control", headers=lease).status_code == 204
+
+
+def _lease(service: Service) -> str:
+    answer = service.robot.post("/control", json={})
+    assert answer.status_code == 200, answer.text
+    lease: str = answer.json()["lease"]
+    return lease
 
 
 def _sent(service: Service, operation: str, body: Any) -> httpx.Response:
@@ -107,7 +121,7 @@ def _sent(service: Service, operation: str, body: Any) -> httpx.Response:
     assert service.robot.post("/queue/pause").status_code == 200  # nothing that is submitted runs
     headers: dict[str, str] = {}
     if not path.endswith("/control"):
-        headers["Control-Lease"] = service.robot.post("/control", json={}).json()["lease"]
+        headers["Control-Lease"] = _lease(service)
     query = {"name": "example"} if path.endswith("/models") else {}
     answer = service.client.request(method, f"{service.url}{path}", json=body, headers=headers, params=query)
     if answer.status_code == 202:
