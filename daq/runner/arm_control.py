@@ -6,6 +6,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.driver import Controller, StopConfirmation
 from daq.safety import Action, Arm, Event, State, advance
@@ -17,7 +18,7 @@ _ORDERLY = (Event.ARM, Event.START, Event.FINISHED, Event.DISARM)
 class StoppedError(DaqError):
     """The arm has been stopped; the operation does not continue."""
 
-    exit_code = 6
+    exit_code = exit_codes.STOPPED
 
 
 class ArmControl:

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SafetyError, TraceError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import Limits
@@ -40,7 +41,7 @@ PATIENCE_IN_LOCK_STEP = 5.0
 class RunFaultError(DaqError):
     """The run ended in a fault before there was anything to record, or its record was lost. The arm is frozen."""
 
-    exit_code = 5
+    exit_code = exit_codes.FAULT
 
 
 @dataclass(frozen=True)

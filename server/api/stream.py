@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from daq.contracts.errors import DaqError
 from daq.contracts.service.live import JogCommand, LiveRequest, RefusedMessage, ThinnedMessage
+from firmware_protocol.invalid import first_invalid
 from server.access.caller import Caller
 from server.access.limits import Bucket
 from server.live.hub import Client
@@ -112,9 +113,9 @@ async def _carry_out(rig: RobotServices, client: Client, caller: Caller, heard: 
         try:
             await _take(LiveRequest.model_validate_json(text), rig, client, caller, said)
         except ValidationError as error:
-            first = error.errors()[0]
-            where = field_of(first["loc"]) if first["loc"] else "message"
-            _refuse(rig, client, f"{where}: {first['msg']}", ADVICE)
+            first = first_invalid(error)
+            where = field_of(first.place) if first.place else "message"
+            _refuse(rig, client, f"{where}: {first.message}", ADVICE)
         except ProblemError as error:
             _refuse(rig, client, error.detail, error.advice)
         except DaqError as error:

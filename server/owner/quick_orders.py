@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, ReachError, SafetyError
 from daq.contracts.limp import limp_line, require_no_jump
 from daq.link import RequestRefusedError
@@ -29,7 +30,7 @@ _WHILE_TEACHING = (ReadProcess, WriteOutput, MoveGripper, ReadGains)
 class NotFrozenError(DaqError):
     """The board has not confirmed that it took the measured posture as its set points."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 def carry_out(robot: OwnedRobot, order: Quick) -> dict[str, object]:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from server.owner.messages import REPORT, Answer, Close, Open, Order, Report
 
@@ -24,7 +25,7 @@ log = logging.getLogger("server.robot")
 class OwnerGoneError(DaqError):
     """The process that owned the port has ended before it answered."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 class OwnerProcess:

@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Callable, Mapping
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.transport import Terminal
 from server.access.caller import Caller
@@ -28,7 +29,7 @@ log = logging.getLogger("server.stop")
 class StopDoorError(DaqError):
     """The stop listener cannot be had: a service that only seems to have one does not start."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 class StopDoor:
