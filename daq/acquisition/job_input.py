@@ -30,7 +30,7 @@ def read_job(descriptor: int) -> Job:
             raise SpecError(f"job: longer than {LONGEST_JOB} bytes")
     line, _, rest = bytes(data).partition(b"\n")
     if rest:
-        raise StoppedError("stopped before it began; nothing moved")
+        raise StoppedError("by the program that started the run", "stopped before it began; nothing moved")
     try:
         return Job.model_validate_json(line)
     except ValidationError as error:

@@ -128,7 +128,7 @@ def _move_to_start(run: RunSetup, prepared: Prepared) -> None:
         ending = approach.arrive(prepared.move.moving, ARRIVED_WITHIN, round(ARRIVAL_TIME / run.controller.period_s))
     if ending.kind != "finished":
         line = f"the move to the start ended before it was there: {ending.cause}; nothing was recorded"
-        raise StoppedError(line) if ending.kind == "stopped" else RunFaultError(line)
+        raise StoppedError(ending.cause, line) if ending.kind == "stopped" else RunFaultError(line)
 
 
 def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) -> RunResult:
@@ -169,8 +169,8 @@ def _finish(run: RunSetup, changes: tuple[GainChange, ...]) -> Ending:
         run.control.handle(Event.FINISHED)
         run.control.handle(Event.DISARM)
     except StoppedError as error:
-        run.control.stop(str(error))
-        return Ending("stopped", str(error))
+        run.control.stop(error.cause)
+        return Ending("stopped", error.cause)
     except (LinkError, GainsNotTakenError) as error:
         run.control.handle(Event.TRIP, str(error))
         return Ending("fault", f"the plan was carried out, but its gains could not be put back: {error}")

@@ -73,7 +73,8 @@ def _require_not_stopped(robot: OwnedRobot, order: WriteOutput | MoveGripper) ->
     """Raises StoppedError: after a stop nothing is switched but by somebody who says that they know of it."""
     cause = robot.ended() or robot.control.halted
     if cause is not None and not order.while_stopped:
-        raise StoppedError(f"the arm has been stopped ({cause}): nothing was switched; while_stopped switches it still")
+        line = f"the arm has been stopped ({cause}): nothing was switched; while_stopped switches it still"
+        raise StoppedError(cause, line)
 
 
 def _process(robot: OwnedRobot) -> dict[str, object]:
@@ -125,7 +126,7 @@ def _reset(robot: OwnedRobot, order: Reset) -> str:
     except RequestRefusedError as error:
         if error.reason != Refusal.OTHER_STOP:
             raise
-        control.stop(robot.ended() or "stopped on the board by somebody else")
+        control.stop(robot.ended() or "on the board, by somebody else")
         raise SafetyError("another stop has come meanwhile, and holds: reset again") from error
     if (cause := robot.ended()) is not None:
         control.stop(cause)

@@ -157,7 +157,7 @@ class Agreeing(Consent):
 
 def test_a_queue_that_is_paused_while_the_operator_is_asked_stays_paused() -> None:
     def status(paused: bool) -> SimpleNamespace:
-        queue = SimpleNamespace(paused=paused, reason="paused by bert: a guest is at the arm")
+        queue = SimpleNamespace(paused=paused, reason="by bert: a guest is at the arm")
         identity = SimpleNamespace(simulated=False)
         return SimpleNamespace(robot="arm", port="serial:///dev/x", identity=identity, queue=queue)
 

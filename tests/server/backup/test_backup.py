@@ -129,7 +129,7 @@ def test_everything_comes_back_elsewhere_as_it_was(archive: Path, tmp_path: Path
     store.close()
 
 
-@pytest.mark.parametrize("before", [None, QueueState(False, "resumed", NOW), QueueState(True, "paused by anna", NOW)])
+@pytest.mark.parametrize("before", [None, QueueState(False, "resumed", NOW), QueueState(True, "by anna", NOW)])
 def test_the_queue_comes_back_paused(tmp_path: Path, before: QueueState | None) -> None:
     here, there, later = filled(tmp_path / "here"), places_in(tmp_path / "there"), NOW + timedelta(days=7)
     store = Store(here.url)
