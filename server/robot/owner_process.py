@@ -8,7 +8,7 @@ import logging
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any
 
@@ -31,9 +31,15 @@ class OwnerGoneError(DaqError):
 class OwnerProcess:
     """A running owner. `report` and `ended` are called on a thread of its own; `ended` once, last."""
 
-    def __init__(self, opening: Open, report: Callable[[Report], None], ended: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        opening: Open,
+        report: Callable[[Report], None],
+        ended: Callable[[str], None],
+        program: Sequence[str] = (sys.executable, "-m", "server.owner"),
+    ) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "server.owner"],
+            program,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C in the terminal is the service's to handle

@@ -24,6 +24,7 @@ from server.store.experiments import ExperimentStore
 from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from tests.server.clocks import HandClock
+from tests.server.meanwhile import Meanwhile
 
 CALM = ArmReport(arm="idle", cause="", activity="none", limp=(), link="connected", counters={})
 MOCK = RobotIdentity(simulated=True, protocol=2, period=0.02, boots=1)
@@ -33,7 +34,7 @@ SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration"
 
 
 class Bench:
-    """A queue, its stores, an arm, and all events.
+    """A queue, its stores, at whose calls something may happen, an arm, and all events.
 
     answer:   what the arm answers an experiment with; None while it moves
     fails_at: the event whose listener fails, once
@@ -43,7 +44,8 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self.store = Store(f"sqlite:///{folder / 'service.sqlite'}")
         self.store.migrate()
-        self.experiments, self.schedules = ExperimentStore(self.store), ScheduleStore(self.store)
+        self.experiments: Any = Meanwhile(ExperimentStore(self.store))
+        self.schedules: Any = Meanwhile(ScheduleStore(self.store))
         self.clock = HandClock()
         self.answer: Answer | None = Answer(number=1, problem="refused", exit_code=2)
         self.asked: Future[Answer] = Future()
@@ -67,7 +69,7 @@ class Bench:
             ask=self._ask,
             tell=self.orders.append,
         )
-        self.queues = QueueStore(self.store)
+        self.queues: Any = Meanwhile(QueueStore(self.store))
         self.queue = self.begun_anew()
 
     def close(self) -> None:
@@ -133,7 +135,9 @@ class Bench:
 
     def schedule(self, every: float = 3600) -> Schedule:
         """One whose first run is due now, and then every hour."""
-        return self.schedules.create("ma2000", ScheduleRequest(spec=SPEC, every=every), self.clock.utc(), "anna")
+        request = ScheduleRequest(spec=SPEC, every=every)
+        made: Schedule = self.schedules.create("ma2000", request, self.clock.utc(), "anna")
+        return made
 
     def runs(self, schedule: Schedule) -> list[Experiment]:
         """What it has submitted."""
@@ -141,7 +145,7 @@ class Bench:
 
     def counted(self, schedule: Schedule) -> int:
         """How many runs count as made."""
-        return self.schedules.get("ma2000", schedule.id).submitted_runs
+        return int(self.schedules.get("ma2000", schedule.id).submitted_runs)
 
 
 def done(outcome: Outcome = "complete") -> Answer:
