@@ -37,13 +37,13 @@ Heard = tuple[str | None, float]
 """A message's text, None where it is bytes, and when it arrived (s, monotonic)."""
 
 
-async def stream(socket: WebSocket, rig: RobotServices, caller: Caller) -> None:
+async def stream(socket: WebSocket, rig: RobotServices, caller: Caller, look_every: float = LOOK_EVERY) -> None:
     """Serves one client until it goes, or is dropped."""
     await socket.accept()
     client = Client(Outbox(rig.robot.clock.monotonic()), caller.name)
     rig.hub.join(client)
     heard: asyncio.Queue[Heard] = asyncio.Queue(WAITING_MESSAGES)
-    dropping = asyncio.create_task(_drop_if_hopeless(rig, client))
+    dropping = asyncio.create_task(_drop_if_hopeless(rig, client, look_every))
     tasks = [
         dropping,
         asyncio.create_task(_send(socket, rig, client)),
@@ -66,7 +66,7 @@ async def stream(socket: WebSocket, rig: RobotServices, caller: Caller) -> None:
         log.warning("live client %s took nothing for too long and was dropped", client.name)
         # Whoever reads nothing would not take the close either: the server ends the connection when this returns.
         with suppress(TimeoutError, WebSocketDisconnect):
-            async with asyncio.timeout(LOOK_EVERY):
+            async with asyncio.timeout(look_every):
                 await socket.close(TOO_SLOW, "this client read too slowly")
 
 
@@ -157,7 +157,7 @@ def _refuse(rig: RobotServices, client: Client, detail: str, advice: str) -> Non
     client.something.set()
 
 
-async def _drop_if_hopeless(rig: RobotServices, client: Client) -> None:
+async def _drop_if_hopeless(rig: RobotServices, client: Client, look_every: float) -> None:
     """Returns when the client is to be dropped."""
     while not client.outbox.is_hopeless(rig.robot.clock.monotonic()):
-        await asyncio.sleep(LOOK_EVERY)
+        await asyncio.sleep(look_every)

@@ -39,10 +39,11 @@ class StopDoor:
     stopped:  called with every stop, on a thread of its own
     """
 
-    def __init__(self, listener: socket.socket, begin: Begin) -> None:
+    def __init__(self, listener: socket.socket, begin: Begin, begin_again_after: float = BEGIN_AGAIN_AFTER) -> None:
         self.stopped: Callable[[Stopped], None] = lambda _news: None
         self._listener = listener
         self._begin = begin
+        self._begin_again_after = begin_again_after
         self._lock = threading.Lock()
         self._owned: dict[str, Owned] = {}
         self._ready = threading.Event()
@@ -115,11 +116,11 @@ class StopDoor:
             self._process.stdin.close()
 
     def _listen(self) -> None:
-        after = BEGIN_AGAIN_AFTER
+        after = self._begin_again_after
         while True:
             self._hear_all()
             code = self._process.wait()
-            after = BEGIN_AGAIN_AFTER if self._ready.is_set() else min(2 * after, BEGIN_AGAIN_AT_MOST)
+            after = self._begin_again_after if self._ready.is_set() else min(2 * after, BEGIN_AGAIN_AT_MOST)
             self._ready.clear()
             with self._lock:
                 self._end_input()

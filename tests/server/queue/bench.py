@@ -5,13 +5,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 from sqlalchemy.exc import OperationalError
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import Experiment, ExperimentRequest, Schedule, ScheduleRequest
 from daq.contracts.service.robot import RobotIdentity
 from daq.contracts.trace import Outcome
@@ -19,6 +20,7 @@ from server.owner.messages import Answer, ArmReport, Finished
 from server.queue.context import QueueContext
 from server.queue.service import QueueService
 from server.robot.control import ControlService
+from server.robot.robot import RobotPlace
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.queues import QueueStore
@@ -31,6 +33,28 @@ MOCK = RobotIdentity(simulated=True, protocol=2, period=0.02, boots=1)
 REAL = MOCK.model_copy(update={"simulated": False})
 FULL = OperationalError("INSERT", {}, Exception("database or disk is full"))
 SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]})
+
+
+@dataclass
+class Arm:
+    """What the queue knows of a robot. ask: what becomes of an experiment; orders: what it was told besides"""
+
+    place: RobotPlace
+    ask: Callable[..., Future[Answer]]
+    orders: list[object]
+    identity: RobotIdentity | None = MOCK
+    arm: ArmReport | None = CALM
+    problem: str = ""
+    experiment: str | None = None
+
+    @property
+    def name(self) -> str:
+        """As in addresses and rows."""
+        return self.place.name
+
+    def tell(self, order: object) -> None:
+        """An order without an answer."""
+        self.orders.append(order)
 
 
 class Bench:
@@ -59,16 +83,8 @@ class Bench:
         self.control = ControlService(
             self.clock, lambda who: self._end("lapsed", who), lambda who: self._end("given_back", who)
         )
-        self.robot: Any = SimpleNamespace(
-            name="ma2000",
-            identity=MOCK,
-            arm=CALM,
-            problem="",
-            experiment=None,
-            place=SimpleNamespace(folder=folder),
-            ask=self._ask,
-            tell=self.orders.append,
-        )
+        place = RobotPlace("ma2000", "mock://", load_machine("ma2000"), folder)
+        self.robot: Any = Arm(place, self._ask, self.orders)
         self.queues: Any = Meanwhile(QueueStore(self.store))
         self.queue = self.begun_anew()
 
