@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from firmware_protocol.invalid import first_invalid
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.units import GAIN_MAX, POSTURE_UNITS
 
@@ -71,9 +72,9 @@ def read_options(arguments: list[str]) -> Options:
     try:
         options = Options.model_validate(chosen)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = " ".join(str(part) for part in first["loc"]).replace("_", "-")
-        raise OptionsError(f"{where}: {first['msg'].lower()}, is {_shown(first['input'])}") from None
+        first = first_invalid(error)
+        where = " ".join(map(str, first.place)).replace("_", "-")
+        raise OptionsError(f"{where}: {first.message.lower()}, is {_shown(first.value)}") from None
     if options.pty and options.tcp:
         raise OptionsError("pty and tcp: give one of them")
     if not (options.pty or options.tcp):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ _LONGEST = 200
 class DamagedError(DaqError):
     """What the database holds cannot be what was written there."""
 
-    exit_code = 2
+    exit_code = exit_codes.WRONG_INPUT
 
 
 def table_of(statement: str | None) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from daq.config.service import ServiceSettings
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.contracts.service.system import stop_port_after
 
@@ -17,7 +18,7 @@ TRIES = 50
 class ListenError(DaqError):
     """An address cannot be listened at."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 @contextmanager

@@ -8,9 +8,11 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.contracts.service.problems import FieldProblem, ProblemDetails
 from daq.transport import PortBusyError
+from firmware_protocol.invalid import message_of
 from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of
 
 if TYPE_CHECKING:
@@ -113,11 +115,11 @@ def no_room(error: OSError) -> ProblemError:
 
 def of_exit_code(exit_code: int, line: str) -> ProblemError:
     """The problem that another process has told in a line, with the exit code of the command line."""
-    if exit_code == 2:
+    if exit_code == exit_codes.WRONG_INPUT:
         return ProblemError(422, "not-valid", line, "correct the request")
-    if exit_code == 3:
+    if exit_code == exit_codes.NOT_REACHED:
         return ProblemError(503, "not-reached", line, "check cable and supply, then connect again")
-    if exit_code == 6:
+    if exit_code == exit_codes.STOPPED:
         return ProblemError(409, "stopped", line, "reset the robot when it is safe")
     return ProblemError(409, "not-safe", line, "remove the cause, then try again")
 
@@ -205,7 +207,7 @@ def _where(error: Mapping[str, Any]) -> str:
 
 
 def _what(error: Mapping[str, Any]) -> str:
-    message = str(error["msg"]).removeprefix("Value error, ")
+    message = message_of(error)
     given = error.get("input")
     if isinstance(given, str | int | float | bool) and error["type"] != "json_invalid":
         return f"{message} (got {given!r:.80})"

@@ -23,6 +23,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace_limits import TraceLimits
+from firmware_protocol.invalid import first_invalid
 
 APP = "ma2000-daq"
 LOCAL_FILE = "daq.toml"
@@ -145,14 +146,13 @@ def _validated(data: dict[str, Any], origin: str) -> Settings:
     except RecursionError:
         raise SpecError("environment: a section is nested too deeply; write keys, such as DAQ_ROBOT__PORT") from None
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        message = first["msg"].removeprefix("Value error, ")
-        if first["type"] == "extra_forbidden":
-            message = f"no such key; allowed here: {', '.join(_keys_at(first['loc'][:-1]))}"
-        where = _variable_of(first["loc"]) or f"configuration {origin}"
-        value = "" if isinstance(first["input"], dict) else f" = {shown(first['input'])}"
-        raise SpecError(f"{where}: {key}{value}: {message}") from error
+        first = first_invalid(error)
+        message = first.message
+        if first.kind == "extra_forbidden":
+            message = f"no such key; allowed here: {', '.join(_keys_at(first.place[:-1]))}"
+        where = _variable_of(first.place) or f"configuration {origin}"
+        value = "" if isinstance(first.value, dict) else f" = {shown(first.value)}"
+        raise SpecError(f"{where}: {first.where()}{value}: {message}") from error
 
 
 def _variable_of(where: tuple[int | str, ...]) -> str | None:

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool, Vali
 
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
+from firmware_protocol.invalid import first_invalid
 
 JOINTS = 6
 GAIN_PLACE = 3
@@ -262,23 +263,22 @@ def parse_spec(data: object, origin: str = "experiment") -> ExperimentSpec:
 
 def _one_line(error: ValidationError) -> str:
     """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
-    first = error.errors()[0]
-    where, value = [str(part) for part in first["loc"]], first["input"]
+    first = first_invalid(error)
+    where, value, message = [str(part) for part in first.place], first.value, first.message
     # Pydantic's names for the branches of a union mean nothing to a user.
     where = [
         part
         for i, part in enumerate(where)
         if not part.startswith("constrained-") and (i != 1 or where[0] != "trajectory")
     ]
-    message = first["msg"].removeprefix("Value error, ")
     if "gains" in where[:1] and len(where) == GAIN_PLACE:
         where = [f"gains of joint {where[1]}", "PID"[int(where[2])]]
-    bound = next((first.get("ctx", {})[key] for key in ("le", "ge") if key in first.get("ctx", {})), None)
+    bound = next((first.bounds[key] for key in ("le", "ge") if key in first.bounds), None)
     if bound is not None and math.isclose(abs(bound), 2 * math.pi) and _fits_a_float(value):
         message, value = "must lie between -360° and 360°", f"{math.degrees(value):g}°"
     elif not isinstance(value, str) or len(value) > LONGEST_SHOWN:
         value = shown(value)
-    given = "" if isinstance(first["input"], dict | BaseModel) else f" (got {value})"
+    given = "" if isinstance(first.value, dict | BaseModel) else f" (got {value})"
     return f"{': '.join(['.'.join(where)] * bool(where) + [message])}{given}"
 
 

@@ -29,6 +29,7 @@ from daq.contracts.quantity import (
     Volt,
     in_unit,
 )
+from firmware_protocol.invalid import first_invalid
 from firmware_protocol.units import DriveScale, JointCalibration
 
 Unitful = Annotated[Quantity, Field()]
@@ -218,9 +219,8 @@ def parse_machine(text: str, origin: str = "machine file") -> Machine:
     try:
         return Machine.model_validate(parse_toml(text, origin))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part + 1 if isinstance(part, int) else part) for part in first["loc"]) or "machine"
-        raise SpecError(f"{origin}: {where}: {first['msg'].removeprefix('Value error, ')}") from error
+        first = first_invalid(error)
+        raise SpecError(f"{origin}: {first.where('machine', first=1)}: {first.message}") from error
 
 
 def load_machine(name_or_path: str) -> Machine:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from typing import Protocol
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.contracts.experiment import Gain
 from daq.contracts.sample import SampleRow
@@ -15,7 +16,7 @@ from daq.runner import StoppedError
 class TeachingError(DaqError):
     """Teaching ended early, or its result cannot be used."""
 
-    exit_code = 5
+    exit_code = exit_codes.FAULT
 
 
 class TeachableArm(Protocol):

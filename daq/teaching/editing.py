@@ -12,6 +12,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from daq.teaching.program import Instruction, Program
 from daq.teaching.program_plan import check_program, plan_program
+from firmware_protocol.invalid import first_invalid
 
 
 def delete(program: Program, number: int) -> Program:
@@ -99,7 +100,6 @@ def _changed(program: Program, **fields: object) -> Program:
     try:
         return Program.model_validate(program.model_dump() | fields)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part + 1 if isinstance(part, int) else part) for part in first["loc"])
-        message = first["msg"].removeprefix("Value error, ")
-        raise SpecError(f"program {program.name}: {where} = {shown(first['input'])}: {message}") from error
+        first = first_invalid(error)
+        where = f"{first.where(first=1)} = {shown(first.value)}"
+        raise SpecError(f"program {program.name}: {where}: {first.message}") from error

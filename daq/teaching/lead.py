@@ -58,7 +58,7 @@ def lead_by_nose(
             if len(rows) >= SHORTEST:
                 keep(_path(rows, arm.joints, joints, control_period(machine)))
     except StoppedError as error:
-        raise StoppedError(f"lead: {error}{_limp_line(limp)}") from error
+        raise StoppedError(error.cause, f"lead: {error}{_limp_line(limp)}") from error
     except DaqError as error:
         raise TeachingError(f"lead: {error}{_limp_line(limp)}") from error
     if len(rows) < SHORTEST:

@@ -110,4 +110,4 @@ class FollowingPerformer:
         try:
             self._control.handle(event)
         except StoppedError as error:
-            raise halting.freeze_for_stop(self._control, self._control.halted or str(error)) from error
+            raise halting.freeze_for_stop(self._control, self._control.halted or error.cause) from error

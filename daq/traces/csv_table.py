@@ -25,6 +25,7 @@ from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds, disk
 from daq.traces.naming import trace_id_of
 from daq.traces.recording import software
+from firmware_protocol.invalid import first_invalid
 
 SIGNALS = ("set_point", "position", "drive", "velocity")
 """Columns a joint may have, after which comes `_` and its number. `position` is needed, or `velocity` in its place: a
@@ -267,9 +268,8 @@ def _beside(path: Path, data: bytes | None) -> Beside:
     try:
         beside = Beside.model_validate(parse_toml(data.decode("utf-8"), str(path)))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise TraceError(f"{path}: {where}: {first['msg']} (got {shown(first['input'])})") from error
+        first = first_invalid(error)
+        raise TraceError(f"{path}: {first.where()}: {first.message} (got {shown(first.value)})") from error
     except UnicodeDecodeError as error:
         raise TraceError(f"{path}: is not text in UTF-8") from error
     except SpecError as error:

@@ -6,6 +6,7 @@ import errno
 import io
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -88,11 +89,12 @@ def options(
     context.obj = Invocation(config_file=config_file, port_option=port, server=server, server_by_default=by_default)
 
 
-def main() -> None:
-    """Entry point: a user's error ends in one line on standard error and a documented exit code."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry point: a user's error ends in one line on standard error and a documented exit code. arguments: as typed
+    behind `daq`; None for those of this process"""
     _print_whatever_files_are_called()
     try:
-        exit_code = app(prog_name="daq", standalone_mode=False)
+        exit_code = app(arguments, prog_name="daq", standalone_mode=False)
         _flush()  # now, while what keeps it from being written is still an error
     except DaqError as error:
         fail(str(error), error.exit_code)

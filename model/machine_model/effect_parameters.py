@@ -23,7 +23,10 @@ def effect_parameters(
     kind = effect(name)
     if kind.whole_machine:
         scale = joint_scale(machine, machine.modelled_joints[-1])
-        return tuple(replace(_parameter(kind, p, scale, kind.group), slots=(p.column,)) for p in kind.parameters)
+        return tuple(
+            replace(_parameter(kind, p, scale, kind.group), component=kind.group, slots=(p.column,))
+            for p in kind.parameters
+        )
     found = []
     for group in [joints] if shared else [(j,) for j in joints]:
         place = f"joint{group[0]}" if len(group) == 1 else "joints" + "+".join(str(j) for j in group)

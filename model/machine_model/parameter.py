@@ -42,6 +42,8 @@ class Parameter:
         name: such as `joint2.viscous_friction.coefficient`, `link3.mass`, `controller.delay`; joints that share it are
             joined by a plus: `joints1+2.coulomb_friction.torque`.
         kind: what sort of number it is.
+        component: what carries it: link, motor, drive, load, controller, or what an effect of the whole machine acts
+            on; empty for an effect on joints, and for an initial state.
         part: which number of its link, motor, controller or effect it is: `mass`, `resistance`, `coefficient`; of
             parameters that share one value, the part of the first.
         unit: as written in reports.
@@ -58,6 +60,7 @@ class Parameter:
 
     name: str
     kind: Kind
+    component: str = ""
     part: str
     unit: str
     value: float

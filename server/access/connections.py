@@ -34,6 +34,7 @@ class Connection(HttpToolsProtocol):
     as soon as that is known, and its connection is closed.
     """
 
+    most = MOST_CONNECTIONS
     _refusal: ProblemError | None = None
     _reading_head = False
     _headers = 0
@@ -48,7 +49,7 @@ class Connection(HttpToolsProtocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """As uvicorn's."""
         super().connection_made(transport)
-        if len(self.connections) > MOST_CONNECTIONS:
+        if len(self.connections) > self.most:
             others = (one for one in self.connections if isinstance(one, Connection) and one is not self)
             given_up = next((one for one in others if one.asks_nothing), self)
             self.connections.discard(given_up)

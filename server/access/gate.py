@@ -63,6 +63,7 @@ class Gate:
     sockets: Counter[str] = field(default_factory=Counter)
     """WebSockets that are open, by the caller's name."""
     turns: Turns = field(default_factory=Turns)
+    look_every: float = LOOK_EVERY
 
     def middleware(self, app: ASGIApp) -> ASGIApp:
         """`app` behind this gate."""
@@ -147,14 +148,14 @@ class Gate:
         elif not await self._while_let_in(caller, app(scope, receive, send)):
             log.info("closed a WebSocket: the token of %s was revoked", caller.name)
             with suppress(TimeoutError):  # of a client that reads nothing: its connection ends when this returns
-                async with asyncio.timeout(LOOK_EVERY):
+                async with asyncio.timeout(self.look_every):
                     await WebSocketClose(NOT_ALLOWED, "this token was revoked")(scope, receive, send)
 
     async def _while_let_in(self, caller: Caller, serving: Awaitable[None]) -> bool:
         """Serves until the end, or until the caller's token is revoked: False then."""
         task = asyncio.ensure_future(serving)
         try:
-            while not (await asyncio.wait({task}, timeout=LOOK_EVERY))[0]:
+            while not (await asyncio.wait({task}, timeout=self.look_every))[0]:
                 if not await self.tokens.still_let_in(caller):
                     return False
             task.result()

@@ -30,7 +30,8 @@ class _Lane:
 class Lanes:
     """The lanes of all callers; each exists while its caller has requests."""
 
-    def __init__(self) -> None:
+    def __init__(self, wait_at_most: float = WAIT_AT_MOST) -> None:
+        self._wait_at_most = wait_at_most
         self._lanes: dict[str, _Lane] = {}
 
     @asynccontextmanager
@@ -42,10 +43,11 @@ class Lanes:
         lane.users += 1
         try:
             try:
-                async with asyncio.timeout(WAIT_AT_MOST):
+                async with asyncio.timeout(self._wait_at_most):
                     await lane.turns.acquire()
             except TimeoutError:
-                raise _too_many(f"requests of {caller} have waited for their turn for {WAIT_AT_MOST:g} s") from None
+                line = f"requests of {caller} have waited for their turn for {self._wait_at_most:g} s"
+                raise _too_many(line) from None
             try:
                 yield
             finally:

@@ -129,10 +129,10 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         "post .*/(teaching/.*|programs/.*/run|queue/resume)$",
         409,
         "arm-stopped",
-        "the arm is stopped: stopped by a person",
+        "the arm is stopped: by a person",
         "reset the robot when it is safe",
     ),
-    _met(MOVES, 409, "stopped", "the arm has been stopped: stopped by a person", "reset the robot when it is safe"),
+    _met(MOVES, 409, "stopped", "the arm has been stopped: by a person", "reset the robot when it is safe"),
     _met(
         "post .*/connect$",
         409,

@@ -50,7 +50,7 @@ def list_queue(rig: RobotDep, services: ServicesDep, _: Viewer) -> tuple[Experim
 @router.post("/queue/pause", tags=["queue"])
 def pause_queue(rig: RobotDep, caller: Operator) -> QueueStatus:
     """Pauses the queue: no further experiment begins, and one that runs goes on."""
-    rig.queue.pause(f"paused by {caller.name}", caller.name)
+    rig.queue.pause(f"by {caller.name}", caller.name)
     return rig.queue.status()
 
 

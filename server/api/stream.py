@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from daq.contracts.errors import DaqError
 from daq.contracts.service.live import JogCommand, LiveRequest, RefusedMessage, ThinnedMessage
+from firmware_protocol.invalid import first_invalid
 from server.access.caller import Caller
 from server.access.limits import Bucket
 from server.live.hub import Client
@@ -36,13 +37,13 @@ Heard = tuple[str | None, float]
 """A message's text, None where it is bytes, and when it arrived (s, monotonic)."""
 
 
-async def stream(socket: WebSocket, rig: RobotServices, caller: Caller) -> None:
+async def stream(socket: WebSocket, rig: RobotServices, caller: Caller, look_every: float = LOOK_EVERY) -> None:
     """Serves one client until it goes, or is dropped."""
     await socket.accept()
     client = Client(Outbox(rig.robot.clock.monotonic()), caller.name)
     rig.hub.join(client)
     heard: asyncio.Queue[Heard] = asyncio.Queue(WAITING_MESSAGES)
-    dropping = asyncio.create_task(_drop_if_hopeless(rig, client))
+    dropping = asyncio.create_task(_drop_if_hopeless(rig, client, look_every))
     tasks = [
         dropping,
         asyncio.create_task(_send(socket, rig, client)),
@@ -65,7 +66,7 @@ async def stream(socket: WebSocket, rig: RobotServices, caller: Caller) -> None:
         log.warning("live client %s took nothing for too long and was dropped", client.name)
         # Whoever reads nothing would not take the close either: the server ends the connection when this returns.
         with suppress(TimeoutError, WebSocketDisconnect):
-            async with asyncio.timeout(LOOK_EVERY):
+            async with asyncio.timeout(look_every):
                 await socket.close(TOO_SLOW, "this client read too slowly")
 
 
@@ -112,9 +113,9 @@ async def _carry_out(rig: RobotServices, client: Client, caller: Caller, heard: 
         try:
             await _take(LiveRequest.model_validate_json(text), rig, client, caller, said)
         except ValidationError as error:
-            first = error.errors()[0]
-            where = field_of(first["loc"]) if first["loc"] else "message"
-            _refuse(rig, client, f"{where}: {first['msg']}", ADVICE)
+            first = first_invalid(error)
+            where = field_of(first.place) if first.place else "message"
+            _refuse(rig, client, f"{where}: {first.message}", ADVICE)
         except ProblemError as error:
             _refuse(rig, client, error.detail, error.advice)
         except DaqError as error:
@@ -156,7 +157,7 @@ def _refuse(rig: RobotServices, client: Client, detail: str, advice: str) -> Non
     client.something.set()
 
 
-async def _drop_if_hopeless(rig: RobotServices, client: Client) -> None:
+async def _drop_if_hopeless(rig: RobotServices, client: Client, look_every: float) -> None:
     """Returns when the client is to be dropped."""
     while not client.outbox.is_hopeless(rig.robot.clock.monotonic()):
-        await asyncio.sleep(LOOK_EVERY)
+        await asyncio.sleep(look_every)

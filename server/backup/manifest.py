@@ -13,6 +13,7 @@ from typing import IO, Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from firmware_protocol.invalid import first_invalid
 from server.backup.places import DATABASE, NAMES, BackupError
 
 FORMAT = 1
@@ -109,9 +110,8 @@ def _manifest(pack: zipfile.ZipFile, archive: Path) -> Manifest:
     try:
         manifest = Manifest.model_validate_json(pack.read(MANIFEST))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        line = f"{archive}: {MANIFEST}: {where}: {first['msg']}; nothing was changed"
+        first = first_invalid(error)
+        line = f"{archive}: {MANIFEST}: {first.where()}: {first.message}; nothing was changed"
         raise BackupError(line) from error
     if manifest.format > FORMAT:
         line = f"{archive}: is a backup of format {manifest.format}, this version knows {FORMAT}; nothing was changed"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from daq.config import Settings
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.traces.layout import SUFFIX
 from server.store.lock import sqlite_file
@@ -23,7 +24,7 @@ NAMES = re.compile(
 class BackupError(DaqError):
     """A backup that cannot be made, is damaged, or does not belong here. Nothing was changed."""
 
-    exit_code = 2
+    exit_code = exit_codes.WRONG_INPUT
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,15 @@ class Restored:
     put_aside: tuple[Path, ...]
 
 
-def restore(archive: Path, places: Places, now: datetime, progress: Progress, *, overwrite: bool = False) -> Restored:
+def restore(
+    archive: Path,
+    places: Places,
+    now: datetime,
+    progress: Progress,
+    *,
+    overwrite: bool = False,
+    reserve: int = RESERVE,
+) -> Restored:
     """Brings everything of a backup to the places of this configuration.
 
     Raises BackupError when the backup is damaged or another robot's, or something is there and `overwrite` is False;
@@ -53,7 +61,7 @@ def restore(archive: Path, places: Places, now: datetime, progress: Progress, *,
             names = ", ".join(str(path) for path in there[:3]) + (", …" if len(there) > 3 else "")
             line = f"{len(there)} files or folders are there already ({names})"
             raise BackupError(f"{line}: with --overwrite they are put aside; nothing was changed")
-        staged = _Staged(archive, places, now)
+        staged = _Staged(archive, places, now, reserve)
         try:
             staged.write(manifest, lambda f, text: progress(CHECK_SHARE + (WRITE_SHARE - CHECK_SHARE) * f, text))
             aside = _put_aside(there, now)
@@ -76,10 +84,11 @@ def occupied(places: Places) -> list[Path]:
 class _Staged:
     """Files on their way: beside their places, on the same disk, so that moving them in is renaming."""
 
-    def __init__(self, archive: Path, places: Places, now: datetime) -> None:
+    def __init__(self, archive: Path, places: Places, now: datetime, reserve: int) -> None:
         self._archive = archive
         self._now = now
         self._places = places
+        self._reserve = reserve
         self._moves: list[tuple[Path, Path]] = []
         self._folders = {folder / STAGING for folder in (places.database.parent, places.traces, places.service)}
 
@@ -147,8 +156,8 @@ class _Staged:
     def _require_room(self, manifest: Manifest) -> None:
         for folder in self._folders:
             free = shutil.disk_usage(folder).free
-            if free < manifest.size + RESERVE:
-                needed = (manifest.size + RESERVE) / 1e6
+            if free < manifest.size + self._reserve:
+                needed = (manifest.size + self._reserve) / 1e6
                 raise BackupError(f"{folder.parent}: {free / 1e6:.0f} MB are free, {needed:.0f} MB are needed")
 
 

@@ -20,7 +20,7 @@ RESERVE = 20_000_000
 """Bytes that stay free beside a backup."""
 
 
-def back_up(places: Places, target: Path, now: datetime, progress: Progress) -> Manifest:
+def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, reserve: int = RESERVE) -> Manifest:
     """Writes a backup to `target`, whole or not at all, for nobody else to read: hashes of tokens are in it.
 
     The database is taken first, in one moment: every file that it names is there by then, and is taken after it. What
@@ -34,7 +34,7 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress) -> 
             copy_database(places.database, database)
             revision = revision_of(database)
             files = [(DATABASE, database), *places.files()]
-            _require_room(target.absolute().parent, files)
+            _require_room(target.absolute().parent, files, reserve)
             part = Path(folder) / "backup.zip"
             entries, left_out = _pack(part, files, progress)
             manifest = Manifest(
@@ -83,8 +83,8 @@ def _put(pack: zipfile.ZipFile, name: str, path: Path) -> Entry:
     return Entry(name=name, size=size, sha256=digest.hexdigest())
 
 
-def _require_room(folder: Path, files: list[tuple[str, Path]]) -> None:
-    needed = sum(path.stat().st_size for _, path in files if path.is_file()) + RESERVE
+def _require_room(folder: Path, files: list[tuple[str, Path]], reserve: int) -> None:
+    needed = sum(path.stat().st_size for _, path in files if path.is_file()) + reserve
     free = shutil.disk_usage(folder).free
     if free < needed:
         raise BackupError(f"{folder}: {free / 1e6:.0f} MB are free, a backup needs {needed / 1e6:.0f} MB")

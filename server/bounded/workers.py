@@ -32,8 +32,9 @@ class Workers:
     """Up to `most` processes, started when they are needed and kept while they stay small. Safe to use from any thread;
     `ask` waits, and belongs into a thread."""
 
-    def __init__(self, limits: Limits, most: int) -> None:
+    def __init__(self, limits: Limits, most: int, start_within: float = START_WITHIN) -> None:
         self._limits = limits
+        self._start_within = start_within
         self._room = threading.BoundedSemaphore(most)
         self._lock = threading.Lock()
         self._idle: list[_Worker] = []
@@ -90,7 +91,7 @@ class Workers:
                     break
                 worker.kill()
             else:
-                worker = _Worker(self._limits)
+                worker = _Worker(self._limits, self._start_within)
             self._busy.add(worker)
             return worker
 
@@ -103,7 +104,7 @@ class Workers:
 
 
 class _Worker:
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: Limits, start_within: float) -> None:
         self._limits = limits
         self._process = subprocess.Popen(
             [sys.executable, "-m", "server.bounded"],
@@ -113,7 +114,7 @@ class _Worker:
             start_new_session=True,
             env=os.environ | ONE_THREAD,
         )
-        self._allowance = START_WITHIN
+        self._allowance = start_within
         self._write(limits.model_dump_json())
 
     @property

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from daq.contracts import exit_codes
 from daq.contracts.trace import Outcome
 from server.experiments.states import Event
 from server.owner.messages import Answer
 
-EXIT_REFUSED = (2, 4)
-EXIT_NOT_REACHED = 3
-EXIT_STOPPED = 6
 _OF_OUTCOME: dict[Outcome, Event] = {
     "complete": Event.COMPLETED,
     "stopped": Event.STOPPED,
@@ -41,8 +39,8 @@ def ending_of(answer: Answer) -> Ending:
     """The ending that the owner's answer reports."""
     if answer.finished is not None:
         return Ending(_OF_OUTCOME[answer.finished.outcome], answer.finished.reason, answer.finished.outcome)
-    if answer.exit_code in EXIT_REFUSED:
+    if answer.exit_code in (exit_codes.WRONG_INPUT, exit_codes.REFUSED):
         return Ending(Event.REFUSED, answer.problem)
-    if answer.exit_code == EXIT_NOT_REACHED:
+    if answer.exit_code == exit_codes.NOT_REACHED:
         return Ending(Event.LOST, answer.problem)
-    return Ending(Event.STOPPED if answer.exit_code == EXIT_STOPPED else Event.FAULT, answer.problem)
+    return Ending(Event.STOPPED if answer.exit_code == exit_codes.STOPPED else Event.FAULT, answer.problem)

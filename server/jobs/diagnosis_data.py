@@ -12,6 +12,8 @@ from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.statistics import chance_significance
 from model.fitting.records import noise_floor, records_of
+from model.machine_model.effect_parameters import effect_parameters
+from model.machine_model.parameter_words import words_by_name
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from server.jobs.overlays import overlays
@@ -20,6 +22,7 @@ from server.jobs.results import DiagnosisData, DiagnosisStep, GivenWhere
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from daq.contracts.service.jobs import ParameterWords
     from daq.contracts.trace import Trace
     from model.comparison.compare import Comparison
     from model.discrepancy.diagnosis import Diagnosis, Step
@@ -37,8 +40,21 @@ def diagnosis_data(found: Diagnosis, comparison: Comparison | None, given: Given
             "signals": () if comparison is None else overlays(comparison),
             "differences": differences((found.model_before, found.model_after)),
             "given": given,
+            "words": _words(found),
         }
     )
+
+
+def _words(found: Diagnosis) -> dict[str, ParameterWords]:
+    """Words for the parameters of both models, and of the effects that were tried and not added."""
+    machine = found.model_before.machine
+    rejected = [
+        parameter
+        for step in found.steps
+        if step.effect is not None and not step.adopted
+        for parameter in effect_parameters(machine, step.effect, step.joints, shared=False)
+    ]
+    return words_by_name([*found.model_before.parameters, *found.model_after.parameters, *rejected])
 
 
 def where_given(model: Model, traces: Sequence[Trace]) -> GivenWhere | None:

@@ -12,6 +12,7 @@ from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import MACHINE, EffectChoice, ModelDetails, ModelParameter
 from model.machine_model.model import Model, base_model
 from model.machine_model.model_file import load_model, save_model
+from model.machine_model.parameter_words import words_of
 from server.clock import Clock
 from server.problems import ProblemError
 from server.store.models import ModelStore, NewModel
@@ -115,6 +116,7 @@ def _parameters(model: Model) -> tuple[ModelParameter, ...]:
     return tuple(
         ModelParameter(
             name=one.name,
+            words=words_of(one),
             unit=one.unit,
             value=one.value,
             low=_finite(one.low),

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from daq.contracts.service.jobs import ParameterWords
 from model.comparison.agreement import ModelAgreement
 from model.comparison.difference import ParameterDifference
 from model.discrepancy.diagnosis import Candidate, Diagnosis, Step, Where
@@ -13,6 +14,8 @@ from model.fitting.result import FitResult
 from model.validation.criterion import Fidelity
 from model.validation.variation import TimeDomain
 
+Words = dict[str, ParameterWords]
+"""How people write the parameters that a result names, by the parameter's name."""
 Row = tuple[float | None, ...]
 """One signal of one joint; None where a simulation did not stay finite."""
 
@@ -42,10 +45,12 @@ class Overlay(_Part):
 
 
 class FitData(FitResult):
-    """A fit, and the models before and after it beside the traces."""
+    """A fit, and the models before and after it beside the traces. `undetermined`: what the traces cannot tell, a
+    sentence each, with the parameters as people write them."""
 
     models: tuple[ModelAgreement, ...]
     signals: tuple[Overlay, ...]
+    undetermined: tuple[str, ...] = ()
 
 
 class ValidationData(_Part):
@@ -55,6 +60,7 @@ class ValidationData(_Part):
     fidelity: Fidelity
     three_sigma: Fidelity
     time_domain: tuple[TimeDomain, ...]
+    words: Words = Field(default_factory=dict)
 
 
 class ComparisonData(_Part):
@@ -63,6 +69,7 @@ class ComparisonData(_Part):
     models: tuple[ModelAgreement, ...]
     signals: tuple[Overlay, ...]
     differences: tuple[ParameterDifference, ...]
+    words: Words = Field(default_factory=dict)
 
 
 class TriedEffect(Candidate):
@@ -96,6 +103,7 @@ class DiagnosisData(Diagnosis):
     signals: tuple[Overlay, ...] = ()
     differences: tuple[ParameterDifference, ...] = ()
     given: GivenWhere | None = None
+    words: Words = Field(default_factory=dict)
 
 
 class FitJobResult(_Part):

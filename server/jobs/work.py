@@ -101,7 +101,9 @@ class _Worker:
     def fit(self, request: FitRequest) -> Ended:
         """As `daq fit`."""
         from model.fitting.fit import fit
+        from model.fitting.identifiability import undetermined_in_words
         from model.fitting.options import FitOptions
+        from model.machine_model.parameter_words import words_by_name
         from model.reports.fit_report import fit_report
         from server.jobs.overlays import overlays
         from server.jobs.results import FitData, FitJobResult
@@ -123,12 +125,18 @@ class _Worker:
             [("before", begin), ("fitted", found.model)], [*traces, *held], request.held_out, FIT_SHARE
         )
         self._keep_model(found.model)
-        data = FitData(**dict(found), models=comparison.models, signals=overlays(comparison))
+        data = FitData(
+            **dict(found),
+            models=comparison.models,
+            signals=overlays(comparison),
+            undetermined=undetermined_in_words(found.identifiability, words_by_name(found.model.parameters)),
+        )
         result = FitJobResult(id=self._job, data=data)
         return self._done(result, fit_report(found, comparison), of_fit(found, comparison), found.model)
 
     def validate(self, request: ValidateRequest) -> Ended:
         """As `daq validate`."""
+        from model.machine_model.parameter_words import words_by_name
         from model.reports.validation_report import validation_report
         from model.simulation.prepared import Options
         from model.validation.conventions import in_convention
@@ -161,6 +169,7 @@ class _Worker:
             fidelity=fidelity,
             three_sigma=three.model_copy(update={"curves": ()}),
             time_domain=tuple(thinned_variation(one) for one in in_time),
+            words=words_by_name(model.parameters),
         )
         report = validation_report(self._name(request.model), (fidelity, three), in_time, model.machine)
         return self._done(ValidationJobResult(id=self._job, data=data), report, of_validation(fidelity))
@@ -168,6 +177,7 @@ class _Worker:
     def compare(self, request: CompareRequest) -> Ended:
         """As `daq compare`; also one model beside traces."""
         from model.comparison.difference import differences
+        from model.machine_model.parameter_words import words_by_name
         from model.reports.comparison_report import comparison_report
         from server.jobs.overlays import overlays
         from server.jobs.results import ComparisonData, ComparisonJobResult
@@ -176,10 +186,15 @@ class _Worker:
         traces = self._traces(request.traces)
         fitted = {trace for model in models for trace in model.lineage.traces}
         held = [trace.record.trace_id for trace in traces if trace.record.trace_id not in fitted] if fitted else None
-        labels = [f"{self._name(number)} ({number})" for number in request.models]
+        labels = self._labels(request.models)
         comparison = self._compared(list(zip(labels, models, strict=True)), traces, held, 0.0)
         differing = differences(models)
-        data = ComparisonData(models=comparison.models, signals=overlays(comparison), differences=differing)
+        data = ComparisonData(
+            models=comparison.models,
+            signals=overlays(comparison),
+            differences=differing,
+            words=words_by_name(parameter for model in models for parameter in model.parameters),
+        )
         result = ComparisonJobResult(id=self._job, data=data)
         return self._done(result, comparison_report(comparison, differing), of_comparison(comparison))
 
@@ -244,6 +259,15 @@ class _Worker:
 
     def _name(self, number: str) -> str:
         return self.task.names.get(number, number)
+
+    def _labels(self, numbers: Sequence[str]) -> list[str]:
+        """The names of models, with their numbers where the names alone do not tell them apart."""
+        names = [self._name(number) for number in numbers]
+        alike = len(set(names)) < len(names)
+        return [
+            f"{name} ({number})" if alike or number == MACHINE else name
+            for name, number in zip(names, numbers, strict=True)
+        ]
 
     def _tell(self, begin: float, end: float, fraction: float, text: str) -> None:
         """A stage's progress as the job's. The end of a stage ends no job, and what follows says what it is."""

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from daq.acquisition.guardian import CANCEL
 from daq.contracts.errors import SpecError
+from firmware_protocol.invalid import first_invalid
 from server.owner.messages import (
     ORDER,
     Close,
@@ -63,7 +64,7 @@ class Inbox:
         try:
             return Open.model_validate_json(line)
         except ValidationError as error:
-            raise SpecError(f"owner: the first order: {error.errors()[0]['msg']}") from error
+            raise SpecError(f"owner: the first order: {first_invalid(error).message}") from error
 
     @contextmanager
     def reading(self) -> Iterator[None]:

@@ -130,7 +130,7 @@ def answered_quickly(robot: OwnedRobot, order: Quick) -> Answer:
 def _require_ready(robot: OwnedRobot) -> None:
     """Raises SafetyError or StoppedError when neither keys nor programs may move the arm."""
     if (cause := robot.ended() or robot.control.halted) is not None:
-        raise StoppedError(f"the arm has been stopped: {cause}")
+        raise StoppedError(cause)
     line = limp_line(robot.read_gains())
     if line:
         raise SafetyError(f"{line}; hold the arm, reset it here, then set their gains; nothing moved")

@@ -70,7 +70,7 @@ def _watch(robot: OwnedRobot, last: int | None) -> int:
     """The next sample of an arm that nobody moves. Returns its tick."""
     snapshot = robot.controller.next_snapshot(last)
     if is_frozen(snapshot) and robot.control.arm.state is State.IDLE:
-        robot.control.stop("stopped on the board by somebody else")
+        robot.control.stop("on the board, by somebody else")
     return snapshot.tick
 
 
@@ -150,7 +150,7 @@ def _answers_again(robot: OwnedRobot) -> None:
 
 def _notice_a_stop_before_us(robot: OwnedRobot) -> None:
     if StatusFlag.FROZEN in robot.controller.status().flags and robot.control.arm.state is State.IDLE:
-        robot.control.stop("stopped before this connection")
+        robot.control.stop("before this connection")
 
 
 def _refuse(robot: OwnedRobot, order: Long | Quick, line: str, exit_code: int) -> None:

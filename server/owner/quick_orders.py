@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, ReachError, SafetyError
 from daq.contracts.limp import limp_line, require_no_jump
 from daq.link import RequestRefusedError
@@ -29,7 +30,7 @@ _WHILE_TEACHING = (ReadProcess, WriteOutput, MoveGripper, ReadGains)
 class NotFrozenError(DaqError):
     """The board has not confirmed that it took the measured posture as its set points."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 def carry_out(robot: OwnedRobot, order: Quick) -> dict[str, object]:
@@ -72,7 +73,8 @@ def _require_not_stopped(robot: OwnedRobot, order: WriteOutput | MoveGripper) ->
     """Raises StoppedError: after a stop nothing is switched but by somebody who says that they know of it."""
     cause = robot.ended() or robot.control.halted
     if cause is not None and not order.while_stopped:
-        raise StoppedError(f"the arm has been stopped ({cause}): nothing was switched; while_stopped switches it still")
+        line = f"the arm has been stopped ({cause}): nothing was switched; while_stopped switches it still"
+        raise StoppedError(cause, line)
 
 
 def _process(robot: OwnedRobot) -> dict[str, object]:
@@ -124,7 +126,7 @@ def _reset(robot: OwnedRobot, order: Reset) -> str:
     except RequestRefusedError as error:
         if error.reason != Refusal.OTHER_STOP:
             raise
-        control.stop(robot.ended() or "stopped on the board by somebody else")
+        control.stop(robot.ended() or "on the board, by somebody else")
         raise SafetyError("another stop has come meanwhile, and holds: reset again") from error
     if (cause := robot.ended()) is not None:
         control.stop(cause)

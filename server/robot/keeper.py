@@ -18,8 +18,9 @@ log = logging.getLogger("server.robot")
 class Keeper:
     """A thread that keeps a robot connected. Connecting moves nothing and resumes nothing that was interrupted."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, delays: ReconnectDelay = DELAYS) -> None:
         self._robot = robot
+        self._delays = delays
         self._changed = threading.Condition()
         self._wanted = False
         self._closing = False
@@ -63,14 +64,14 @@ class Keeper:
             self._changed.notify_all()
 
     def _keep(self) -> None:
-        delays = DELAYS.delays()
+        delays = self._delays.delays()
         while True:
             with self._changed:
                 if self._closing:
                     return
                 missing = self._wanted and self._robot.connection == "disconnected"
                 if not missing:
-                    delays = DELAYS.delays()
+                    delays = self._delays.delays()
                     self._changed.wait()
                     continue
                 if self._changed.wait_for(lambda: self._closing or not self._wanted, next(delays)):

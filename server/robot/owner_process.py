@@ -8,10 +8,11 @@ import logging
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from server.owner.messages import REPORT, Answer, Close, Open, Order, Report
 
@@ -24,15 +25,21 @@ log = logging.getLogger("server.robot")
 class OwnerGoneError(DaqError):
     """The process that owned the port has ended before it answered."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 class OwnerProcess:
     """A running owner. `report` and `ended` are called on a thread of its own; `ended` once, last."""
 
-    def __init__(self, opening: Open, report: Callable[[Report], None], ended: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        opening: Open,
+        report: Callable[[Report], None],
+        ended: Callable[[str], None],
+        program: Sequence[str] = (sys.executable, "-m", "server.owner"),
+    ) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "server.owner"],
+            program,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C in the terminal is the service's to handle

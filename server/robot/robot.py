@@ -70,12 +70,15 @@ class Seen:
 class Robot:
     """A robot, and the process that owns its port while it is connected.
 
-    listeners are called with every report of that process, on its thread; they must not wait.
+    listeners are called with every report of that process, on its thread; they must not wait. start_owner: starts it
     """
 
-    def __init__(self, place: RobotPlace, clock: Clock) -> None:
+    def __init__(
+        self, place: RobotPlace, clock: Clock, start_owner: Callable[..., OwnerProcess] = OwnerProcess
+    ) -> None:
         self.place = place
         self.clock = clock
+        self._start_owner = start_owner
         self.listeners: list[Callable[[Report], None]] = []
         self.disconnected: list[Callable[[str], None]] = []
         self.reached: list[Callable[[Reach], None]] = []
@@ -217,7 +220,7 @@ class Robot:
             memory_map=place.memory_map,
         )
         try:
-            self._owner = OwnerProcess(opening, self._on_report, self._on_end)
+            self._owner = self._start_owner(opening, self._on_report, self._on_end)
             _notify_each(self.reached, self.reach())
         except OSError as error:  # no memory, or no file is left for another process
             self._problem = f"the robot's process cannot be started: {error.strerror or error}"

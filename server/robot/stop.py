@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 from daq.contracts.service.robot import StopResult
 from server.robot.robot import Robot
-from server.stopping.arm import stop_arm
+from server.stopping.arm import Reach, stop_arm
 
 STOPPERS = 4
 """Threads: one may wait for a process that does not answer, the next stop does not."""
@@ -17,8 +18,9 @@ STOPPERS = 4
 class StopService:
     """Stops one robot through the stop socket of the process that owns its port; through the port when nobody does."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, stop: Callable[[Reach], StopResult] = stop_arm) -> None:
         self._robot = robot
+        self._stop = stop
         self._threads = ThreadPoolExecutor(STOPPERS, thread_name_prefix="stop")
         ready = threading.Barrier(STOPPERS)
         # The threads are made now: the moment of a stop is no moment to ask the operating system for one.
@@ -31,7 +33,7 @@ class StopService:
 
     def stop_now(self) -> StopResult:
         """From any thread. Never raises: the result says what is known."""
-        result = stop_arm(self._robot.reach())
+        result = self._stop(self._robot.reach())
         if result.confirmed:
             self._robot.note_stop()
         return result

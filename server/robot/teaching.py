@@ -51,12 +51,22 @@ class Word:
 class TeachingService:
     """Teaching by a client that has control. Safe to use from any thread.
 
-    notify: called with one line when a teaching has ended
+    notify:          called with one line when a teaching has ended
+    ends_within:     s that what was told to finish may take
+    lead_ends_within: s that a lead may take
     """
 
-    def __init__(self, robot: Robot, notify: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        notify: Callable[[str], None],
+        ends_within: float = ANSWER_WITHIN,
+        lead_ends_within: float = LEAD_ENDS_WITHIN,
+    ) -> None:
         self._robot = robot
         self._notify = notify
+        self._ends_within = ends_within
+        self._lead_ends_within = lead_ends_within
         self._changed = threading.Condition(threading.RLock())
         self._numbers = itertools.count(1)
         self._lines: deque[TeachingLine] = deque(maxlen=LINES)
@@ -98,7 +108,7 @@ class TeachingService:
                 return
             self._robot.tell(Finish())
             leading = under_way[0] == "lead"
-            within = LEAD_ENDS_WITHIN if leading else ANSWER_WITHIN
+            within = self._lead_ends_within if leading else self._ends_within
             if not self._changed.wait_for(lambda: self._under_way is not under_way, within):
                 line = f"{under_way[0]} did not end within {within:g} s"
                 raise ProblemError(503, "not-reached", line, IF_A_LEAD_GOES_ON if leading else "stop the robot")

@@ -27,18 +27,19 @@ def stop_arm(reach: Reach) -> StopResult:
     begun = time.monotonic()
     answer = _ask(reach)
     if answer.confirmed:
-        text = f"stopped, confirmed by the board: set points frozen at tick {answer.tick}. {answer.text}".strip()
-    elif answer.delivered:
-        text = f"stop sent, NOT CONFIRMED by the board: {answer.text}. Use the emergency stop."
+        head = "stopped, confirmed by the board"
+        detail = f"set points frozen at tick {answer.tick}. {answer.text}".strip()
     else:
-        text = f"stop NOT DELIVERED: {answer.text}. Use the emergency stop."
+        head = "stop sent, NOT CONFIRMED by the board" if answer.delivered else "stop NOT DELIVERED"
+        detail = f"{answer.text}. Use the emergency stop."
     return StopResult(
         delivered=answer.delivered,
         confirmed=answer.confirmed,
         tick=answer.tick,
         seconds=time.monotonic() - begun,
         note=answer.text,
-        text=text,
+        detail=detail,
+        text=f"{head}: {detail}",
     )
 
 

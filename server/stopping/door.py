@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Callable, Mapping
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.transport import Terminal
 from server.access.caller import Caller
@@ -28,7 +29,7 @@ log = logging.getLogger("server.stop")
 class StopDoorError(DaqError):
     """The stop listener cannot be had: a service that only seems to have one does not start."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 class StopDoor:
@@ -38,10 +39,11 @@ class StopDoor:
     stopped:  called with every stop, on a thread of its own
     """
 
-    def __init__(self, listener: socket.socket, begin: Begin) -> None:
+    def __init__(self, listener: socket.socket, begin: Begin, begin_again_after: float = BEGIN_AGAIN_AFTER) -> None:
         self.stopped: Callable[[Stopped], None] = lambda _news: None
         self._listener = listener
         self._begin = begin
+        self._begin_again_after = begin_again_after
         self._lock = threading.Lock()
         self._owned: dict[str, Owned] = {}
         self._ready = threading.Event()
@@ -114,11 +116,11 @@ class StopDoor:
             self._process.stdin.close()
 
     def _listen(self) -> None:
-        after = BEGIN_AGAIN_AFTER
+        after = self._begin_again_after
         while True:
             self._hear_all()
             code = self._process.wait()
-            after = BEGIN_AGAIN_AFTER if self._ready.is_set() else min(2 * after, BEGIN_AGAIN_AT_MOST)
+            after = self._begin_again_after if self._ready.is_set() else min(2 * after, BEGIN_AGAIN_AT_MOST)
             self._ready.clear()
             with self._lock:
                 self._end_input()

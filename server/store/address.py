@@ -6,6 +6,7 @@ from sqlalchemy import Engine, create_engine
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, NoSuchModuleError
 
+from daq.contracts import exit_codes
 from daq.contracts.documents import shown
 from daq.contracts.errors import DaqError
 
@@ -17,7 +18,7 @@ PACKAGES = {"psycopg": "psycopg[binary]", "psycopg2": "psycopg2-binary", "MySQLd
 class StoreError(DaqError):
     """The database cannot be opened or brought up to date."""
 
-    exit_code = 2
+    exit_code = exit_codes.WRONG_INPUT
 
 
 def parse_address(url: str) -> URL:

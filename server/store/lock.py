@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from server.store.address import parse_address
 
@@ -14,7 +15,7 @@ from server.store.address import parse_address
 class InUseError(DaqError):
     """A service uses this database now."""
 
-    exit_code = 3
+    exit_code = exit_codes.NOT_REACHED
 
 
 def sqlite_file(url: str) -> Path | None:

@@ -28,8 +28,9 @@ class StoredProgram(Wire):
 class ProgramStore:
     """Programs of all robots."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, most: int = MOST_PROGRAMS) -> None:
         self._store = store
+        self._most = most
 
     def all(self, robot: str) -> tuple[ProgramEntry, ...]:
         """Those of a robot, the one changed last first."""
@@ -50,7 +51,7 @@ class ProgramStore:
         """Keeps a program under its own name; where that is another than `name`, the program `name` is renamed.
 
         `revision` is that which was changed, None for a new program. Raises a 409 when somebody else has changed it
-        meanwhile, when its new name is taken, or when there are MOST_PROGRAMS; a 404 when what was changed is gone.
+        meanwhile, when its new name is taken, or when there are as many as may be; a 404 when what was changed is gone.
         What is kept already in this very form is no change: an answer that was lost may be asked for again.
         """
         content = program.model_dump(mode="json")
@@ -62,7 +63,7 @@ class ProgramStore:
                 if there is not None:
                     raise _taken(program.name)
                 count = session.scalar(select(func.count()).select_from(ProgramRow).filter_by(robot=robot)) or 0
-                if count >= MOST_PROGRAMS:
+                if count >= self._most:
                     raise conflict("too-many-programs", f"there are {count} programs", "delete some of them first")
                 row = ProgramRow(robot=robot, revision=0)
                 session.add(row)

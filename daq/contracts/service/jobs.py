@@ -165,11 +165,24 @@ class ModelEntry(Wire):
     notes: str = ""
 
 
+class ParameterWords(Wire):
+    """A parameter as people write it. `joint`: the one that it, or its link, belongs to; None where it is not one."""
+
+    joint: int | None
+    group: str
+    """Whose it is: joint 2, link 1, load."""
+    short: str
+    """What it is, beneath its group: motor back-EMF constant."""
+    label: str
+    """Both: J2 motor back-EMF constant."""
+
+
 class ModelParameter(Wire):
     """A parameter of a model, in its unit. `deviation` is the standard deviation of the expected value; None where
     nothing is claimed."""
 
     name: str
+    words: ParameterWords
     unit: str
     value: float
     low: float | None

@@ -20,7 +20,7 @@ class QueueStatus(Wire):
 
     paused: bool
     reason: str
-    """Why it is paused; who resumed it, when it is not."""
+    """Why it is paused, as it stands behind "paused:"; who resumed it, when it is not."""
     since: AwareDatetime
     queued: int
     running: str | None = None

@@ -68,7 +68,7 @@ class RobotStatus(Wire):
     identity: RobotIdentity | None = None
     arm: ArmState
     cause: str = ""
-    """Why the arm is stopped, or at fault."""
+    """Why the arm is stopped or at fault, as it stands behind "stopped:" or "fault:"."""
     activity: Activity
     experiment: str | None = None
     limp: tuple[int, ...] = ()
@@ -101,6 +101,8 @@ class StopResult(Wire):
     """Time (s) from the request to this answer."""
     note: str = ""
     """What else is known: joints without drive, or why it was not confirmed."""
+    detail: str = ""
+    """What `text` says beyond whether the stop was delivered and confirmed, and what to do about it."""
     text: str
     """The whole result in one line."""
 

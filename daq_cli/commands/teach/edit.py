@@ -10,6 +10,7 @@ import typer
 from daq.contracts.errors import SafetyError, SpecError
 from daq_cli.app.context import JsonOption, invocation, print_json, printable
 from daq_cli.app.quantities import parse_angle, parse_per_joint_angles
+from firmware_protocol.invalid import first_invalid
 
 if TYPE_CHECKING:
     from daq.teaching.program import Instruction, Program
@@ -176,8 +177,8 @@ def _instruction(
     try:
         made: Instruction = TypeAdapter(Instruction).validate_python(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        raise SpecError(f"insert: {'.'.join(map(str, first['loc'][1:]))}: {first['msg']}") from error
+        first = first_invalid(error)
+        raise SpecError(f"insert: {'.'.join(map(str, first.place[1:]))}: {first.message}") from error
     return made
 
 

@@ -15,6 +15,7 @@ from daq_cli.app.context import JsonOption, YesOption
 from daq_cli.app.quantities import parse_angle, parse_per_joint_angles
 from daq_cli.commands.teach import edit, programs
 from daq_cli.robot.access import robot_of
+from firmware_protocol.invalid import first_invalid
 
 LONGEST_LEAD = 3600.0
 """Longest lead in s, because somebody has to hold the arm."""
@@ -85,9 +86,8 @@ def step(
     try:
         instruction: Instruction = kind(angles=angles, speed=parse_angle(speed, "speed"))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise SpecError(f"step: {where} = {first['input']:.5g} rad or rad/s: {first['msg']}") from error
+        first = first_invalid(error)
+        raise SpecError(f"step: {first.where()} = {first.value:.5g} rad or rad/s: {first.message}") from error
     program = Program(name="step", machine=robot.machine.name, instructions=(instruction,))
     print(robot.teaching(Consent(yes)).perform(program))
 
@@ -164,6 +164,6 @@ def play(
     try:
         path = RecordedPath.model_validate_json(read_text(file, f"path {file}"))
     except ValidationError as error:
-        raise SpecError(f"path {file}: {error.errors()[0]['msg']}") from error
+        raise SpecError(f"path {file}: {first_invalid(error).message}") from error
     spec = playback(path, rate, "playback")
     carry_out(robot_of(context), spec, RunOptions(folder, dry_run, yes, json))

@@ -129,7 +129,7 @@ def test_everything_comes_back_elsewhere_as_it_was(archive: Path, tmp_path: Path
     store.close()
 
 
-@pytest.mark.parametrize("before", [None, QueueState(False, "resumed", NOW), QueueState(True, "paused by anna", NOW)])
+@pytest.mark.parametrize("before", [None, QueueState(False, "resumed", NOW), QueueState(True, "by anna", NOW)])
 def test_the_queue_comes_back_paused(tmp_path: Path, before: QueueState | None) -> None:
     here, there, later = filled(tmp_path / "here"), places_in(tmp_path / "there"), NOW + timedelta(days=7)
     store = Store(here.url)
@@ -292,15 +292,11 @@ def test_a_restore_waits_for_no_service_that_runs(archive: Path, tmp_path: Path)
         pass
 
 
-def test_a_disk_that_fills_up_leaves_no_half_backup_and_no_half_restore(
-    archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("server.backup.write.RESERVE", 1 << 60)
+def test_a_disk_that_fills_up_leaves_no_half_backup_and_no_half_restore(archive: Path, tmp_path: Path) -> None:
     with pytest.raises(BackupError, match="are free, a backup needs"):
-        back_up(places_in(tmp_path / "here"), tmp_path / "second.zip", NOW, quietly)
-    monkeypatch.setattr("server.backup.restore.RESERVE", 1 << 60)
+        back_up(places_in(tmp_path / "here"), tmp_path / "second.zip", NOW, quietly, reserve=1 << 60)
     with pytest.raises(BackupError, match="are needed"):
-        restore(archive, places_in(tmp_path / "there"), NOW, quietly)
+        restore(archive, places_in(tmp_path / "there"), NOW, quietly, reserve=1 << 60)
     assert not (tmp_path / "second.zip").exists()
     assert everything(tmp_path / "there") == {}
     assert {path.name for path in tmp_path.iterdir()} == {"here", "there", "arm.zip"}
@@ -317,7 +313,7 @@ def daq(
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(service.folder)
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "configuration"))
-    return CommandLine(capsys, monkeypatch)
+    return CommandLine(capsys)
 
 
 def test_a_backup_of_a_running_service_is_brought_back_elsewhere(

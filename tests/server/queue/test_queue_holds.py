@@ -137,7 +137,7 @@ def test_a_stop_that_reaches_no_arm_holds_what_a_schedule_brings(bench: Bench) -
 
 @pytest.mark.parametrize("taken", [True, False])
 def test_what_nobody_had_seen_when_the_queue_was_resumed_holds_it_again(bench: Bench, taken: bool) -> None:
-    bench.queue.pause("paused by anna", "anna")
+    bench.queue.pause("by anna", "anna")
     bench.queue.stop_asked("anna")
     seen = bench.queue.notices.seen  # a request that waits for the queue
     bench.queue.stop_asked("bert")

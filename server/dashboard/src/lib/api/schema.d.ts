@@ -1514,6 +1514,10 @@ export interface components {
             signals: components["schemas"]["Overlay"][];
             /** Differences */
             differences: components["schemas"]["ParameterDifference"][];
+            /** Words */
+            words?: {
+                [key: string]: components["schemas"]["ParameterWords"];
+            };
         };
         /**
          * ComparisonJobResult
@@ -1833,6 +1837,10 @@ export interface components {
              */
             differences?: components["schemas"]["ParameterDifference"][];
             given?: components["schemas"]["GivenWhere"] | null;
+            /** Words */
+            words?: {
+                [key: string]: components["schemas"]["ParameterWords"];
+            };
         };
         /**
          * DiagnosisJobResult
@@ -2200,7 +2208,8 @@ export interface components {
         };
         /**
          * FitData
-         * @description A fit, and the models before and after it beside the traces.
+         * @description A fit, and the models before and after it beside the traces. `undetermined`: what the traces cannot tell, a
+         *     sentence each, with the parameters as people write them.
          */
         FitData: {
             /**
@@ -2239,6 +2248,11 @@ export interface components {
             models: components["schemas"]["ModelAgreement"][];
             /** Signals */
             signals: components["schemas"]["Overlay"][];
+            /**
+             * Undetermined
+             * @default []
+             */
+            undetermined?: string[];
         };
         /**
          * FitJobResult
@@ -3191,6 +3205,7 @@ export interface components {
         ModelParameter: {
             /** Name */
             name: string;
+            words: components["schemas"]["ParameterWords"];
             /** Unit */
             unit: string;
             /** Value */
@@ -3550,6 +3565,20 @@ export interface components {
             alone: number | null;
             /** Expected Deviation */
             expected_deviation: number | null;
+        };
+        /**
+         * ParameterWords
+         * @description A parameter as people write it. `joint`: the one that it, or its link, belongs to; None where it is not one.
+         */
+        ParameterWords: {
+            /** Joint */
+            joint: number | null;
+            /** Group */
+            group: string;
+            /** Short */
+            short: string;
+            /** Label */
+            label: string;
         };
         /**
          * Path
@@ -4661,6 +4690,11 @@ export interface components {
              * @default
              */
             note?: string;
+            /**
+             * Detail
+             * @default
+             */
+            detail?: string;
             /** Text */
             text: string;
         };
@@ -5067,6 +5101,10 @@ export interface components {
             three_sigma: components["schemas"]["Fidelity"];
             /** Time Domain */
             time_domain: components["schemas"]["TimeDomain"][];
+            /** Words */
+            words?: {
+                [key: string]: components["schemas"]["ParameterWords"];
+            };
         };
         /**
          * ValidationJobResult
