@@ -63,7 +63,7 @@ def read_text(path: Path, what: str) -> str:
             content = stream.read(LARGEST + 1)
     except OSError as error:
         raise SpecError(f"{what}: cannot be read: {error.strerror or error}") from error
-    except ValueError as error:  # a name with a NUL in it
+    except ValueError as error:  # the path contains a NUL
         raise SpecError(f"{what}: cannot be read: {error}") from error
     if len(content) > LARGEST:
         raise SpecError(f"{what}: cannot be read: it is larger than {LARGEST >> 20} MiB")

@@ -1,4 +1,4 @@
-"""What a process of this project ends with: one table for every program (docs/command-line.md explains each)."""
+"""Exit codes, the same for every program of this project (docs/command-line.md explains each)."""
 
 from __future__ import annotations
 
@@ -18,4 +18,4 @@ INTERRUPTED: Final = 130
 """What shells report for a process that Ctrl-C has ended."""
 
 OF_OUTCOME: Final[dict[str, int]] = {"complete": COMPLETE, "fault": FAULT, "interrupted": FAULT, "stopped": STOPPED}
-"""Exit code by the outcome of a run that left a trace."""
+"""Exit code for each outcome of a run that left a trace."""

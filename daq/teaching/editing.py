@@ -47,7 +47,7 @@ def move(program: Program, number: int, to: int) -> Program:
 def change(program: Program, number: int, fields: Mapping[str, Any]) -> Program:
     """The program with other values in instruction `number`; angles of joints that are not named stay.
 
-    Raises SpecError for a field that such an instruction has not, and for a value that is not allowed.
+    Raises SpecError for a field that such an instruction does not have, and for a value that is not allowed.
     """
     _require(program, number)
     old = program.instructions[number - 1]

@@ -27,8 +27,8 @@ from daq.traces.naming import trace_id_of
 from daq.traces.recording import software
 
 SIGNALS = ("set_point", "position", "drive", "velocity")
-"""Columns a joint may have, after which comes `_` and its number. `position` is needed, or `velocity` in its place: a
-position is then the integral of the speed, from 0."""
+"""Signals that a joint may have; a column is named by the signal, `_` and the joint's number. `position` is needed, or
+`velocity` in its place: the position is then the integral of the velocity, from 0."""
 
 INTEGRATED = "Positions are integrals of the measured speeds, from 0."
 """Note in a trace whose positions were integrated."""
@@ -62,7 +62,7 @@ def toml_path(path: Path) -> Path:
 
 
 def export_csv(trace: Trace, path: Path) -> Path:
-    """Write `time` and the signals that the trace has, and the TOML beside it. Numbers read back exactly.
+    """Writes `time` and the signals that the trace has, and the TOML beside it. Numbers read back exactly.
 
     The same trace gives the same bytes. Raises TraceError when a file cannot be written.
     """
@@ -162,7 +162,7 @@ def _joints(path: Path, header: list[str], beside: Beside) -> tuple[int, ...]:
 
 
 def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str], Floats, array[int]]:
-    """Header, numbers (rows, columns), all finite, and in which row of the file each stands. Raises TraceError."""
+    """Header, numbers (rows, columns), all finite, and the row of the file that each stands in. Raises TraceError."""
     try:
         rows = csv.reader(io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig", newline=""))
         header = [name.strip() for name in next(rows, [])]
@@ -192,7 +192,7 @@ def _check_header(path: Path, header: list[str]) -> None:
 def _numbers(
     path: Path, header: list[str], rows: Iterable[list[str]], limits: TraceLimits
 ) -> tuple[Floats, array[int]]:
-    """The numbers (rows, columns), all finite, and the row of the file of each: blank ones are left out.
+    """The numbers (rows, columns), all finite, and the row of the file of each; blank rows are left out.
 
     Raises TraceError.
     """
@@ -217,7 +217,7 @@ def _numbers(
 
 
 def _records_of_a_row(header: list[str]) -> int:
-    """Messages that a row becomes in a trace: one a joint, and one for all of them."""
+    """Number of messages that a row becomes in a trace: one per joint, and one for all of them."""
     return 1 + len({name.rpartition("_")[2] for name in header[1:]})
 
 

@@ -1,4 +1,4 @@
-"""From a specified motion to the set points of every control period. Pure: nothing here moves anything."""
+"""Turns a specified motion into set points for every control period. Pure: nothing here moves an arm."""
 
 from daq.trajectories.move import MOVE_SPEED, plan_move
 from daq.trajectories.planner import plan, start_angles

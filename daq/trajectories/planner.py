@@ -67,8 +67,8 @@ def plan(spec: ExperimentSpec, machine: Machine, start: Several[float]) -> Plan:
     """Set points of the whole experiment from `start` (rad, all joints of the machine): settle, motion, hold, and with
     repeats a slow way back between them.
 
-    Joints that the experiment does not move keep their posture. Nothing is checked here but that it can be written
-    down; `daq.safety.check_plan` says whether it may be carried out. Raises SpecError.
+    Joints that the experiment does not move keep their posture. The only check here is that it can be written
+    down as set points; `daq.safety.check_plan` says whether it may be carried out. Raises SpecError.
     """
     _require_joints(spec, machine)
     period = control_period(machine)
@@ -161,7 +161,7 @@ def _angles(given: Amplitude, joints: tuple[int, ...]) -> Floats:
 
 
 def _of_one_joint(piece: Piece, joints: tuple[int, ...]) -> Piece:
-    """The marks of one joint alone say so."""
+    """Names the joint in the marks of a piece that moves one joint only."""
     if len(joints) > 1:
         return piece
     return replace(piece, marks=tuple(replace(mark, joint=joints[0]) for mark in piece.marks))

@@ -13,7 +13,7 @@ from model.reports.units import squared
 
 
 def comparison_report(found: Comparison, differences: Sequence[ParameterDifference] = ()) -> Report:
-    """Models beside what was measured; `differences` between the parameters of two models."""
+    """The page of models beside the measurement; `differences` are between the parameters of two models."""
     labels = [m.label for m in found.models]
     sections = [
         Section("How large the error is", (agreement_table(found.models), _squared_errors(found.models))),

@@ -28,7 +28,7 @@ LITTLE = 0.9
 
 @dataclass(frozen=True)
 class PlannedExperiment:
-    """An experiment with its set points (k, joints of the machine), rad or m, one row a control period.
+    """An experiment with its set points (k, joints of the machine), rad or m, one row per control period.
 
     nats: information of this experiment and those before it; None where they have no order.
     """

@@ -76,7 +76,7 @@ def diagnosis_page(found: Diagnosis, comparison: Comparison | None = None) -> st
 
 
 def _nothing_added(found: Diagnosis, of: Compared) -> list[Section]:
-    """The ground of an answer in which no effect was added: the map, what was tried, and errors beside the noise."""
+    """The basis of an answer in which no effect was added: the map, what was tried, and errors beside the noise."""
     sections = []
     if not found.steps:
         if found.where is not None:

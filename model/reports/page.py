@@ -70,7 +70,7 @@ class Section:
 
     @property
     def anchor(self) -> str:
-        """Its name in links."""
+        """Its name in links within the page."""
         return "".join(c if c.isalnum() else "-" for c in self.title.lower())
 
 
@@ -113,7 +113,7 @@ def html(report: Report) -> str:
 
 
 def write_report(report: Report, path: Path) -> Path:
-    """Write the page. Returns `path`. Raises SpecError when it is not an .html file or cannot be written."""
+    """Writes the page. Returns `path`. Raises SpecError when it is not an .html file or cannot be written."""
     if path.suffix != ".html":
         raise SpecError(f"report {path}: is written as .html")
     try:

@@ -26,7 +26,7 @@ COLUMNS = (*_AS_IT_STANDS[:3], *list(_MADE)[:4], *_AS_IT_STANDS[3:5], *list(_MAD
 
 
 def as_csv(scores: Iterable[Score]) -> str:
-    """CSV with a line a case, in the order of their seeds; empty where a question does not arise."""
+    """CSV with one line per case, in the order of their seeds; empty where a question does not arise."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(COLUMNS)

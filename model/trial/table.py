@@ -18,7 +18,7 @@ class _Told(BaseModel):
 
 
 class Line(_Told):
-    """One line of the table: what, its rate, and what was to be reached (None: reported only)."""
+    """One line of the table: what it counts, the rate, and the rate to be reached (None: only reported)."""
 
     what: str
     rate: Rate

@@ -23,8 +23,8 @@ class _Told(BaseModel):
 
 
 class HiddenEffect(_Told):
-    """One hidden effect: the mock's name, the shared name (or `unknown_effect`), joints, parameters one set a joint
-    (one set without joints for an effect on the whole arm), strength 0 to 1 within its range of sizes."""
+    """One hidden effect: the mock's name, the shared name (or `unknown_effect`), joints, one set of parameters per
+    joint (one set without joints for an effect on the whole arm), strength 0 to 1 within its range of sizes."""
 
     effect: str
     known_as: str
@@ -38,7 +38,7 @@ class HiddenEffect(_Told):
 
 
 class Truth(_Told):
-    """An arm revealed. `deviations`: fractions of the data file's values, of the computing delay s."""
+    """An arm revealed. `deviations`: fractions of the data file's values; that of the computing delay in s."""
 
     seed: int
     kind: Kind
