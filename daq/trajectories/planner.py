@@ -37,7 +37,7 @@ from daq.trajectories.pick_and_place import pick_and_place
 from daq.trajectories.piece import Piece, smooth_piece
 from daq.trajectories.ramp import ramp
 from daq.trajectories.sequence import join_pieces, spread
-from daq.trajectories.set_points import Mark, Plan, control_period, make_plan, snapped
+from daq.trajectories.set_points import Mark, Plan, control_period, make_plan, representable_angles
 from daq.trajectories.sine import sine
 from daq.trajectories.slow_ramp import slow_ramp
 from daq.trajectories.staircase import staircase
@@ -72,7 +72,7 @@ def plan(spec: ExperimentSpec, machine: Machine, start: Several[float]) -> Plan:
     """
     _require_joints(spec, machine)
     period = control_period(machine)
-    begin = snapped(machine, start)
+    begin = representable_angles(machine, start)
     columns = [joint - 1 for joint in spec.joints]
     unit = np.array([abs(machine.calibration(joint).rad_per_posture_unit) for joint in spec.joints])
     if isinstance(spec.trajectory, PickAndPlace):

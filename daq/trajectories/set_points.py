@@ -152,7 +152,7 @@ def postures_of(machine: Machine, joint: int, angles: Floats) -> Integers:
     return np.floor(units + 0.5).astype(np.int64)
 
 
-def snapped(machine: Machine, angles: Sequence[float]) -> Floats:
+def representable_angles(machine: Machine, angles: Sequence[float]) -> Floats:
     """The angles (rad) of the postures nearest to `angles`, one per joint: what set points can represent.
 
     A reading in the last fraction of the range counts as posture 999, as on the wire. Raises SpecError for a wrong

@@ -48,8 +48,8 @@ class JointScale:
 Size = float | Callable[[JointScale], float]
 
 
-def sized(size: Size, scale: JointScale) -> float:
-    """The value of a size that is a number, or follows from the joint."""
+def evaluate_size(size: Size, scale: JointScale) -> float:
+    """The value of a size: a number, or a function of the joint."""
     return size(scale) if callable(size) else size
 
 
@@ -82,7 +82,7 @@ class EffectParameter:
         chosen = self.null if self.start is None else self.start
         if chosen is None:
             raise ValueError(f"effect parameter {self.name} has neither a null nor a starting value")
-        return sized(chosen, scale)
+        return evaluate_size(chosen, scale)
 
 
 class EffectFile(BaseModel):

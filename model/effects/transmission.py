@@ -22,7 +22,7 @@ def contact_compliance(scale: JointScale) -> float:
     return 1.0 / (CONTACT_RATE**2 * scale.inertia)
 
 
-def _give(scale: JointScale) -> float:
+def _noticeable_compliance(scale: JointScale) -> float:
     """Compliance at which a joint yields by two counts under a twentieth of its rated torque."""
     return 2 * scale.resolution / (0.05 * scale.torque)
 
@@ -85,8 +85,8 @@ TRANSMISSION = (
                 null=None,
                 start=contact_compliance,
                 low=contact_compliance,
-                high=lambda s: contact_compliance(s) + 10 * _give(s),
-                deviation=_give,
+                high=lambda s: contact_compliance(s) + 10 * _noticeable_compliance(s),
+                deviation=_noticeable_compliance,
             ),
         ),
         flag=at.HAS_FLEXIBILITY,

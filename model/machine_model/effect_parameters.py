@@ -7,7 +7,7 @@ from dataclasses import replace
 from daq.contracts.machine import Friction, Machine
 from daq.contracts.quantity import Quantity
 from model import layout as at
-from model.effects.effect import Effect, EffectParameter, JointScale, sized
+from model.effects.effect import Effect, EffectParameter, JointScale, evaluate_size
 from model.effects.library import effect
 from model.machine_model.nominal import joint_scale
 from model.machine_model.parameter import Kind, Parameter
@@ -49,10 +49,10 @@ def _parameter(kind: Effect, p: EffectParameter, scale: JointScale, place: str) 
         unit=p.unit,
         value=p.starting_value(scale),
         source=p.source or kind.source,
-        low=sized(p.low, scale),
-        high=sized(p.high, scale),
-        null=None if p.null is None else sized(p.null, scale),
-        deviation=sized(p.deviation, scale),
+        low=evaluate_size(p.low, scale),
+        high=evaluate_size(p.high, scale),
+        null=None if p.null is None else evaluate_size(p.null, scale),
+        deviation=evaluate_size(p.deviation, scale),
         effect=kind.name,
     )
 

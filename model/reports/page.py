@@ -129,6 +129,6 @@ def listed(names: Sequence[str], most: int = 6) -> str:
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
 
 
-def spoken(effects: Sequence[str]) -> str:
-    """Effects in words."""
+def effect_list(effects: Sequence[str]) -> str:
+    """Names of effects, as a sentence lists them."""
     return ", ".join(effect_name(e) for e in effects) or "no effects"
