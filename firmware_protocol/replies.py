@@ -147,7 +147,7 @@ class ErrorsPositionsPowers(Reply):
 
 @dataclass(frozen=True)
 class Snapshot(Reply):
-    """One period of the controller, consistent over joints: the set points it took, what it measured and put out.
+    """One period of the controller, consistent over joints: the set points it took, its measurements and its outputs.
 
     A new set point has been missed when it differs from what was sent; then position + error shows the old one.
     """

@@ -1,4 +1,4 @@
-"""Where every number of a model lies in the flat vector that compiled code reads.
+"""The place of every number of a model in the flat vector that compiled code reads.
 
 The vector is `SHARED` numbers of the whole machine, then `PER_JOINT` numbers per joint. Every effect of the library has
 its place; an effect that is not in a model lies at its null value there, where it does nothing.

@@ -8,7 +8,7 @@ COMPLETE: Final = 0
 PROGRAM_FAULT: Final = 1
 WRONG_INPUT: Final = 2
 NOT_REACHED: Final = 3
-"""The robot or the service was not reached, or did not confirm what it was asked."""
+"""The robot or the service was not reached, or did not confirm the request."""
 REFUSED: Final = 4
 """Refused for safety; nothing moved."""
 FAULT: Final = 5

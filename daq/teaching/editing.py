@@ -72,7 +72,7 @@ def new_violations(before: Program, after: Program, machine: Machine) -> list[st
     """Violations of the edited program that the program before did not have, planned from the machine's rest posture.
 
     A program that could not be planned before either (of another machine, or outside the sensors' ranges) is let
-    through: it may take several edits to mend. Raises SpecError where it cannot be planned any more, and for a machine
+    through: repairing it may take several edits. Raises SpecError where it can no longer be planned, and for a machine
     that has no rest posture.
     """
     if machine.rest_posture is None:

@@ -13,7 +13,7 @@ from daq.contracts.errors import TraceError
 
 
 def open_regular(path: Path) -> IO[bytes]:
-    """A file to read. Raises OSError, also for what is no file: opening a pipe would wait for its writer."""
+    """Opens a regular file to read. Raises OSError, also for a pipe, whose opening would wait for its writer."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISREG(mode):

@@ -1,6 +1,6 @@
 """Walks through the records of an MCAP file that may end anywhere, be damaged anywhere, or be made to do harm.
 
-mcap's own StreamReader reads the same records, but takes what is left of a cut record for the whole of it, and parses
+mcap's own StreamReader reads the same records, but takes the rest of a cut record for a whole one, and parses
 the index of every message, which costs more than all the rest of opening a trace.
 """
 

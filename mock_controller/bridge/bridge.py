@@ -191,7 +191,7 @@ class Bridge:
         return replies
 
     def _understood(self, frame: Frame) -> Request | Refusal:
-        """The request in a frame, or what is wrong with the frame itself, whatever the session."""
+        """The request in a frame, or the refusal for a fault of the frame itself, whatever the session."""
         if frame.opcode in self._incapable:
             return Refusal.NOT_CAPABLE
         try:

@@ -56,7 +56,7 @@ def dependencies(module: str, root: Path = _ROOT) -> dict[str, Path]:
 def source_hash(module: str, root: Path = _ROOT) -> str:
     """Hash of the sources that a module reaches, names included, as 16 hexadecimal digits.
 
-    For a module from elsewhere, a user's own: of its file, where it has been imported, and of all of `model`.
+    For a module outside the project, such as a user's own: hash of its file, if it is imported, and of all of `model`.
     """
     sources = dependencies(module, root)
     if not sources:

@@ -61,8 +61,10 @@ def arms(numbers: Sequence[int], kinds: Sequence[str], loads: Sequence[str] = LO
 
 
 def sample_arms(seeds: Sequence[int], count: int) -> list[int]:
-    """At most `count` of the seeds, kinds and loads mixed: those whose SHA-256 comes first. A larger sample contains the
-    smaller ones."""
+    """At most `count` of the seeds, kinds and loads mixed: those whose SHA-256 comes first.
+
+    A larger sample contains the smaller ones.
+    """
     return sorted(dict.fromkeys(seeds), key=lambda seed: sha256(str(seed).encode()).digest())[:count]
 
 

@@ -187,7 +187,7 @@ class ModelDetails(Wire):
 
 
 class ModelChange(Wire):
-    """A new name or notes; what is None stays."""
+    """A new name or notes; a field that is None stays unchanged."""
 
     name: ModelName | None = None
     notes: Annotated[str, Field(max_length=10000)] | None = None

@@ -52,7 +52,7 @@ class TraceDetails(Wire):
 
 
 class TraceChange(Wire):
-    """New tags or notes; what is None stays."""
+    """New tags or notes; a field that is None stays unchanged."""
 
     tags: Annotated[tuple[Tag, ...], Field(max_length=50)] | None = None
     notes: Annotated[str, Field(max_length=10000)] | None = None

@@ -3115,7 +3115,7 @@ export interface components {
         };
         /**
          * ModelChange
-         * @description A new name or notes; what is None stays.
+         * @description A new name or notes; a field that is None stays unchanged.
          */
         ModelChange: {
             /** Name */
@@ -4864,7 +4864,7 @@ export interface components {
         };
         /**
          * TraceChange
-         * @description New tags or notes; what is None stays.
+         * @description New tags or notes; a field that is None stays unchanged.
          */
         TraceChange: {
             /** Tags */
