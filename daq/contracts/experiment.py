@@ -261,7 +261,7 @@ def parse_spec(data: object, origin: str = "experiment") -> ExperimentSpec:
 
 
 def _one_line(error: ValidationError) -> str:
-    """The error as one line: the field, what is allowed, what was given; angles in degrees, as people type them."""
+    """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
     first = error.errors()[0]
     where, value = [str(part) for part in first["loc"]], first["input"]
     # Pydantic's names for the branches of a union mean nothing to a user.

@@ -20,7 +20,7 @@ def effect_on(effect: str, joints: Sequence[int]) -> str:
     return f"{effect_name(effect)} on {joints_in_words(joints)}" if joints else effect_name(effect)
 
 
-def effect_label(effect: str, joints: Sequence[int]) -> str:
+def placed(effect: str, joints: Sequence[int]) -> str:
     """An effect in a list: Coulomb friction, joint 2. Of the whole machine, the effect alone."""
     if not joints:
         return effect_name(effect)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.discrepancy.diagnosis import Candidate, RemainingShape, SignalError, in_order
-from model.effects.names import effect_label
+from model.effects.names import placed
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels
 from model.reports.numbers import whole
 from model.reports.page import Picture
@@ -63,7 +63,7 @@ def evidence_picture(
                 style="italic",
                 color=QUIET,
             )
-        axes.set_yticks(places, [effect_label(c.effect, c.joints) for c in (*fitted, *probed)])
+        axes.set_yticks(places, [placed(c.effect, c.joints) for c in (*fitted, *probed)])
         axes.set_ylim((places[-1] if places else 0) - 0.6, 0.6)
         if needed is not None:
             axes.axvline(needed, color=INK, lw=0.8, ls=(0, (4, 2)))

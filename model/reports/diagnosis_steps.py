@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from model.discrepancy.diagnosis import Candidate, Dependence, FoundValue, SignalError, Step, Where
-from model.effects.names import capitalised, effect_label
+from model.effects.names import capitalised, placed
 from model.reports.diagnosis_map import dependence_picture, map_picture
 from model.reports.diagnosis_pictures import error_picture, evidence_picture
 from model.reports.diagnosis_words import Compared, distortion, gap, gone
@@ -82,7 +82,7 @@ def _what(step: Step, before: Sequence[Step]) -> tuple[Block, ...]:
     if candidates and step.proof is None:
         blocks.append(evidence_picture(candidates, chosen))
     if step.group:
-        names = "; ".join(effect_label(c.effect, c.joints) for c in step.group)
+        names = "; ".join(placed(c.effect, c.joints) for c in step.group)
         blocks.append(Text(f"These traces cannot tell apart: {names}.", "warning"))
     return tuple(blocks)
 

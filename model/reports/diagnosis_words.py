@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from model.discrepancy.diagnosis import Diagnosis, FoundValue, SignalError, Step
 from model.discrepancy.explanation.effect_words import words_of
-from model.effects.names import capitalised, effect_label
+from model.effects.names import capitalised, placed
 from model.reports.numbers import estimate
 from model.reports.units import shown_unit, with_unit
 
@@ -65,12 +65,12 @@ def headline(found: Diagnosis) -> str:
 
 def _finding(step: Step) -> str:
     if step.group:
-        return "one of: " + " or ".join(effect_label(c.effect, c.joints) for c in step.group)
+        return "one of: " + " or ".join(placed(c.effect, c.joints) for c in step.group)
     if step.effect is None:
         return "an effect without a name"
     size = words_of(step.effect).size
     values = [v for name, v in step.parameters.items() if size is not None and name.rsplit(".", 1)[-1] == size]
-    return ", ".join([effect_label(step.effect, step.joints), *(_size(v) for v in values)])
+    return ", ".join([placed(step.effect, step.joints), *(_size(v) for v in values)])
 
 
 def _size(v: FoundValue) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from model.effects.names import effect_label
+from model.effects.names import placed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,7 +53,7 @@ def of_diagnosis(found: Diagnosis) -> str:
 
 
 def _named(one: Step | Candidate) -> str:
-    return effect_label(one.effect or "", one.joints)
+    return placed(one.effect or "", one.joints)
 
 
 def _error(joints: Sequence[JointAgreement]) -> str:

@@ -48,7 +48,7 @@ class Control(Wire):
 
 
 class ControlRequest(Wire):
-    """Asks for the control of the robot. A real arm needs the operator's consent: `moves_real_arm`."""
+    """Requests control of the robot. A real arm needs the operator's consent: `moves_real_arm`."""
 
     moves_real_arm: StrictBool = False
 

@@ -1566,7 +1566,7 @@ export interface components {
         };
         /**
          * ControlRequest
-         * @description Asks for the control of the robot. A real arm needs the operator's consent: `moves_real_arm`.
+         * @description Requests control of the robot. A real arm needs the operator's consent: `moves_real_arm`.
          */
         ControlRequest: {
             /**
