@@ -139,7 +139,7 @@ def _parser() -> argparse.ArgumentParser:
         default=None,
         help="board time moves only when the host asks; runs repeat to the bit",
     )
-    time.add_argument("--baud", type=int, metavar="N", help="bytes take their time on a line of N baud (off)")
+    time.add_argument("--baud", type=int, metavar="N", help="bytes take as long as on a line of N baud (off)")
     time.add_argument(
         "--no-sample",
         dest="sample",
@@ -149,7 +149,7 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     machine = parser.add_argument_group("the machine")
-    machine.add_argument("--seed", type=int, metavar="N", help="of everything random (0)")
+    machine.add_argument("--seed", type=int, metavar="N", help="seed of all random numbers (0)")
     machine.add_argument("--start", type=_numbers, metavar="P1,…,P6", help="start posture, six posture units 0-999")
     machine.add_argument("--gains", type=_numbers, metavar="P,I,D", help="default gains of all joints, 0-20 (2,0,0)")
     machine.add_argument("--memory-map", type=Path, metavar="FILE", help="another memory map (TOML)")
@@ -162,7 +162,7 @@ def _parser() -> argparse.ArgumentParser:
         "--secret",
         type=int,
         metavar="SEED",
-        help="an arm with tolerances and hidden effects that nobody is told; python -m mock_controller.reveal SEED is",
+        help="an arm with secret tolerances and effects; python -m mock_controller.reveal SEED shows them",
     )
 
     parser.add_argument("--fault", action="append", metavar="NAME:KEY=VALUE,…", help="a fault; may be repeated")

@@ -1,4 +1,4 @@
-"""Names for the types of arrays, with the shape said where they are used."""
+"""Types of arrays; their shapes are stated where they are used."""
 
 from __future__ import annotations
 

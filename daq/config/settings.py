@@ -132,7 +132,7 @@ def _parse(path: Path) -> Settings:
     data = parse_toml(read_text(path, what), what)
     server = data.get("server")
     given = server.get("unattended") if isinstance(server, dict) else None
-    if isinstance(given, str):  # text is allowed from the environment only, which has nothing else
+    if isinstance(given, str):  # only the environment, which holds nothing but text, may give text
         raise SpecError(f"{what}: server.unattended = {shown(given)}: must be true or false, without quotation marks")
     return _validated(data, str(path))
 
@@ -156,7 +156,7 @@ def _validated(data: dict[str, Any], origin: str) -> Settings:
 
 
 def _variable_of(where: tuple[int | str, ...]) -> str | None:
-    """The environment variable that a value came from, since that goes before the file; None where there is none."""
+    """The environment variable that overrides the file at this key; None where there is none."""
     name = "DAQ_" + "__".join(str(part) for part in where).upper()
     found = next((one for one in os.environ if one.upper() == name != SERVER_VARIABLE), None)
     return None if found is None else f"environment {found}"

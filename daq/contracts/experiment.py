@@ -36,7 +36,7 @@ GainValue = Annotated[int, Field(ge=0, le=20)]
 Gain = tuple[GainValue, GainValue, GainValue]
 """P, I, D of one joint, each 0–20 (section 6.2)."""
 Amplitude = Angle | dict[JointNumber, Angle]
-"""One value for all joints of the experiment, or one a joint."""
+"""One value for all joints of the experiment, or one per joint."""
 
 
 class _Part(BaseModel):
@@ -116,8 +116,8 @@ class Cubic(_Part):
 class Via(_Part):
     """Cubic segments through via points to the last one, at rest at both ends (section 3.7.1).
 
-    `points` are angles (rad) from the start, one for all joints or one a joint; `times` (s) from the start when each is
-    passed, the last being the end. Position, velocity and acceleration are continuous.
+    `points` are angles (rad) from the start, one for all joints or one per joint; `times` (s) count from there, and the
+    last is the end. Position, velocity and acceleration are continuous.
     """
 
     kind: Literal["via"] = "via"
@@ -157,7 +157,7 @@ class Path(_Part):
     kind: Literal["path"] = "path"
     times: Annotated[tuple[FiniteFloat, ...], Field(min_length=2, max_length=MOST_POINTS)]
     positions: Annotated[tuple[tuple[Angle, ...], ...], Field(min_length=2, max_length=MOST_POINTS)]
-    """One row a time, one column a joint."""
+    """One row per time, one column per joint."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -245,7 +245,7 @@ class ExperimentSpec(_Part):
 
 @dataclass(frozen=True)
 class OfferedExperiment:
-    """An experiment that a diagnosis may ask for. general: whether it is made for effects of every kind."""
+    """An experiment that a diagnosis may ask for. `general`: whether it suits effects of every kind."""
 
     name: str
     description: str
@@ -283,7 +283,7 @@ def _one_line(error: ValidationError) -> str:
 
 
 def _fits_a_float(value: object) -> bool:
-    """Whether it is a number that can be converted to degrees; whole numbers may be larger than any float."""
+    """Whether the value is a number that can be converted to degrees; whole numbers may be larger than any float."""
     return isinstance(value, int | float) and abs(value) <= sys.float_info.max
 
 

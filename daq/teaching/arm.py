@@ -34,8 +34,8 @@ class TeachableArm(Protocol):
         ...
 
     def driven(self) -> AbstractContextManager[None]:
-        """Only within it are set points taken. Leaving it is the end of the work, unless it has been stopped; whatever
-        else ends it freezes the arm before anything else is done."""
+        """Set points are taken only within this context. Leaving it ends the work, unless the arm has been stopped; an
+        exception freezes the arm before anything else is done."""
         ...
 
     def next_sample(self) -> SampleRow:

@@ -75,7 +75,10 @@ def signals_of(start: dict[str, str], origin: str) -> frozenset[str]:
 
 
 def extent_of(end: dict[str, str], origin: str) -> tuple[int, float]:
-    """Number of samples, and s between the first and the last, as its end tells. Raises TraceError."""
+    """Number of samples, and time (s) between the first and the last, as the trace's end states them.
+
+    Raises TraceError.
+    """
     try:
         samples, duration = int(end["samples"][:_SHOWN]), float(end["duration"][:_SHOWN])
     except (KeyError, ValueError) as error:

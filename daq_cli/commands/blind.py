@@ -91,10 +91,10 @@ def _asked_for(context: typer.Context, option: str) -> bool:
 
 
 def _chosen(seeds: str, kinds: str, loads: str, cases: int | None) -> list[int]:
-    from model.trial.arms import KINDS, LOADS, arms, parse_choice, parse_numbers, some_of
+    from model.trial.arms import KINDS, LOADS, arms, parse_choice, parse_numbers, sample_arms
 
     found = arms(parse_numbers(seeds), parse_choice(kinds, KINDS, "kind"), parse_choice(loads, LOADS, "load"))
-    return found if cases is None else some_of(found, cases)
+    return found if cases is None else sample_arms(found, cases)
 
 
 def _registered(path: Path, run: str) -> tuple[list[int], Literal["diagnostic", "ramp"], bool, dict[str, str]]:

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 class TraceSignals:
     """One trace beside its simulations.
 
-    time (m,) s; measured, set_point (or None) and each of `simulated` (m, n) in `units`, one column a joint.
+    time (m,) s; measured, set_point (or None) and each of `simulated` (m, n) in `units`, one column per joint.
     """
 
     trace: str
@@ -55,7 +55,7 @@ def compare(
     progress: Progress = silent,
     cancel: Cancel | None = None,
 ) -> Comparison:
-    """Simulate every trace with every model, driven by the controller or by the recorded drive.
+    """Simulates every trace with every model, driven by the controller or by the recorded drive.
 
     Args:
         models: labels and models, all of the same machine's joints. held_out: identities of traces not fitted to;

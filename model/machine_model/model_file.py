@@ -14,7 +14,7 @@ from model.machine_model.model import MODEL_FORMAT, Model
 
 
 def save_model(model: Model, path: Path) -> Path:
-    """Write a model. Returns `path`. Raises SpecError when the file cannot be written."""
+    """Writes a model. Returns `path`. Raises SpecError when the file cannot be written."""
     try:
         path.write_text(model.model_dump_json(indent=1) + "\n", "utf-8")
     except OSError as error:

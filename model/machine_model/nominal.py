@@ -22,7 +22,7 @@ NO_LIMIT = 1e9
 SENSOR_COUNTS = 4096
 DAC_COUNTS = 127
 PRESLIDING_COUNTS = 0.5
-"""Distance, in counts of the sensor, over which friction builds up: an assumption, below what the sensor resolves."""
+"""Distance, in counts of the sensor, over which friction builds up: an assumption, below the sensor's resolution."""
 
 
 def parameter(
@@ -198,7 +198,7 @@ def _radius(joint: Joint) -> float:
 
 
 def _transmission_inertia(machine: Machine, number: int) -> float:
-    """Rotor and link in series (kg·m²), the link at the least that it shows: its own bodies, folded."""
+    """Inertia of rotor and link in series (kg·m²), with the link's least inertia: its own bodies, the arm folded."""
     joint = machine.joint(number)
     link = joint.link
     own = link.mass.value

@@ -1,4 +1,4 @@
-"""A number of a model and what it is: kind, joints, effect and part, unit, bounds, and where it lies."""
+"""A parameter of a model: its kind, joints, effect and part, unit and bounds, and its place in the vector."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Kind(StrEnum):
     PRESLIDING_SHAPE = "presliding shape"
     """Shape of that rise, from 0 (Prandtl) to 1 (Dahl)."""
     INITIAL_POSITION = "initial position"
-    """Where a joint starts: how far off the posture that was read."""
+    """Where a joint starts, relative to the posture that was read."""
     INITIAL_VELOCITY = "initial velocity"
-    """How fast a joint starts: beyond the speed that was read."""
+    """How fast a joint starts, relative to the speed that was read."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,7 +38,7 @@ class _Part(BaseModel):
 
 
 class ControlCase(_Part):
-    """One run. Angles in rad, one series a joint.
+    """One run. Angles in rad, one series per joint.
 
     `back_emf`: whether the law compensates the back-EMF with its own table's constants or with the plant's.
     `amplitude_ratio` is the swing of the position over that of the wanted motion in the first period and in the last;
@@ -84,7 +84,7 @@ class _Run:
 
 
 def control_chapter(progress: Progress = silent, cancel: Cancel | None = None) -> ControlChapter:
-    """Run all of chapter 8. Raises CancelledError when cancelled."""
+    """Runs all of chapter 8. Raises CancelledError when cancelled."""
     cancel = cancel or Never()
     plant = VISCOUS_AND_COULOMB.arm()
     wanted = wanted_motion()

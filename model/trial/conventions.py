@@ -1,4 +1,4 @@
-"""The mock's parameters in the conventions of the model, so that stated intervals can be held against the truth.
+"""Converts the mock's parameters to the model's conventions, so that stated intervals can be compared with the truth.
 
 The two were written independently: they measure the same quantity from different zeros, with other signs or on the
 other side of a gear. `TRANSLATIONS` says how, effect by effect; `LEFT_OUT` lists what has no counterpart, and why.

@@ -76,7 +76,7 @@ class Registration(_Part):
         return drawn_arms(commit, self.run(name).cases, self.loads)
 
     def check_code(self, hashes: dict[str, str], versions: dict[str, str], origin: str) -> None:
-        """Raises SpecError when something of the code at hand is not registered, or not as it was registered.
+        """Raises SpecError when part of the present code is not registered, or differs from what was registered.
 
         Args:
             hashes, versions: of all that decides the outcome, as they are found. origin: the file, for the message.

@@ -38,7 +38,7 @@ class Covered(_Scored):
 
 
 class Score(_Scored):
-    """What an answer is worth. None means that the question does not arise for this case.
+    """The score of one answer. None means that the question does not arise for this case.
 
     `named_right`: every effect that was there was named, and no other. `merged_right`: the same with all friction kinds
     as one, for which a group of friction kinds alone is that one name. `in_first`: the effect is among the
@@ -59,7 +59,7 @@ class Score(_Scored):
     """None where the diagnosis failed."""
     place: Place
     answered: tuple[str, ...]
-    """Names that were given; of a group, all in it."""
+    """Names in the answer; of a group, all of them."""
     named_right: bool | None = None
     merged_right: bool | None = None
     in_answer: bool | None = None
@@ -70,16 +70,16 @@ class Score(_Scored):
     alarm: bool | None = None
     honest: bool | None = None
     excess_removed: float | None = None
-    """Of the held-out excess that was there once the tolerance parameters were fitted: what the effects brought."""
+    """Share of the held-out excess after tolerance fits that was removed: the contribution of the effects."""
     excess_removed_whole: float | None = None
-    """Of that of the model as it was given: what the whole diagnosis brought."""
+    """Share of the held-out excess of the given model that was removed: the contribution of the whole diagnosis."""
     covered: tuple[Covered, ...] = ()
     seconds: float
     robot_seconds: float
 
 
 def score(truth: Truth, seen: Detectability, answer: Diagnosis, machine: Machine) -> Score:
-    """Score an answer. `machine`: with the load that was announced."""
+    """Scores an answer. `machine`: with the load that was announced."""
     names = tuple(effect.known_as for effect in truth.effects)
     named, group = named_effects(answer), group_of(answer)
     common = {

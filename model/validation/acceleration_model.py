@@ -1,4 +1,4 @@
-"""Accelerations that a model expects along a measured motion, and their exact derivatives by its parameters.
+"""Accelerations that a model expects along a measured motion, and their exact parameter derivatives.
 
 The right-hand side of the equations of motion, f of (4.1), evaluated at the measured state and the recorded drive. With
 positions as outputs C·J_a of (4.19) is zero, since rates of position contain no parameters; accelerations contain them.
@@ -68,7 +68,7 @@ class _Numbers(NamedTuple):
 
 
 def expected_accelerations(model: Model, motion: MeasuredMotion, names: Sequence[str]) -> tuple[Floats, Floats]:
-    """Accelerations f (k, n) and their derivatives (p, k, n) by the named parameters.
+    """Accelerations f (k, n) and their derivatives (p, k, n) with respect to the named parameters.
 
     Raises:
         SpecError: for a model with a flexible transmission, whose rotor is not measured, or an unknown parameter.

@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 SEARCH_DEVIATIONS = 50.0
 """Largest change that is tried, in expected deviations; a parameter that needs more adds less than 0.0003 to Σλ²."""
 CURVE_REACH = 1.5
-"""A curve reaches this many doubling changes to either side (expected deviations where no change doubles)."""
+"""Reach of an error curve to either side, in doubling changes (in expected deviations where no change doubles)."""
 MINIMUM_TOLERANCE = 0.98
 """Share of the error at the given parameters; a smaller error elsewhere shows that they are not the minimum."""
 

@@ -25,7 +25,7 @@ NOISE_SHARE = 0.05
 MOVING = 4.0
 """Speed above which a joint counts as moving, in standard deviations of the speed's noise."""
 FINE = 8
-"""Points a control period at which friction's change of direction is looked for."""
+"""Points per control period at which friction's change of direction is looked for."""
 SHORTEST = 12
 """Least number of samples of a trace."""
 
@@ -97,7 +97,7 @@ def position_noise(model: Model) -> Floats:
 def _friction_deflection(model: Model, measured: Floats) -> Floats:
     """Deflection of the friction contact (k, n) that follows the motion from rest, averaged as accelerations are.
 
-    Motion between samples is interpolated: friction changes sign within a period, and the moment matters.
+    Motion between samples is interpolated: friction changes sign within a period, and its moment matters.
     """
     presliding = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)[:, at.PRESLIDING]
     count = len(measured)

@@ -1,4 +1,4 @@
-"""The noise floor of the time-domain form: the residual that is left of a record made by the model itself, rad/s².
+"""The noise floor of the time-domain form: the residual (rad/s²) that remains for records made by the model itself.
 
 Three causes add up, and only the first follows from a formula. (1) Noise and rounding of the readings are amplified by
 differentiation and by the model's dependence on speed (`measured_motion.observe`). (2) Between two samples the drive
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 FEWEST, MOST = 12, 40
 """Least and largest number of replicas of a record."""
 SECONDS = 400.0
-"""s of motion that the replicas of a record have together: in a short record friction changes sign only a few times."""
+"""Total length of motion (s) of a record's replicas: in a short record friction changes sign only a few times."""
 SEED = 1991
 
 

@@ -1,4 +1,4 @@
-"""What a variation may depend on (position, speed, direction, load and so on of a joint), and how strongly it does."""
+"""Quantities that a variation may depend on (a joint's position, speed, load and so on), and how strongly it does."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class _Solution:
 def vary_in_time(model: Model, trace: Trace, names: Sequence[str]) -> TimeDomain:
     """How the named parameters would have to vary with time for the model to explain a trace.
 
-    At each sample J_a α = q̈ − f is solved for the least α in units of expected deviations, as far as noise allows
+    At each sample J_a α = q̈ − f is solved for the least α in units of expected deviations, regularised by noise
     (a Bayes estimate: α ~ N(0, τ′²), and the noise floor of `noise_floor`). Rounding of the drive, motion
     between samples and the delay are accounted for; a rotor's current, heat and sensors' errors are not varied.
 

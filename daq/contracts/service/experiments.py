@@ -18,12 +18,12 @@ ENDS: frozenset[ExperimentState] = frozenset({"done", "failed", "cancelled", "in
 """States that nothing leaves; those of jobs too."""
 
 ExperimentOrder = Literal["submitted", "ended"]
-"""Of a list: submitted last first, or, of those that have ended, ended last first."""
+"""Order of a list: by submission, newest first; or only those that have ended, by their end, newest first."""
 
 Priority = Annotated[int, Field(ge=-100, le=100)]
-"""Higher goes first; among equals the one submitted first."""
+"""Experiments of higher priority run first; among equal ones, the one submitted first."""
 Interval = Annotated[float, Field(ge=10, le=366 * 86400)]
-"""s between two runs of a schedule."""
+"""Time (s) between two runs of a schedule."""
 
 
 class ExperimentRequest(Wire):
@@ -73,11 +73,11 @@ class Experiment(Wire):
 
 
 class ScheduleRequest(Wire):
-    """An experiment to be run every so often: studies of wear and drift."""
+    """An experiment that is repeated at a fixed interval, for studies of wear and drift."""
 
     spec: ExperimentSpec = ExperimentSpec()
     every: Interval
-    """s from one run to the next."""
+    """Time (s) from one run to the next."""
     starts: Moment | None = None
     """The first run; None for at once."""
     count: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
@@ -92,8 +92,8 @@ class ScheduleChange(Wire):
 
 
 class Schedule(Wire):
-    """A schedule and how far it is. Runs that were due while the service was off, or while the run before still waited,
-    are left out, not made up for."""
+    """A schedule and its progress. Runs that were due while the service was off, or while the previous run still
+    waited, are left out and not made up for."""
 
     id: str
     robot: str
@@ -112,7 +112,7 @@ class Schedule(Wire):
 
 class MotionPreview(Wire):
     """The motion of an experiment, worked out and checked without a robot. Columns of `set_points` are the machine's
-    joints, in rad; `violations` is what speaks against it, empty when it may run."""
+    joints, in rad; `violations` are the limits that it breaks, empty when it may run."""
 
     time: tuple[float, ...]
     set_points: tuple[tuple[float, ...], ...]

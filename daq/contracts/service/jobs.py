@@ -14,10 +14,10 @@ JobState = Literal["queued", "running", "done", "failed", "cancelled", "interrup
 """The same states as those of experiments; an interrupted job is not run again by itself either."""
 
 JobFailure = Literal["refused", "program-fault", "lost"]
-"""Why a job has no result: something spoke against it; a fault of the program; the process or the service ended."""
+"""Why a job has no result: it was refused; the program has a fault; the process or the service ended."""
 
 MACHINE = "machine"
-"""In place of a model's number: the model that the robot's machine file describes."""
+"""Stands, in place of a model's number, for the model that the robot's machine file describes."""
 TraceNumber = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 TraceNumbers = Annotated[tuple[TraceNumber, ...], Field(min_length=1, max_length=200)]
 ModelNumber = Annotated[str, Field(pattern=r"^(machine|[0-9a-f]{12})$")]
@@ -28,7 +28,7 @@ Bound = FiniteFloat | None
 
 
 class EffectChoice(Wire):
-    """An effect to be in the model; on all joints where none are named."""
+    """An effect to add to the model; on all joints where none are named."""
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")]
     joints: tuple[JointNumber, ...] = ()
@@ -200,7 +200,7 @@ class ModelDetails(Wire):
 
 
 class ModelChange(Wire):
-    """A new name or notes; what is None stays."""
+    """A new name or notes; a field that is None stays unchanged."""
 
     name: ModelName | None = None
     notes: Annotated[str, Field(max_length=10000)] | None = None

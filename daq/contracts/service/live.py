@@ -1,4 +1,4 @@
-"""What the live WebSocket sends, and what it takes. Angles in rad, joints from 1.
+"""Messages of the live WebSocket, in both directions. Angles in rad, joints from 1.
 
 Every frame says `now`, the monotonic clock of the service's computer (s), and `utc`, its wall clock (s since 1970). A
 value's age is `now − host_time` when the frame was sent, and grows from then on.
@@ -33,7 +33,7 @@ class SampleMessage(ControlPeriod):
 
 
 class HistoryMessage(Wire):
-    """The last minutes, thinned so that no peak is lost. A signal has one row a joint; None where there is none."""
+    """The last minutes, thinned so that no peak is lost. A signal has one row per joint; None where there is none."""
 
     topic: Literal["history"] = "history"
     joints: tuple[int, ...]
@@ -123,7 +123,7 @@ class TeachingMessage(Wire):
 
 
 class ThinnedMessage(Wire):
-    """This client reads too slowly: so many samples were left out for it. It is dropped if that goes on."""
+    """This client reads too slowly, so this many samples were left out. It is disconnected if that goes on."""
 
     topic: Literal["thinned"] = "thinned"
     left_out: int
@@ -184,7 +184,7 @@ class LiveRequest(Wire):
 
 
 class Ticket(Wire):
-    """Good for one WebSocket, once, for `seconds`: browsers cannot send a token with it."""
+    """Opens one WebSocket, once, within `seconds`: browsers cannot send a token with it."""
 
     ticket: str
     seconds: float

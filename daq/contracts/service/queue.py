@@ -44,11 +44,11 @@ class Control(Wire):
     """Name of the client."""
     expires: AwareDatetime | None = None
     remaining: float | None = None
-    """s until it lapses without a heartbeat."""
+    """Time (s) until it lapses without a heartbeat."""
 
 
 class ControlRequest(Wire):
-    """Asks for the control of the robot. A real arm needs the operator's word: `moves_real_arm`."""
+    """Requests control of the robot. A real arm needs the operator's consent: `moves_real_arm`."""
 
     moves_real_arm: StrictBool = False
 

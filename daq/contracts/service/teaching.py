@@ -37,8 +37,8 @@ class LeadRequest(Wire):
 
 
 class TaughtPath(Wire):
-    """Measured angles (rad), one row a control period, one column a joint; times (s) from the first row. As the `path`
-    of an experiment it is played back."""
+    """Measured angles (rad), one row per control period, one column per joint; times (s) from the first row. As the
+    `path` of an experiment it is played back."""
 
     joints: tuple[int, ...]
     times: tuple[float, ...]

@@ -52,17 +52,17 @@ class TraceDetails(Wire):
 
 
 class TraceChange(Wire):
-    """New tags or notes; what is None stays."""
+    """New tags or notes; a field that is None stays unchanged."""
 
     tags: Annotated[tuple[Tag, ...], Field(max_length=50)] | None = None
     notes: Annotated[str, Field(max_length=10000)] | None = None
 
 
 class TraceSignals(Wire):
-    """Signals of a trace for a plot, thinned so that no peak is lost: of every stretch the extremes are kept.
+    """Signals of a trace for a plot, thinned so that no peak is lost: each interval keeps its extremes.
 
-    `time` is in s; a signal has one row a joint, in the order of `joints`; rad, or m on a prismatic joint; drive in
-    `drive_unit`. A signal that the trace has not is None.
+    `time` is in s; a signal has one row per joint, in the order of `joints`; rad, or m on a prismatic joint; drive in
+    `drive_unit`. A signal that the trace does not have is None.
     """
 
     id: str

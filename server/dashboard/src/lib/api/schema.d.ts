@@ -1570,7 +1570,7 @@ export interface components {
         };
         /**
          * ControlRequest
-         * @description Asks for the control of the robot. A real arm needs the operator's word: `moves_real_arm`.
+         * @description Requests control of the robot. A real arm needs the operator's consent: `moves_real_arm`.
          */
         ControlRequest: {
             /**
@@ -1591,7 +1591,7 @@ export interface components {
         };
         /**
          * Correlation
-         * @description Pearson's correlation with one regressor of one joint. `noise` is what independent signals would show (1σ).
+         * @description Pearson's correlation with one regressor of one joint. `noise` is that of independent signals (1σ).
          */
         Correlation: {
             /** Regressor */
@@ -1934,7 +1934,7 @@ export interface components {
         };
         /**
          * EffectChoice
-         * @description An effect to be in the model; on all joints where none are named.
+         * @description An effect to add to the model; on all joints where none are named.
          */
         EffectChoice: {
             /** Name */
@@ -2511,8 +2511,9 @@ export interface components {
         };
         /**
          * Friction
-         * @description Friction known beforehand. Viscous as in (7.30), on the motor's side, times the motor's speed; `coulomb_arm` is
-         *     μ̃ of (7.32)–(7.34), a length that multiplies the normal gravity force; `coulomb` a plain torque at the joint.
+         * @description Friction that is known beforehand. `viscous` is that of (7.30), on the motor's side, and multiplies the motor's
+         *     speed; `coulomb_arm` is μ̃ of (7.32)–(7.34), a length that multiplies the normal gravity force; `coulomb` is a plain
+         *     torque at the joint.
          */
         Friction: {
             viscous_motor_side?: components["schemas"]["Quantity"] | null;
@@ -2584,7 +2585,7 @@ export interface components {
         };
         /**
          * HistoryMessage
-         * @description The last minutes, thinned so that no peak is lost. A signal has one row a joint; None where there is none.
+         * @description The last minutes, thinned so that no peak is lost. A signal has one row per joint; None where there is none.
          */
         HistoryMessage: {
             /**
@@ -2730,8 +2731,8 @@ export interface components {
          * @description One joint over one or more traces.
          *
          *     `rmse` and `largest` of measured − simulated, `floor` the noise and rounding of the measurement alone, `count` one
-         *     count of the sensor (None where it has none), all in `unit`. `share` is the mean square of what is left over that of
-         *     the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
+         *     count of the sensor (None where it has none), all in `unit`. `share` is the mean square of the residual divided by
+         *     that of the measured motion about its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
          */
         JointAgreement: {
             /** Joint */
@@ -3128,7 +3129,7 @@ export interface components {
         };
         /**
          * ModelChange
-         * @description A new name or notes; what is None stays.
+         * @description A new name or notes; a field that is None stays unchanged.
          */
         ModelChange: {
             /** Name */
@@ -3235,7 +3236,7 @@ export interface components {
         /**
          * MotionPreview
          * @description The motion of an experiment, worked out and checked without a robot. Columns of `set_points` are the machine's
-         *     joints, in rad; `violations` is what speaks against it, empty when it may run.
+         *     joints, in rad; `violations` are the limits that it breaks, empty when it may run.
          */
         MotionPreview: {
             /** Time */
@@ -3377,7 +3378,7 @@ export interface components {
         };
         /**
          * NoController
-         * @description No controller in the loop, or none that is known: the recorded drive is the input.
+         * @description No controller in the loop, or an unknown one: the recorded drive is the input.
          */
         NoController: {
             /**
@@ -3497,7 +3498,8 @@ export interface components {
          * ParameterDifference
          * @description One parameter with its value in each model, None where a model does not have it.
          *
-         *     `deviations` is the spread of the values in expected deviations; None where one lacks it or none is expected.
+         *     `deviations` is the spread of the values in expected deviations; None where a model lacks the
+         *     parameter or no deviation is expected.
          */
         ParameterDifference: {
             /** Name */
@@ -4033,7 +4035,7 @@ export interface components {
         };
         /**
          * RecordedPath
-         * @description Measured angles (rad), one row a control period, one column a joint; times (s) from the first row.
+         * @description Measured angles (rad), one row per control period, one column per joint; times (s) from the first row.
          */
         RecordedPath: {
             /** Joints */
@@ -4335,7 +4337,7 @@ export interface components {
         };
         /**
          * SampledPid
-         * @description PID in SI units, sampled: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) a joint. `velocity_gains` closes
+         * @description PID in SI units, sampled: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) per joint. `velocity_gains` closes
          *     an inner loop (cascade): the outer output is then a speed set point for it.
          */
         SampledPid: {
@@ -4361,8 +4363,8 @@ export interface components {
         };
         /**
          * Schedule
-         * @description A schedule and how far it is. Runs that were due while the service was off, or while the run before still waited,
-         *     are left out, not made up for.
+         * @description A schedule and its progress. Runs that were due while the service was off, or while the previous run still
+         *     waited, are left out and not made up for.
          */
         Schedule: {
             /** Id */
@@ -4405,7 +4407,7 @@ export interface components {
         };
         /**
          * ScheduleRequest
-         * @description An experiment to be run every so often: studies of wear and drift.
+         * @description An experiment that is repeated at a fixed interval, for studies of wear and drift.
          */
         ScheduleRequest: {
             /**
@@ -4749,8 +4751,8 @@ export interface components {
         };
         /**
          * TaughtPath
-         * @description Measured angles (rad), one row a control period, one column a joint; times (s) from the first row. As the `path`
-         *     of an experiment it is played back.
+         * @description Measured angles (rad), one row per control period, one column per joint; times (s) from the first row. As the
+         *     `path` of an experiment it is played back.
          */
         TaughtPath: {
             /** Joints */
@@ -4817,7 +4819,7 @@ export interface components {
         };
         /**
          * ThinnedMessage
-         * @description This client reads too slowly: so many samples were left out for it. It is dropped if that goes on.
+         * @description This client reads too slowly, so this many samples were left out. It is disconnected if that goes on.
          */
         ThinnedMessage: {
             /**
@@ -4830,7 +4832,7 @@ export interface components {
         };
         /**
          * Ticket
-         * @description Good for one WebSocket, once, for `seconds`: browsers cannot send a token with it.
+         * @description Opens one WebSocket, once, within `seconds`: browsers cannot send a token with it.
          */
         Ticket: {
             /** Ticket */
@@ -4882,7 +4884,7 @@ export interface components {
         };
         /**
          * TraceAgreement
-         * @description One trace; `held_out` tells whether the model was fitted to it, None where that is not the question.
+         * @description One trace; `held_out` tells whether the model was fitted to it, None where nothing was fitted.
          */
         TraceAgreement: {
             /** Trace */
@@ -4896,7 +4898,7 @@ export interface components {
         };
         /**
          * TraceChange
-         * @description New tags or notes; what is None stays.
+         * @description New tags or notes; a field that is None stays unchanged.
          */
         TraceChange: {
             /** Tags */
@@ -5010,10 +5012,10 @@ export interface components {
         };
         /**
          * TraceSignals
-         * @description Signals of a trace for a plot, thinned so that no peak is lost: of every stretch the extremes are kept.
+         * @description Signals of a trace for a plot, thinned so that no peak is lost: each interval keeps its extremes.
          *
-         *     `time` is in s; a signal has one row a joint, in the order of `joints`; rad, or m on a prismatic joint; drive in
-         *     `drive_unit`. A signal that the trace has not is None.
+         *     `time` is in s; a signal has one row per joint, in the order of `joints`; rad, or m on a prismatic joint; drive in
+         *     `drive_unit`. A signal that the trace does not have is None.
          */
         TraceSignals: {
             /** Id */
@@ -5160,8 +5162,8 @@ export interface components {
          * Via
          * @description Cubic segments through via points to the last one, at rest at both ends (section 3.7.1).
          *
-         *     `points` are angles (rad) from the start, one for all joints or one a joint; `times` (s) from the start when each is
-         *     passed, the last being the end. Position, velocity and acceleration are continuous.
+         *     `points` are angles (rad) from the start, one for all joints or one per joint; `times` (s) count from there, and the
+         *     last is the end. Position, velocity and acceleration are continuous.
          */
         Via: {
             /**
