@@ -17,6 +17,7 @@ from server.catalogue.catalogue import UPLOAD
 from server.catalogue.room import require_room
 from server.problems import ProblemError, conflict
 from server.services import RobotServices, Services
+from server.store.labels import trace_label
 
 KINDS = {"application/octet-stream": ".mcap", "text/csv": ".csv"}
 LOOK_EVERY = 4 << 20
@@ -57,12 +58,14 @@ async def _write_body(request: Request, path: Path, largest: int) -> None:
 
 def _take_in(path: Path, rig: RobotServices, services: Services, caller: Caller) -> CatalogueEntry:
     made = _read(path, rig, services)
-    target = rig.catalogue.folder / made.name
-    number = made.summary.trace_id or ""
-    if not rig.catalogue.move_in(made.path, target, made.summary):
-        raise conflict("trace-exists", f"trace {number} is there already", "nothing needs to be done")
-    services.record_event(rig.robot.name, "trace", f"trace {number} was uploaded", actor=caller.name)
-    return services.traces.get(rig.robot.name, number)
+    summary = made.summary
+    assert summary.trace_id is not None
+    assert summary.created is not None
+    label = trace_label(summary.name, summary.kind, made.name, summary.created)
+    if not rig.catalogue.move_in(made.path, rig.catalogue.folder / made.name, summary):
+        raise conflict("trace-exists", f"{label} exists already", "it is the same trace: nothing needs to be done")
+    services.record_event(rig.robot.name, "trace", f"{label} was uploaded", actor=caller.name)
+    return services.traces.get(rig.robot.name, summary.trace_id)
 
 
 def _read(path: Path, rig: RobotServices, services: Services) -> UploadedTrace:
