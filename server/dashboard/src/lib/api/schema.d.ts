@@ -1730,9 +1730,9 @@ export interface components {
         };
         /**
          * DiagnosisData
-         * @description A diagnosis (docs/diagnosis-json.md), and the models before and after it beside the traces where those can be
-         *     simulated. `differences` are the parameters that moved, those of added effects among them; `given` is where the
-         *     model disagreed with the traces as it was given, before anything was fitted.
+         * @description A diagnosis (docs/diagnosis-json.md), and the traces beside simulations of the models before and after it, if
+         *     these can be simulated. `differences` are the parameters that changed, including those of added effects; `given` is
+         *     where the given model disagreed with the traces before anything was fitted.
          */
         DiagnosisData: {
             /**
@@ -2200,7 +2200,7 @@ export interface components {
         };
         /**
          * FitData
-         * @description A fit, and the models before and after it beside the traces.
+         * @description A fit, and the traces beside simulations of the models before and after it.
          */
         FitData: {
             /**
@@ -3409,10 +3409,10 @@ export interface components {
         };
         /**
          * Overlay
-         * @description One trace beside its simulations, thinned so that no peak is lost: of every stretch the extremes are kept.
+         * @description One trace beside its simulations, thinned to the extremes of short stretches, so that no peak is lost.
          *
-         *     `time` is in s; signals have one row a joint, in the order of `joints`, in `units`. `simulated` and `residual`
-         *     (measured − simulated, thinned by itself) have such rows for every model, in the order of the result's `models`.
+         *     `time` is in s; signals have one row per joint, in the order of `joints`, in `units`. `simulated` and `residual`
+         *     (measured − simulated, thinned separately) have such rows for every model, in the order of the result's `models`.
          */
         Overlay: {
             /** Trace */
@@ -4684,7 +4684,7 @@ export interface components {
         };
         /**
          * StoredProgram
-         * @description A program with what is known about it.
+         * @description A program with its entry in the list.
          */
         StoredProgram: {
             entry: components["schemas"]["ProgramEntry"];
@@ -5059,8 +5059,8 @@ export interface components {
         };
         /**
          * ValidationData
-         * @description A validation by distortion: `fidelity` in the source's convention of τ′, `three_sigma` in the other (its curves
-         *     are the same), and what would have to move with time, a trace each, thinned.
+         * @description A validation by distortion: `fidelity` in the source's convention of τ′, `three_sigma` in the other one (with the
+         *     same curves), and for each trace, thinned, how parameters would have to vary with time.
          */
         ValidationData: {
             fidelity: components["schemas"]["Fidelity"];
