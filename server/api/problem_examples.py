@@ -106,7 +106,7 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         MOVES,
         409,
         "control-needed",
-        "only who has control of the robot can move it",
+        "only the client that has control can move the robot",
         "take control with POST …/control",
     ),
     _met(
@@ -127,7 +127,7 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         "post .*/(control|queue/resume)$",
         409,
         "consent-needed",
-        "serial:///dev/ttyUSB0 is a real arm: it moves only with the operator's word",
+        "serial:///dev/ttyUSB0 is a real arm: it moves only with the operator's consent",
         "is its workspace clear? then ask again with moves_real_arm",
     ),
     _met(

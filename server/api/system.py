@@ -26,7 +26,7 @@ from server.store.tables import TraceRow
 plain = APIRouter(tags=["system"])
 router = APIRouter(tags=["system"], responses=PROBLEMS)
 VERSION = version("ma2000-daq")
-NOT_WELL = "not well: a token is needed to be told more"
+NOT_WELL = "not well: details need a token"
 
 
 @plain.get("/healthz")

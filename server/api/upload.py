@@ -69,7 +69,7 @@ def _take_in(path: Path, rig: RobotServices, services: Services, caller: Caller)
 
 
 def _read(path: Path, rig: RobotServices, services: Services) -> UploadedTrace:
-    """Raises a 413 for what takes too much, a 422 for what is no trace."""
+    """Reads the upload. Raises a 413 if this takes too much time or memory, and a 422 if it is not a trace."""
     try:
         limits = services.settings.traces.limits
         answer = services.uploads.ask(ReadUpload(path=path, folder=rig.catalogue.folder, limits=limits))
@@ -83,10 +83,10 @@ def _read(path: Path, rig: RobotServices, services: Services) -> UploadedTrace:
         raise ProblemError(422, "not-a-trace", f"upload: {answer.problem}", ADVICE)
     made = UploadedTrace.model_validate(answer.data)
     if made.path.parent != path.parent:
-        raise ProblemError(422, "not-a-trace", "upload: its reader answered nonsense", ADVICE)
+        raise ProblemError(422, "not-a-trace", "upload: its reader gave an impossible answer", ADVICE)
     return made
 
 
 def _too_much(line: str) -> ProblemError:
-    advice = "server.upload_memory and server.upload_time set the limits, docs/service.md tells of them"
+    advice = "server.upload_memory and server.upload_time set the limits (docs/service.md)"
     return ProblemError(413, "too-large", f"upload: {line}", advice)

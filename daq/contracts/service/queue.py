@@ -48,14 +48,14 @@ class Control(Wire):
 
 
 class ControlRequest(Wire):
-    """Asks for the control of the robot. A real arm needs the operator's word: `moves_real_arm`."""
+    """Requests control of the robot. A real arm needs the operator's consent: `moves_real_arm`."""
 
     moves_real_arm: StrictBool = False
 
 
 class ControlLease(Wire):
-    """The control of the robot, for one client. `lease` is its secret: it goes with every motion and heartbeat in the
-    header `Control-Lease`."""
+    """Control of the robot for one client. `lease` is its secret, which the client sends with every motion and
+    heartbeat in the header `Control-Lease`."""
 
     lease: str
     expires: AwareDatetime

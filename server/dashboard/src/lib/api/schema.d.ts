@@ -175,12 +175,12 @@ export interface paths {
         };
         /**
          * Get Gains
-         * @description The gains P, I and D of every joint, read from the controller.
+         * @description Reads the gains P, I and D of every joint from the controller.
          */
         get: operations["get_gains"];
         /**
          * Set Gains
-         * @description Writes gains of the named joints and reads all back. Refused for a joint off its set point, which would jump.
+         * @description Writes gains of the named joints and reads all back. Refused for a joint that would jump to its set point.
          */
         put: operations["set_gains"];
         post?: never;
@@ -199,7 +199,7 @@ export interface paths {
         };
         /**
          * Get Process
-         * @description The process inputs and outputs, and the gripper.
+         * @description Reads the process inputs and outputs, and the gripper.
          */
         get: operations["get_process"];
         put?: never;
@@ -684,7 +684,7 @@ export interface paths {
         put?: never;
         /**
          * Resume Queue
-         * @description Resumes the queue: the operator's consent that it may move the robot. A real arm needs `moves_real_arm`.
+         * @description Resumes the queue. The operator thereby consents that it moves the robot. A real arm needs `moves_real_arm`.
          */
         post: operations["resume_queue"];
         delete?: never;
@@ -779,7 +779,7 @@ export interface paths {
         get: operations["get_control"];
         /**
          * Renew Control
-         * @description Renews the control: the heartbeat of the client that has it.
+         * @description Renews control. The client that has it sends this as its heartbeat.
          */
         put: operations["renew_control"];
         /**
@@ -789,7 +789,7 @@ export interface paths {
         post: operations["take_control"];
         /**
          * Give Control Back
-         * @description Gives the control back. The arm holds its posture; a program that still runs is stopped.
+         * @description Gives control back. The arm holds its posture; a program that still runs is stopped.
          *
          *     If experiments are waiting, the queue is paused until somebody resumes it.
          */
@@ -1548,8 +1548,8 @@ export interface components {
         };
         /**
          * ControlLease
-         * @description The control of the robot, for one client. `lease` is its secret: it goes with every motion and heartbeat in the
-         *     header `Control-Lease`.
+         * @description Control of the robot for one client. `lease` is its secret, which the client sends with every motion and
+         *     heartbeat in the header `Control-Lease`.
          */
         ControlLease: {
             /** Lease */
@@ -1566,7 +1566,7 @@ export interface components {
         };
         /**
          * ControlRequest
-         * @description Asks for the control of the robot. A real arm needs the operator's word: `moves_real_arm`.
+         * @description Requests control of the robot. A real arm needs the operator's consent: `moves_real_arm`.
          */
         ControlRequest: {
             /**
@@ -5321,7 +5321,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5370,7 +5370,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5402,7 +5402,7 @@ export interface operations {
                 experiment?: string | null;
                 /** @description Length of this part of the list. */
                 limit?: number;
-                /** @description `next` of the part before. */
+                /** @description `next` of the previous part. */
                 cursor?: string | null;
             };
             header?: never;
@@ -5452,7 +5452,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5505,7 +5505,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5536,7 +5536,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5589,7 +5589,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5619,7 +5619,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5649,7 +5649,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5679,7 +5679,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5709,7 +5709,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5735,7 +5735,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description Sent again with the same request, it is carried out once. */
+                /** @description A request sent again with the same key is carried out once. */
                 "idempotency-key"?: string | null;
             };
             path: {
@@ -5901,7 +5901,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -5935,7 +5935,7 @@ export interface operations {
                 order?: "submitted" | "ended";
                 /** @description Length of this part of the list. */
                 limit?: number;
-                /** @description `next` of the part before. */
+                /** @description `next` of the previous part. */
                 cursor?: string | null;
             };
             header?: never;
@@ -5962,7 +5962,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description Sent again with the same request, it is carried out once. */
+                /** @description A request sent again with the same key is carried out once. */
                 "idempotency-key"?: string | null;
             };
             path: {
@@ -6275,7 +6275,7 @@ export interface operations {
             query?: {
                 /** @description Length of this part of the list. */
                 limit?: number;
-                /** @description `next` of the part before. */
+                /** @description `next` of the previous part. */
                 cursor?: string | null;
             };
             header?: never;
@@ -6426,7 +6426,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -6479,7 +6479,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description The lease that POST …/control gave. */
+                /** @description The lease that POST …/control returned. */
                 "Control-Lease"?: string | null;
             };
             path: {
@@ -6512,7 +6512,7 @@ export interface operations {
                 until?: string | null;
                 /** @description Length of this part of the list. */
                 limit?: number;
-                /** @description `next` of the part before. */
+                /** @description `next` of the previous part. */
                 cursor?: string | null;
             };
             header?: never;
@@ -6724,7 +6724,7 @@ export interface operations {
                 model?: string | null;
                 /** @description Length of this part of the list. */
                 limit?: number;
-                /** @description `next` of the part before. */
+                /** @description `next` of the previous part. */
                 cursor?: string | null;
             };
             header?: never;
@@ -6751,7 +6751,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description Sent again with the same request, it is carried out once. */
+                /** @description A request sent again with the same key is carried out once. */
                 "idempotency-key"?: string | null;
             };
             path: {
@@ -6912,7 +6912,7 @@ export interface operations {
             query?: {
                 /** @description Length of this part of the list. */
                 limit?: number;
-                /** @description `next` of the part before. */
+                /** @description `next` of the previous part. */
                 cursor?: string | null;
             };
             header?: never;
