@@ -14,13 +14,13 @@ Role = Literal["viewer", "operator"]
 class QueueStatus(Wire):
     """Whether experiments are taken from the queue, and if not, why.
 
-    `waiting_for` says in one line why nothing runs although the queue is not paused; empty when something runs or
-    nothing waits.
+    `waiting_for` says in one line why nothing runs although the queue is not paused; it is empty if an experiment runs
+    or none waits.
     """
 
     paused: bool
     reason: str
-    """Why it is paused; who resumed it, when it is not."""
+    """Why it is paused; if it is not, who resumed it."""
     since: AwareDatetime
     queued: int
     running: str | None = None
@@ -44,7 +44,7 @@ class Control(Wire):
     """Name of the client."""
     expires: AwareDatetime | None = None
     remaining: float | None = None
-    """s until it lapses without a heartbeat."""
+    """Time (s) until control lapses without a heartbeat."""
 
 
 class ControlRequest(Wire):
@@ -61,4 +61,4 @@ class ControlLease(Wire):
     expires: AwareDatetime
     remaining: float
     heartbeat_every: float
-    """s after which the client should renew it, at the latest."""
+    """Time (s) after which the client should renew it, at the latest."""

@@ -1406,7 +1406,7 @@ export interface components {
         };
         /**
          * CalibrationRequest
-         * @description Joints whose actual proportional gain is to be found, by small steps at several postures (section 6.5).
+         * @description Joints whose actual proportional gain is measured by small steps at several postures (section 6.5).
          */
         CalibrationRequest: {
             /**
@@ -1490,7 +1490,7 @@ export interface components {
         };
         /**
          * CompareRequest
-         * @description Simulates the same traces with one model or several, beside what was measured.
+         * @description Compares one model or several with the same traces, by simulation.
          */
         CompareRequest: {
             /**
@@ -1696,7 +1696,8 @@ export interface components {
         };
         /**
          * DiagnoseRequest
-         * @description Where a model and traces disagree, which effect is missing, what adding it brings; as `daq diagnose`.
+         * @description Finds where a model and traces disagree, which effect is missing, and what adding it improves, as `daq diagnose`
+         *     does.
          */
         DiagnoseRequest: {
             /**
@@ -1926,7 +1927,7 @@ export interface components {
         };
         /**
          * EffectChoice
-         * @description An effect to be in the model; on all joints where none are named.
+         * @description An effect of the model; on all joints if none are named.
          */
         EffectChoice: {
             /** Name */
@@ -1976,7 +1977,7 @@ export interface components {
         };
         /**
          * Experiment
-         * @description One experiment and what became of it. `progress` is a fraction from 0 to 1, only while it runs.
+         * @description One experiment with its state and outcome. `progress` is a fraction from 0 to 1, only while it runs.
          */
         Experiment: {
             /** Id */
@@ -2025,7 +2026,7 @@ export interface components {
         };
         /**
          * ExperimentChange
-         * @description A new priority of an experiment that still waits.
+         * @description A new priority for a waiting experiment.
          */
         ExperimentChange: {
             /** Priority */
@@ -2033,7 +2034,7 @@ export interface components {
         };
         /**
          * ExperimentPreset
-         * @description An experiment that has a name, and one line that says what it is for.
+         * @description A named experiment with one line about its purpose.
          */
         ExperimentPreset: {
             /** Name */
@@ -2044,7 +2045,7 @@ export interface components {
         };
         /**
          * ExperimentRequest
-         * @description What is to be run. `at`: not before this moment (with its time zone); None for as soon as possible.
+         * @description An experiment to run, not before the time `at` (with its time zone); None for as soon as possible.
          */
         ExperimentRequest: {
             /**
@@ -2553,7 +2554,7 @@ export interface components {
         };
         /**
          * Health
-         * @description Whether it answers, and whether it can take experiments. `checks`: one line each; empty where all is well.
+         * @description Whether the service answers, and can take experiments. `checks`: one line each; empty if the check succeeded.
          */
         Health: {
             /**
@@ -2570,7 +2571,7 @@ export interface components {
         };
         /**
          * HistoryMessage
-         * @description The last minutes, thinned so that no peak is lost. A signal has one row a joint; None where there is none.
+         * @description The last minutes, thinned so that no peak is lost. A signal has one row per joint; a missing value is None.
          */
         HistoryMessage: {
             /**
@@ -2614,7 +2615,7 @@ export interface components {
         };
         /**
          * Job
-         * @description One computation and what became of it. `progress` is a fraction from 0 to 1.
+         * @description One computation with its state and result. `progress` is a fraction from 0 to 1.
          */
         Job: {
             /** Id */
@@ -2682,7 +2683,7 @@ export interface components {
         /**
          * JogRequest
          * @description Velocities (rad/s) of joints, applied for at most 0.3 s: the client repeats the request while the key is held.
-         *     Empty: hold.
+         *     No velocities: hold.
          */
         JogRequest: {
             /** Velocities */
@@ -2828,7 +2829,7 @@ export interface components {
         };
         /**
          * KnownEffect
-         * @description An effect of the library: what a fit may add and a diagnosis looks for.
+         * @description An effect of the library, which a fit may add and a diagnosis considers.
          */
         KnownEffect: {
             /** Name */
@@ -2906,7 +2907,7 @@ export interface components {
         };
         /**
          * LinkMessage
-         * @description The link and its counters, once a second.
+         * @description The link and its counters; sent once a second.
          */
         LinkMessage: {
             /**
@@ -3013,7 +3014,7 @@ export interface components {
         /**
          * MeasuredGain
          * @description The actual proportional gain of one joint, in DAC counts per ADC count of error, and in V/rad at the motor; or
-         *     the reason why the trace does not tell it. Gains between `lowest` and `highest` agree with every sample.
+         *     the reason why the trace does not determine it. Gains between `lowest` and `highest` agree with every sample.
          */
         MeasuredGain: {
             /** Joint */
@@ -3114,7 +3115,7 @@ export interface components {
         };
         /**
          * ModelChange
-         * @description A new name or notes; what is None stays.
+         * @description A new name or notes; a field that is None stays as it is.
          */
         ModelChange: {
             /** Name */
@@ -3124,7 +3125,7 @@ export interface components {
         };
         /**
          * ModelDetails
-         * @description A model: its effects, its parameters, and the models that it comes from, the nearest first.
+         * @description A model: its effects, its parameters, and the models from which it was made, the nearest first.
          */
         ModelDetails: {
             entry: components["schemas"]["ModelEntry"];
@@ -3137,7 +3138,7 @@ export interface components {
         };
         /**
          * ModelEntry
-         * @description A model of the service, and where it comes from.
+         * @description A model of the service, and how it was made.
          */
         ModelEntry: {
             /** Id */
@@ -3170,10 +3171,10 @@ export interface components {
         };
         /**
          * ModelLineage
-         * @description Where a robot's models come from, and what was made of them.
+         * @description The models of a robot, and the jobs that made or used them.
          *
-         *     A model's parent is another of these models, the one that the machine file describes, or one that is not here any
-         *     more. A job leads from the models and traces of its request to the model that it made, if it made one.
+         *     A model's parent is another of these models, the one that the machine file describes, or one that has been
+         *     deleted. A job leads from the models and traces of its request to the model that it made, if it made one.
          */
         ModelLineage: {
             /** Machine */
@@ -3185,8 +3186,8 @@ export interface components {
         };
         /**
          * ModelParameter
-         * @description A parameter of a model, in its unit. `deviation` is the standard deviation of the expected value; None where
-         *     nothing is claimed.
+         * @description A parameter of a model, in its unit. `deviation` is the standard deviation of the expected value; None if
+         *     none is stated.
          */
         ModelParameter: {
             /** Name */
@@ -3219,8 +3220,8 @@ export interface components {
         };
         /**
          * MotionPreview
-         * @description The motion of an experiment, worked out and checked without a robot. Columns of `set_points` are the machine's
-         *     joints, in rad; `violations` is what speaks against it, empty when it may run.
+         * @description The motion of an experiment, computed and checked without a robot. Columns of `set_points` are the machine's
+         *     joints, in rad; `violations` lists the limits that it violates, and is empty if it may run.
          */
         MotionPreview: {
             /** Time */
@@ -3241,8 +3242,8 @@ export interface components {
         };
         /**
          * MotionViolation
-         * @description One limit that a motion breaks: the worst place of one rule and joint (or link, for `floor` and `reach`). `time`
-         *     in s from the start of the record; `value` and `limit` in rad, rad/s or m, for `posture` in posture units.
+         * @description One limit that a motion violates: the worst place of one rule and joint (or link, for `floor` and `reach`).
+         *     `time` in s from the start of the record; `value` and `limit` in rad, rad/s or m, for `posture` in posture units.
          */
         MotionViolation: {
             /**
@@ -3874,8 +3875,8 @@ export interface components {
          * QueueStatus
          * @description Whether experiments are taken from the queue, and if not, why.
          *
-         *     `waiting_for` says in one line why nothing runs although the queue is not paused; empty when something runs or
-         *     nothing waits.
+         *     `waiting_for` says in one line why nothing runs although the queue is not paused; it is empty if an experiment runs
+         *     or none waits.
          */
         QueueStatus: {
             /** Paused */
@@ -3976,7 +3977,7 @@ export interface components {
         };
         /**
          * RecordEventMessage
-         * @description Something in the record of the experiment that runs: a ramp that begins, a limit, a retry.
+         * @description An event in the record of the running experiment, such as the beginning of a ramp, a limit or a retry.
          */
         RecordEventMessage: {
             /**
@@ -4039,7 +4040,7 @@ export interface components {
         };
         /**
          * RefusedMessage
-         * @description What the client sent cannot be carried out.
+         * @description The client's message cannot be carried out.
          */
         RefusedMessage: {
             /**
@@ -4103,7 +4104,7 @@ export interface components {
         };
         /**
          * ResetRequest
-         * @description `here`: first make the posture measured now the set points.
+         * @description Ends a stop. `here`: first make the measured posture the set points.
          */
         ResetRequest: {
             /**
@@ -4251,7 +4252,7 @@ export interface components {
         /**
          * Sample
          * @description One control period. `host_time` is the monotonic clock (s) of the service's computer, `utc` the wall clock (s
-         *     since 1970) when it arrived, `age` the s that have passed since.
+         *     since 1970) when it arrived, `age` the time (s) since then.
          */
         Sample: {
             /** Tick */
@@ -4332,8 +4333,8 @@ export interface components {
         };
         /**
          * Schedule
-         * @description A schedule and how far it is. Runs that were due while the service was off, or while the run before still waited,
-         *     are left out, not made up for.
+         * @description A schedule and its progress. Runs that were due while the service was off, or while the previous run still
+         *     waited, are skipped.
          */
         Schedule: {
             /** Id */
@@ -4376,7 +4377,7 @@ export interface components {
         };
         /**
          * ScheduleRequest
-         * @description An experiment to be run every so often: studies of wear and drift.
+         * @description An experiment to run at regular intervals, for studies of wear and drift.
          */
         ScheduleRequest: {
             /**
@@ -4461,7 +4462,7 @@ export interface components {
         };
         /**
          * ServiceEvent
-         * @description One thing that happened. `number` grows with every event, whatever the clock does.
+         * @description Something that happened. `number` grows with every event, even if the clock is set back.
          */
         ServiceEvent: {
             /** Number */
@@ -4625,8 +4626,8 @@ export interface components {
         };
         /**
          * StepRequest
-         * @description One off-line step to absolute angles (`to`), or by relative ones (`by`), in rad; `speed` of the fastest joint in
-         *     rad/s. Give one of the two.
+         * @description One off-line step to absolute angles (`to`) or by relative ones (`by`), in rad; give one of the two. `speed` is
+         *     that of the fastest joint, in rad/s.
          */
         StepRequest: {
             /** To */
@@ -4666,7 +4667,7 @@ export interface components {
         };
         /**
          * StorageStatus
-         * @description Where things are kept, and how much room there is (bytes).
+         * @description Where data are stored, and how much space is free (bytes).
          */
         StorageStatus: {
             /** Traces Folder */
@@ -4692,7 +4693,7 @@ export interface components {
         };
         /**
          * SystemStatus
-         * @description The service: version, since when it runs, storage, watchers.
+         * @description The service: version, uptime, storage, clients.
          */
         SystemStatus: {
             /** Version */
@@ -4715,8 +4716,8 @@ export interface components {
         };
         /**
          * TaughtPath
-         * @description Measured angles (rad), one row a control period, one column a joint; times (s) from the first row. As the `path`
-         *     of an experiment it is played back.
+         * @description Measured angles (rad), one row per control period, one column per joint; times (s) from the first row. An
+         *     experiment with this as its `path` plays it back.
          */
         TaughtPath: {
             /** Joints */
@@ -4728,7 +4729,7 @@ export interface components {
         };
         /**
          * TeachingLine
-         * @description A line for the operator who teaches: a joint that is refused, an instruction that begins.
+         * @description A line for the operator who teaches, such as a refused joint, or the beginning of an instruction.
          */
         TeachingLine: {
             /** Number */
@@ -4756,7 +4757,7 @@ export interface components {
         };
         /**
          * TeachingStatus
-         * @description What is being taught now, and how the last one ended.
+         * @description The teaching activity under way, and how the last one ended.
          */
         TeachingStatus: {
             /**
@@ -4783,7 +4784,7 @@ export interface components {
         };
         /**
          * ThinnedMessage
-         * @description This client reads too slowly: so many samples were left out for it. It is dropped if that goes on.
+         * @description This client reads too slowly, and samples were left out. It is disconnected if that goes on.
          */
         ThinnedMessage: {
             /**
@@ -4796,7 +4797,7 @@ export interface components {
         };
         /**
          * Ticket
-         * @description Good for one WebSocket, once, for `seconds`: browsers cannot send a token with it.
+         * @description A ticket, valid once within `seconds` for a WebSocket, with which browsers cannot send a token.
          */
         Ticket: {
             /** Ticket */
@@ -4862,7 +4863,7 @@ export interface components {
         };
         /**
          * TraceChange
-         * @description New tags or notes; what is None stays.
+         * @description New tags or notes; a field that is None stays as it is.
          */
         TraceChange: {
             /** Tags */
@@ -4872,7 +4873,7 @@ export interface components {
         };
         /**
          * TraceDetails
-         * @description One trace: what it says about itself, its figures and events.
+         * @description One trace: its record, figures and events.
          */
         TraceDetails: {
             entry: components["schemas"]["CatalogueEntry"];
@@ -4976,10 +4977,10 @@ export interface components {
         };
         /**
          * TraceSignals
-         * @description Signals of a trace for a plot, thinned so that no peak is lost: of every stretch the extremes are kept.
+         * @description Signals of a trace for a plot, thinned to the extremes of short stretches, so that no peak is lost.
          *
-         *     `time` is in s; a signal has one row a joint, in the order of `joints`; rad, or m on a prismatic joint; drive in
-         *     `drive_unit`. A signal that the trace has not is None.
+         *     `time` is in s; a signal has one row per joint, in the order of `joints`, in rad, or in m for a prismatic joint; the
+         *     drive is in `drive_unit`. A signal that the trace does not have is None.
          */
         TraceSignals: {
             /** Id */
@@ -5153,7 +5154,7 @@ export interface components {
         };
         /**
          * WaitsBehind
-         * @description What a queued job waits for: the first of the jobs of its lane that come before it.
+         * @description The job that a queued job waits for: the first of those before it in its lane.
          */
         WaitsBehind: {
             /** Job */
