@@ -28,7 +28,7 @@ router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
 
 
 async def _seen(rig: RobotDep) -> Seen:
-    """What an operator could see when the request arrived, before it waited for a thread or for the queue."""
+    """Returns what an operator could see when the request arrived, before it waited for a thread or for the queue."""
     return rig.queue.notices.seen
 
 

@@ -111,7 +111,7 @@ def _checks(services: Services) -> dict[str, str]:
 
 
 def _require_writable(folder: Path) -> None:
-    """Raises OSError where nothing can be written. The probe is a file without a name, so nobody sees it."""
+    """Raises OSError if nothing can be written. The probe is a file without a name, so nobody sees it."""
     with tempfile.TemporaryFile(dir=folder) as probe:
         probe.write(b"written")
 

@@ -21,7 +21,7 @@ from server.store.labels import trace_label
 
 KINDS = {"application/octet-stream": ".mcap", "text/csv": ".csv"}
 LOOK_EVERY = 4 << 20
-"""Bytes after which is looked again whether the disk has room."""
+"""Number of bytes after which the free disk space is checked again."""
 ADVICE = "docs/traces.md tells what a trace looks like"
 
 

@@ -120,7 +120,7 @@ class Robot:
 
     @property
     def arm_seen(self) -> Seen | None:
-        """The same, with its time."""
+        """The newest report of the arm's state, with its time."""
         return self._arm
 
     @property
