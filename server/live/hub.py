@@ -75,7 +75,7 @@ class Hub:
         self._progressed = 0.0
 
     def open(self, experiment: Callable[[], str | None]) -> None:
-        """Starts sending. Call this on the event loop, before the first client. `experiment`: returns the running one."""
+        """Starts sending. Call this on the event loop before the first client. `experiment` returns the running one."""
         self._loop = asyncio.get_running_loop()
         self._experiment = experiment
         self._watching = self._loop.create_task(self._watch())
