@@ -144,7 +144,7 @@ def test_what_nobody_had_seen_when_the_queue_was_resumed_holds_it_again(bench: B
     if taken:
         bench.queue.notices.take()
     bench.queue.resume("anna", moves_real_arm=False, seen=seen)
-    assert bench.queue.status().reason.startswith("bert asked")
+    assert bench.queue.status().reason.startswith("bert requested")
     _is_held(bench, "bert requested a stop: look at the arm, reset it if it is stopped, then resume the queue")
 
 
