@@ -79,7 +79,7 @@ def options(
     by_default = getattr(context.get_parameter_source("server"), "name", "") == "ENVIRONMENT"
     if server is not None and port is not None:
         if not by_default:
-            raise SpecError("--port and --server: the server uses its own port; give one of the two options")
+            raise SpecError("--port and --server: the server uses its own port; give one of them")
         server = None
     if server is not None and context.invoked_subcommand in HERE:
         if not by_default:
