@@ -40,4 +40,6 @@ def check_csv(path: Path) -> None:
     except (SpecError, ValidationError):
         found = CsvDescription()
     if not found.model_fields_set >= WRITTEN:
-        raise SpecError(f"{path}: {toml} would be replaced, which is no trace's; give the CSV another name or folder")
+        raise SpecError(
+            f"{path}: {toml} would be replaced, which does not belong to a trace; give the CSV another name or folder"
+        )

@@ -1,4 +1,4 @@
-"""The answer of a diagnosis with what its pictures need besides: overlays, what moved, what chance does."""
+"""The answer of a diagnosis with the data of its plots: overlays, changed parameters, significance by chance."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
 
 def diagnosis_data(found: Diagnosis, comparison: Comparison | None, given: GivenWhere | None = None) -> DiagnosisData:
-    """The answer, ready for plots. comparison: of the models before and after, where those can be simulated."""
+    """Returns the answer with the data of its plots. `comparison`: of the models before and after, if they can be
+    simulated."""
     return DiagnosisData(
         **{
             **dict(found),
@@ -58,10 +59,8 @@ def _words(found: Diagnosis) -> dict[str, ParameterWords]:
 
 
 def where_given(model: Model, traces: Sequence[Trace]) -> GivenWhere | None:
-    """Where a model disagrees with traces before anything is fitted; None where its simulation does not stay finite.
-
-    Raises TraceError, SpecError for traces that cannot be simulated.
-    """
+    """Returns where a model disagrees with traces before anything is fitted; None if its simulation does not stay
+    finite. Raises TraceError, SpecError for traces that cannot be simulated."""
     records = records_of(traces, model.machine, "position")
     runs = [simulate(model, record.inputs, Options(quantise=False)) for record in records]
     left = [record.measured - run.at_samples(run.reading) for record, run in zip(records, runs, strict=True)]

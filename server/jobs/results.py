@@ -1,4 +1,4 @@
-"""Results of jobs as clients get them: the data of the command's `--json`, and signals for plots."""
+"""Results of jobs as clients get them: the data of the commands' `--json`, and signals for plots."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from model.validation.variation import TimeDomain
 Words = dict[str, ParameterWords]
 """How people write the parameters that a result names, by the parameter's name."""
 Row = tuple[float | None, ...]
-"""One signal of one joint; None where a simulation did not stay finite."""
+"""One signal of one joint; None for samples at which a simulation was not finite."""
 
 
 class _Part(BaseModel):
@@ -25,10 +25,10 @@ class _Part(BaseModel):
 
 
 class Overlay(_Part):
-    """One trace beside its simulations, thinned so that no peak is lost: of every stretch the extremes are kept.
+    """One trace beside its simulations, thinned to the extremes of short stretches, so that no peak is lost.
 
-    `time` is in s; signals have one row a joint, in the order of `joints`, in `units`. `simulated` and `residual`
-    (measured − simulated, thinned by itself) have such rows for every model, in the order of the result's `models`.
+    `time` is in s; signals have one row per joint, in the order of `joints`, in `units`. `simulated` and `residual`
+    (measured − simulated, thinned separately) have such rows for every model, in the order of the result's `models`.
     """
 
     trace: str
@@ -36,7 +36,7 @@ class Overlay(_Part):
     joints: tuple[int, ...]
     units: tuple[str, ...]
     samples: int
-    """Before thinning."""
+    """Number of samples before thinning."""
     time: tuple[float, ...]
     measured: tuple[Row, ...]
     set_point: tuple[Row, ...] | None
@@ -45,8 +45,8 @@ class Overlay(_Part):
 
 
 class FitData(FitResult):
-    """A fit, and the models before and after it beside the traces. `undetermined`: what the traces cannot tell, a
-    sentence each, with the parameters as people write them."""
+    """A fit, and the traces beside simulations of the models before and after it. `undetermined`: what the traces cannot
+    determine, a sentence each, with the parameters as people write them."""
 
     models: tuple[ModelAgreement, ...]
     signals: tuple[Overlay, ...]
@@ -54,8 +54,8 @@ class FitData(FitResult):
 
 
 class ValidationData(_Part):
-    """A validation by distortion: `fidelity` in the source's convention of τ′, `three_sigma` in the other (its curves
-    are the same), and what would have to move with time, a trace each, thinned."""
+    """A validation by distortion: `fidelity` in the source's convention of τ′, `three_sigma` in the other one (with the
+    same curves), and for each trace, thinned, how parameters would have to vary with time."""
 
     fidelity: Fidelity
     three_sigma: Fidelity
@@ -82,7 +82,7 @@ class DiagnosisStep(Step):
     candidates: tuple[TriedEffect, ...]
     group: tuple[TriedEffect, ...] = ()
     chance: float
-    """Significance that noise alone exceeds in some cell of `where` in one record of a hundred."""
+    """Significance that noise alone exceeds in any cell of `where` in one record out of a hundred."""
 
 
 class GivenWhere(_Part):
@@ -93,9 +93,9 @@ class GivenWhere(_Part):
 
 
 class DiagnosisData(Diagnosis):
-    """A diagnosis (docs/diagnosis-json.md), and the models before and after it beside the traces where those can be
-    simulated. `differences` are the parameters that moved, those of added effects among them; `given` is where the
-    model disagreed with the traces as it was given, before anything was fitted."""
+    """A diagnosis (docs/diagnosis-json.md), and the traces beside simulations of the models before and after it, if
+    these can be simulated. `differences` are the parameters that changed, including those of added effects; `given` is
+    where the given model disagreed with the traces before anything was fitted."""
 
     steps: tuple[DiagnosisStep, ...]
     candidates: tuple[TriedEffect, ...] = ()

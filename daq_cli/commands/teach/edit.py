@@ -1,4 +1,4 @@
-"""`daq teach edit`: a taught program changed off line. Nothing moves; a refused change leaves the file as it was."""
+"""`daq teach edit`: changes a taught program off line. Nothing moves; a refused change leaves the file as it was."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def insert(
     input_: Annotated[str | None, typer.Option("--input", help="A process input to wait for: 3=on or 3=off.")] = None,
     gripper: GripperOption = None,
 ) -> None:
-    """Put a new instruction at this number; those from there on move one back."""
+    """Insert an instruction at this number; the following ones move back by one."""
     from daq.teaching import editing
 
     made = _instruction(to=to, by=by, speed=speed, wait=wait, output=output, awaited=input_, gripper=gripper)
@@ -127,7 +127,7 @@ def _edit(context: typer.Context, file: Path, edited: Any) -> None:
     from daq.teaching.program import load_program, save_program
 
     if file.suffix == ".toml":
-        raise SpecError(f"program {file}: is TOML, with comments of yours that would be lost; edit it as text")
+        raise SpecError(f"program {file}: is TOML, and its comments would be lost; edit it as text")
     before = load_program(file)
     after: Program = edited(before)
     machine = load_settings(invocation(context).config_file)[0].machine()
@@ -148,7 +148,7 @@ def _instruction(
     awaited: str | None,
     gripper: str | None,
 ) -> Instruction:
-    """The one instruction that the options name. Raises SpecError for none, several, or wrong values."""
+    """Returns the instruction that the options name. Raises SpecError for none, several, or wrong values."""
     from pydantic import TypeAdapter, ValidationError
 
     from daq.teaching.program import Instruction

@@ -22,7 +22,7 @@ LONGEST_LEAD = 3600.0
 
 app = typer.Typer(
     add_completion=False,
-    help="Jog the arm, lead it by the nose, make steps, and play back. Needs a configured robot, or --port.",
+    help="Jog the arm, lead it by hand, make steps, and play back. Needs a configured robot, or --port.",
     no_args_is_help=True,
 )
 app.add_typer(programs.app, name="programs")
@@ -34,7 +34,7 @@ def jog(
     context: typer.Context,
     speed: Annotated[str, typer.Option(help="Speed to begin with, up to 20 degrees/s.")] = "10",
     program: Annotated[
-        Path | None, typer.Option(help="File for the postures that are kept with `p` (a program, .json).")
+        Path | None, typer.Option(help="File for the postures that `p` saves (a program, .json).")
     ] = None,
     yes: YesOption = False,
 ) -> None:
@@ -130,7 +130,7 @@ def lead(
     if seconds is None and not sys.stdin.isatty():
         raise SpecError("lead: give --seconds, or a terminal in which Enter ends it")
     if not output.name or output.is_dir():
-        raise SpecError(f"lead: {str(output)!r}: is no name for a file; nothing was begun")
+        raise SpecError(f"lead: {str(output)!r}: cannot be the name of a file; nothing was begun")
     if not output.absolute().parent.is_dir():
         raise SpecError(f"lead: {output}: its folder does not exist; nothing was begun")
     led = parse_joints(joints)

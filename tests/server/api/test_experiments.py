@@ -76,4 +76,4 @@ def test_a_stop_while_nothing_waits_pauses_the_queue_until_it_is_resumed(service
     assert service.robot.post("/reset", json={}).status_code == 200
     service.until_arm("idle")
     queue = service.robot.get("/queue").json()
-    assert (queue["paused"], queue["reason"][:22]) == (True, "local asked for a stop")
+    assert (queue["paused"], queue["reason"][:22]) == (True, "local requested a stop")

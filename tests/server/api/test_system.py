@@ -52,7 +52,7 @@ def test_a_disk_that_cannot_be_written_is_not_ready_and_only_who_may_see_the_rob
     stranger = api.get(address, headers=STRANGER)
     assert stranger.status_code == 503
     checks = stranger.json()["checks"]
-    assert {checks["database"], checks["traces"]} == {"not well: a token is needed to be told more"}
+    assert {checks["database"], checks["traces"]} == {"not well: details need a token"}
     assert "/the/folder" not in stranger.text
 
 

@@ -91,7 +91,7 @@ def test_a_trace_whose_file_is_gone_comes_back_with_a_file(shelf: Shelf, noticed
 
 
 def test_a_trace_that_is_there_is_not_taken_in_again(shelf: Shelf) -> None:
-    with pytest.raises(ProblemError, match="is there already"):
+    with pytest.raises(ProblemError, match="exists already"):
         shelf.catalogue.move_in(shelf.copy, shelf.path, summary_of(shelf.copy))
     other = shelf.catalogue.folder / "other.mcap"
     assert not shelf.catalogue.move_in(shelf.copy, other, summary_of(shelf.copy))

@@ -99,7 +99,7 @@ def test_nobody_waits_for_a_reader_once_the_service_ends(tmp_path: Path) -> None
             pass
         workers.close()
         for one in asked:
-            with pytest.raises(ProblemError, match="the service ends"):
+            with pytest.raises(ProblemError, match="the service is ending"):
                 one.result(30)
 
 

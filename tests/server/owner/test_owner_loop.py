@@ -89,7 +89,7 @@ def test_what_would_move_a_robot_that_is_silent_is_refused() -> None:
     order = cast(Any, RunProgram).model_construct(number=7, asked=time.monotonic(), activity="program")
     states, answers = served({2: order})
     assert [(a.number, a.exit_code) for a in answers] == [(7, ReachError.exit_code)]
-    assert "the link is lost; it is being tried again" in answers[0].problem
+    assert "the link is lost; the service tries to reconnect" in answers[0].problem
     assert states[-1] == "idle"
 
 

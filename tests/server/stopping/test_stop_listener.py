@@ -197,7 +197,7 @@ def test_a_stop_that_is_not_delivered_holds_the_queue_at_either_door(tmp_path: P
             assert httpx.post(stop, timeout=30).json()["delivered"] is False
             while not (queue := service.robot.get("/queue").json())["paused"]:
                 assert service.process.poll() is None
-            assert queue["reason"].startswith("local asked for a stop")
+            assert queue["reason"].startswith("local requested a stop")
 
 
 @pytest.mark.parametrize(
