@@ -83,7 +83,7 @@ def probe(point: Point, tried: Sequence[Hypothesis]) -> list[Probe]:
     """Every hypothesis at its best trial, the most promising first; those without a response are left out."""
     clear = projection(point)
     step = step_of_derivatives(point.model)
-    coarse = point.observation.shown(point.model, point.unknowns, point.values, step)
+    coarse = point.observation.shown(point, step)
     fine = [r.measured - e for r, e in zip(point.observation.records, point.residuals, strict=True)]
 
     def best(hypothesis: Hypothesis) -> Probe | None:
@@ -162,13 +162,12 @@ def _simulated(
     They are simulated with the step of derivatives, because derivatives are projected out of them.
     """
     observation = point.observation
-    vector, initials = observation.state(hypothesis.model, point.unknowns, point.values)
-    vectors = np.tile(vector, (len(trials), 1))
-    for row, trial in zip(vectors, trials, strict=True):
+    model = hypothesis.model
+    states = [observation.state(point.of(model)) for _ in trials]
+    for (vector, _), trial in zip(states, trials, strict=True):
         for name, value in trial.items():
-            row[list(hypothesis.model.parameter(name).slots)] = value
-    starts = [np.tile(i, (len(vectors), 1, 1)) for i in initials]
-    shown = observation.readings(hypothesis.model, vectors, starts, step_of_derivatives(hypothesis.model))
+            vector[list(model.parameter(name).slots)] = value
+    shown = observation.readings(model, states, step_of_derivatives(model))
     return observation.weighted([y - y0 for y, y0 in zip(shown, reference, strict=True)])
 
 

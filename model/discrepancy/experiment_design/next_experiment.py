@@ -179,7 +179,7 @@ def _unhidden(
 
     Raises SpecError when the simulation does not stay finite.
     """
-    information, begun = predicted.known_so_far(), predicted.values
+    information, begun = predicted.known_so_far(), predicted.begun.values
     derivatives = predicted.tangents(known)
     delta = target - predicted.shown()
     moved = begun + np.linalg.solve(information + derivatives @ derivatives.T, derivatives @ delta)

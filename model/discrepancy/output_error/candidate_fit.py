@@ -18,6 +18,7 @@ from daq.contracts.errors import SpecError
 from model.discrepancy.candidates.library import TONES, Hypothesis
 from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.tones import tones_tried
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.noise_model import AutoregressiveNoise, fit_noise_model
 from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.search import Point, converge, descend, point_at
@@ -250,8 +251,8 @@ def _start(before: Point, probe: Probe, observation: Observation | None = None, 
     if expected:
         values = [u.expected if u.deviation is not None else v for u, v in zip(unknowns, values, strict=True)]
     tangents = np.concatenate([before.tangents[kept], np.zeros((len(hypothesis.free), before.tangents.shape[1]))])
-    model, there = hypothesis.model, np.array(values)
-    return point_at(observation or before.observation, model, unknowns, there, tangents)
+    begun = Calibration(hypothesis.model, tuple(unknowns), np.array(values))
+    return point_at(observation or before.observation, begun, tangents)
 
 
 def with_evidence(before: Fit, probe: Probe, point: Point) -> CandidateFit:

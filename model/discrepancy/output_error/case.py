@@ -60,7 +60,7 @@ class Case:
 
     def fitted_errors(self, before: Point, after: Point) -> tuple[SignalError, ...]:
         """Errors of every joint on the fitted traces."""
-        old, new = (p.residuals_on(self.scoring) for p in (before, after))
+        old, new = (self.scoring.residuals(p) for p in (before, after))
         return signal_errors(self.scoring, old, new, self.floor)
 
     def held_residuals(self, before: Point, after: Point) -> tuple[Signals, Signals]:
@@ -105,12 +105,12 @@ class Case:
         return remaining_shapes(self._residuals(point), feedback_share=FEEDBACK_SHARE_FOR_ERRORS)
 
     def _residuals(self, point: Point) -> Residuals:
-        left = point.residuals_on(self.scoring)
+        left = self.scoring.residuals(point)
         return Residuals(point.fitted_model, self.scoring.records, left, self.scoring.deviations)
 
     def _square(self, point: Point) -> float:
         """Weighted sum of squares of a point, on the fitted traces as errors are reported."""
-        weighted = self.scoring.weighted(point.residuals_on(self.scoring))
+        weighted = self.scoring.weighted(self.scoring.residuals(point))
         return float(weighted @ weighted)
 
 

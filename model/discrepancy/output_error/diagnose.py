@@ -22,6 +22,7 @@ from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import Note
 from model.discrepancy.localisation.statistics import chance_significance
 from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, improved_baseline, judge
 from model.discrepancy.output_error.case import Case, build_case, errors_of_fit
 from model.discrepancy.output_error.controller_evidence import (
@@ -102,12 +103,11 @@ class _Search:
         return [Added(s.effect, s.joints, s.evidence) for s in self.steps if s.adopted]
 
 
-def _given_point(observation: Observation, model: Model, unknowns: Sequence[Unknown]) -> Point:
+def _given_point(observation: Observation, given: Calibration) -> Point:
     """The model as it was given; its derivatives are left at zero. Wrong gains, which the controller's own numbers
     prove, stay as they are."""
-    free = tuple(u for u in unknowns if u.parameter.effect != "wrong_gain")
-    values = np.array([u.start for u in free])
-    return point_at(observation, model, free, values, np.zeros((len(free), observation.samples)))
+    free = [k for k, u in enumerate(given.unknowns) if u.parameter.effect != "wrong_gain"]
+    return point_at(observation, given.only(free), np.zeros((len(free), observation.samples)))
 
 
 def _fit_tolerances(given: Point) -> Point:

@@ -55,8 +55,7 @@ def _without(point: Point, gone: Sequence[str]) -> Fit:
     for effect, joints in dict.fromkeys((known[n].effect, known[n].joints) for n in gone):
         model = model.without_effect(effect or "", joints or None)
     kept = [k for k, u in enumerate(point.unknowns) if u.name not in gone]
-    unknowns = [point.unknowns[k] for k in kept]
-    begun = point_at(point.observation, model, unknowns, point.values[kept], point.tangents[kept])
+    begun = point_at(point.observation, point.only(kept).of(model), point.tangents[kept])
     return judge(converge(begun, LAST_STEPS))
 
 

@@ -35,8 +35,7 @@ def counting(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 def test_a_fit_that_cannot_reach_its_goal_takes_few_simulations(monkeypatch: pytest.MonkeyPatch) -> None:
     """With a cost to come to that it cannot reach, a fit takes few steps, and has no second way."""
     arm = imagined.arm().with_effect("dead_zone", (2,), {"width": 1.5})
-    observation, model, unknowns = observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
-    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
+    given = point_at(*observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)]))
     before = judge(converge(given, 4))
     (found,) = probe(before.point, hypotheses(before.point.model, ("back_emf_error",), (2,)))
     counted = counting(monkeypatch)
@@ -47,8 +46,8 @@ def test_a_fit_that_cannot_reach_its_goal_takes_few_simulations(monkeypatch: pyt
 
 
 def test_a_point_has_diverged_where_unlikely_numbers_leave_the_record_unexplained() -> None:
-    observation, model, unknowns = observe(imagined.arm(), [imagined.trace(imagined.arm(), seconds=2.0)])
-    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
+    given = point_at(*observe(imagined.arm(), [imagined.trace(imagined.arm(), seconds=2.0)]))
+    unknowns = given.unknowns
     sound = replace(given, weighted=given.weighted / np.sqrt(given.misfit))
     far = sound.values.copy()
     k = [u.name for u in unknowns].index("joint2.motor.rotor_inertia")
@@ -63,9 +62,8 @@ def test_a_point_has_diverged_where_unlikely_numbers_leave_the_record_unexplaine
 def test_a_fit_with_unlikely_numbers_is_restarted() -> None:
     """An inductance that has been taken for a rotor's inertia, ten of its deviations off, with the record explained."""
     arm = imagined.arm().with_effect("motor_inductance", (2,), {"inductance": 0.06})
-    observation, model, unknowns = observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
-    before = judge(point_at(observation, model, unknowns, np.array([u.start for u in unknowns])))
-    (inductance,) = probe(before.point, hypotheses(model, ("motor_inductance",), (2,)))
+    before = judge(point_at(*observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])))
+    (inductance,) = probe(before.point, hypotheses(before.point.model, ("motor_inductance",), (2,)))
     fitted = refit(before, inductance)
     assert fitted is not None
     assert restart(before, fitted) is fitted, "nothing is strange here"
@@ -73,7 +71,7 @@ def test_a_fit_with_unlikely_numbers_is_restarted() -> None:
     k = [u.name for u in point.unknowns].index("joint2.motor.rotor_inertia")
     strained = point.values.copy()
     strained[k] += 10 * (point.unknowns[k].deviation or 0.0)
-    off = point_at(observation, point.model, point.unknowns, strained, point.tangents)
+    off = point.moved_to(strained)
     again = restart(before, with_evidence(before, inductance, off))
     assert again.fit.point.cost < off.cost - 50
     assert abs(again.fit.point.values[k] - point.values[k]) < 2 * (point.unknowns[k].deviation or 0.0)
@@ -81,8 +79,7 @@ def test_a_fit_with_unlikely_numbers_is_restarted() -> None:
 
 def test_a_delay_that_led_the_tolerance_parameters_to_instability_is_fitted_from_the_expected_numbers() -> None:
     arm = imagined.arm().with_effect("input_delay", (3,), {"time": DELAY})
-    observation, model, unknowns = observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)])
-    given = point_at(observation, model, unknowns, np.array([u.start for u in unknowns]))
+    given = point_at(*observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)]))
     before = judge(converge(given, 4))
     (found,) = probe(before.point, hypotheses(before.point.model, ("input_delay",), (3,)))
     fitted = refit(before, found)
