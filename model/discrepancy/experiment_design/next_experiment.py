@@ -24,7 +24,7 @@ from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import UNWRITTEN, DifferencePlace, NextExperiment, Verdict
 from model.discrepancy.experiment_design.signals import Imagined, Planner, Prediction, imagine
 from model.discrepancy.grounds import Note
-from model.discrepancy.localisation.phases import PHASES, phases_of
+from model.discrepancy.localisation.phases import PHASES, AskedMotion
 from model.discrepancy.output_error.candidate_fit import CandidateFit, judge, same_answer
 from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.search import Point, converge
@@ -247,14 +247,15 @@ def _hopeless(
 
 def _differs_at(rival: CandidateFit, observation: Observation, left: Floats) -> DifferencePlace:
     """Joint and phase that hold most of the squared difference (N,) that a rival's parameters could not hide."""
-    model, joints = rival.fit.point.model, rival.hypothesis.joints
+    machine, joints = observation.machine, rival.hypothesis.joints
     record = observation.records[0]
-    phases = np.concatenate([phases_of(model, record)[run] for run in record.runs])
+    every = AskedMotion(machine, record).phases
+    phases = np.concatenate([every[run] for run in record.runs])
     energy = left.reshape(phases.shape) ** 2
     total = max(float(energy.sum()), 1e-300)
     sums = {
         (joint, phase): float(energy[phases[:, column] == number, column].sum())
-        for column, joint in enumerate(model.machine.modelled_joints)
+        for column, joint in enumerate(machine.modelled_joints)
         for number, phase in enumerate(PHASES)
     }
     (joint, phase), most = max(sums.items(), key=lambda item: item[1])

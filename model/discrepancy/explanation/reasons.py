@@ -111,7 +111,7 @@ def _most_affected(found: Motions) -> int:
 
 
 def _fall(model: Model, samples: Samples, joint: int) -> ErrorFall:
-    factor, unit = spoken_unit(model, joint)
+    factor, unit = spoken_unit(model.machine, joint)
     before, after = (factor * float(np.sqrt(np.mean(r**2))) for r in (samples.without, samples.left))
     return ErrorFall(before=before, after=after, unit=unit)
 
@@ -124,7 +124,7 @@ def _units(model: Model, index: int) -> ReadingUnits:
         factor=math.degrees(1.0) if turns else 1e3,
         unit=f"{place}/s" if velocity else place,
         place_unit=place,
-        drive_unit=drive_units(model)[index],
+        drive_unit=drive_units(model.machine)[index],
         torque_unit="N·m" if turns else "N",
         least=0.0 if joint.sensor is None or velocity else LEAST_COUNTS * resolution(joint.sensor),
         turns=turns,

@@ -102,11 +102,17 @@ class Case:
 
     def remaining(self, point: Point) -> tuple[RemainingShape, ...]:
         """What the point leaves of the fitted traces, as torques."""
-        return remaining_shapes(self._residuals(point), feedback_share=FEEDBACK_SHARE_FOR_ERRORS)
+        return remaining_shapes(self._residuals(point))
 
     def _residuals(self, point: Point) -> Residuals:
         left = self.scoring.residuals(point)
-        return Residuals(point.fitted_model, self.scoring.records, left, self.scoring.deviations)
+        return Residuals(
+            model=point.fitted_model,
+            records=self.scoring.records,
+            signals=left,
+            deviations=self.scoring.deviations,
+            feedback_share=FEEDBACK_SHARE_FOR_ERRORS,
+        )
 
     def _square(self, point: Point) -> float:
         """Weighted sum of squares of a point, on the fitted traces as errors are reported."""
