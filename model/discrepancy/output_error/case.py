@@ -22,6 +22,7 @@ from model.discrepancy.output_error.observation import Observation, Signals
 from model.discrepancy.output_error.search import Point
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS, THRESHOLDS, Thresholds
 from model.discrepancy.verdict import excess_removed, rises_too_much
+from model.machine_model.model import Model
 
 Floats = NDArray[np.float64]
 
@@ -31,12 +32,15 @@ class Case:
     """What stays the same during a diagnosis by output error. It is built once and passed whole.
 
     Args:
+        model: as it was given. given: the point of that model, with the gains that records prove, before any fit.
         traces: the fitted ones. scoring: these traces as errors are reported, with less feedback of the record than
             fits get. floor: (n,) rad, the error that noise alone leaves on them.
         held: the held-out traces, if any. floor_held: the same on those; empty without any.
         excluded: effects that need not be tried.
     """
 
+    model: Model
+    given: Point
     traces: tuple[Trace, ...]
     scoring: Observation
     floor: Floats
@@ -50,6 +54,11 @@ class Case:
     def names(self) -> tuple[str, ...]:
         """Identities of the fitted traces."""
         return tuple(t.record.trace_id for t in self.traces)
+
+    @property
+    def held_traces(self) -> tuple[Trace, ...]:
+        """The held-out traces."""
+        return () if self.held is None else self.held.traces
 
     def with_floors_of(self, point: Point) -> Case:
         """The same with floors that are no less than a point's: with play, noise decides where a joint comes to rest,
@@ -121,20 +130,24 @@ class Case:
 
 
 def build_case(
-    point: Point,
+    model: Model,
+    given: Point,
+    fitted: Point,
     traces: Sequence[Trace],
     held: HeldOut | None = None,
     options: DiagnosisOptions | None = None,
     excluded: tuple[str, ...] = (),
 ) -> Case:
-    """The case of traces that a point was fitted to, with the floors that its model gives them."""
-    scoring = point.observation.with_feedback_share(FEEDBACK_SHARE_FOR_ERRORS)
+    """The case of traces that a point was fitted to, with the floors that this point gives them."""
+    scoring = fitted.observation.with_feedback_share(FEEDBACK_SHARE_FOR_ERRORS)
     return Case(
+        model=model,
+        given=given,
         traces=tuple(traces),
         scoring=scoring,
-        floor=noise_floor(scoring, point),
+        floor=noise_floor(scoring, fitted),
         held=held,
-        floor_held=np.zeros(0) if held is None else held.floor(point),
+        floor_held=np.zeros(0) if held is None else held.floor(fitted),
         options=options or DiagnosisOptions(),
         excluded=excluded,
     )

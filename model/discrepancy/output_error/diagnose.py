@@ -70,11 +70,11 @@ def diagnose_by_simulation(
     known = with_findings(model, findings)
     given = _given_point(*observe(known, traces))
     fitted = judge(_fit_tolerances(given))
-    case = build_case(fitted.point, traces, hold_out(known, holdout), options, excluded)
+    case = build_case(model, given, fitted.point, traces, hold_out(known, holdout), options, excluded)
     search = _add_effects(case, _Search(first=fitted, current=fitted), progress, cancel)
     progress(0.95, "writing the answer")
     proved = tuple(proved_step(given.observation, f) for f in findings)
-    answer = _answer(case, model, given, search, proved, ask, tuple(holdout))
+    answer = _answer(case, search, proved, ask)
     progress(1.0, "done")
     return answer.model_copy(update={"seconds": time.perf_counter() - begun})
 
@@ -177,15 +177,7 @@ def _rank(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> tu
     return rank(case, better, progress, cancel), better
 
 
-def _answer(
-    case: Case,
-    model: Model,
-    given: Point,
-    found: _Search,
-    proved: tuple[Step, ...],
-    ask: Asker | None,
-    holdout: tuple[Trace, ...],
-) -> Diagnosis:
+def _answer(case: Case, found: _Search, proved: tuple[Step, ...], ask: Asker | None) -> Diagnosis:
     """The answer that a search has come to, after what is withdrawn of it. It does not know the time that it took."""
     looked = None if found.added else case.where(found.current.point)
     left = _unexplained_joints(case, found, looked)
@@ -201,11 +193,11 @@ def _answer(
         *on_stated_numbers(_stated(end), end.by_name),
         Note(kind="tolerances-fitted-first", values={"traces": len(case.traces)}),
         Note(kind="errors-follow-record", values={"share": FEEDBACK_SHARE_FOR_ERRORS}),
-        *on_unfinished((*case.traces, *holdout)),
-        *(() if holdout else (Note(kind="nothing-held-out"),)),
+        *on_unfinished((*case.traces, *case.held_traces)),
+        *(() if case.held_traces else (Note(kind="nothing-held-out"),)),
         *(() if asked.note is None else (asked.note,)),
     )
-    held = case.held_errors(*case.held_residuals(given, end))
+    held = case.held_errors(*case.held_residuals(case.given, end))
     unknown = answered == "unknown-effect"
     answer = Diagnosis(
         verdict=answered,
@@ -217,11 +209,11 @@ def _answer(
         where=where,
         candidates=_candidates(found),
         remaining=remaining,
-        model_before=model,
-        model_after=_with_lineage(model, end, case.names),
+        model_before=case.model,
+        model_after=_with_lineage(case, end),
         traces=case.names,
-        holdout=tuple(t.record.trace_id for t in holdout),
-        rmse_fit=case.fitted_errors(given, end),
+        holdout=tuple(t.record.trace_id for t in case.held_traces),
+        rmse_fit=case.fitted_errors(case.given, end),
         rmse_holdout=held,
         significant=case.thresholds.significant,
         seconds=0.0,
@@ -272,8 +264,8 @@ def _stated(point: Point) -> list[Unknown]:
     return [u for u in point.unknowns if u.name in known and known[u.name].effect is None]
 
 
-def _with_lineage(model: Model, point: Point, names: tuple[str, ...]) -> Model:
+def _with_lineage(case: Case, point: Point) -> Model:
     """The model of the last fit, and where it comes from."""
     fit = {"misfit": point.misfit, "fitted": [u.name for u in point.unknowns if u.name in point.model.by_name]}
-    lineage = Lineage(parent=model.identity, traces=names, fit=fit, note="diagnosis")
+    lineage = Lineage(parent=case.model.identity, traces=case.names, fit=fit, note="diagnosis")
     return point.fitted_model.with_lineage(lineage)

@@ -34,6 +34,7 @@ problem."""
 class HeldOut:
     """Traces that no parameter is fitted to. starts: the unknowns of their initial postures, each of one trace."""
 
+    traces: tuple[Trace, ...]
     observation: Observation
     starts: tuple[Unknown, ...]
 
@@ -76,7 +77,7 @@ def hold_out(model: Model, traces: Sequence[Trace]) -> HeldOut | None:
     if not traces:
         return None
     observation, given = observe(model, traces, FEEDBACK_SHARE_FOR_ERRORS)
-    return HeldOut(observation, tuple(u for u in given.unknowns if u.kind is Kind.INITIAL_POSITION))
+    return HeldOut(tuple(traces), observation, tuple(u for u in given.unknowns if u.kind is Kind.INITIAL_POSITION))
 
 
 def signal_errors(observation: Observation, before: Signals, after: Signals, floor: Floats) -> tuple[SignalError, ...]:

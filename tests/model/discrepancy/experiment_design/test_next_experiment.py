@@ -64,7 +64,7 @@ def known(trace: Trace) -> Point:
 def ranking(trace: Trace, effects: tuple[str, ...]) -> Ranking:
     """These effects on joint 2, fitted and ranked."""
     point = known(trace)
-    case = build_case(point, [trace], options=DiagnosisOptions(effects=effects, joints=(2,)))
+    case = build_case(point.model, point, point, [trace], options=DiagnosisOptions(effects=effects, joints=(2,)))
     return rank(case, judge(point), silent, Never())
 
 
