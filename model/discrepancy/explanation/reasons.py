@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from daq.contracts.errors import SpecError
+from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import Candidate, FoundValue
 from model.discrepancy.explanation.effect_words import of_joint
 from model.discrepancy.explanation.patterns import GENERAL, PATTERNS, is_off
@@ -53,16 +54,15 @@ def reason(
     Raises SpecError when a simulation does not stay finite.
     """
     found = motions(model, without_effect(model, before, effect, joints, parameters), records, signal, left)
-    modelled = model.machine.modelled_joints
+    machine, modelled = model.machine, model.machine.modelled_joints
     own = list(joints) or [modelled[_most_affected(found)]]
     joint = max(own, key=lambda j: _gone(found.joint(modelled.index(j))))
-    index = modelled.index(joint)
-    samples = found.joint(index)
+    samples = found.joint(modelled.index(joint))
     return Reason(
         joint=joint,
         pattern=clearest_pattern(effect, samples, parameters, joint),
-        units=_units(model, index),
-        rms=_fall(model, samples, joint),
+        units=_units(machine, joint),
+        rms=_fall(samples, *spoken_unit(machine, joint)),
         rival=None if rival is None else NamedEffect(effect=rival.effect, joints=rival.joints, evidence=rival.evidence),
     )
 
@@ -110,21 +110,20 @@ def _most_affected(found: Motions) -> int:
     return max(range(count), key=lambda j: _gone(found.joint(j)))
 
 
-def _fall(model: Model, samples: Samples, joint: int) -> ErrorFall:
-    factor, unit = spoken_unit(model.machine, joint)
+def _fall(samples: Samples, factor: float, unit: str) -> ErrorFall:
     before, after = (factor * float(np.sqrt(np.mean(r**2))) for r in (samples.without, samples.left))
     return ErrorFall(before=before, after=after, unit=unit)
 
 
-def _units(model: Model, index: int) -> ReadingUnits:
-    joint = model.machine.joint(model.machine.modelled_joints[index])
+def _units(machine: Machine, number: int) -> ReadingUnits:
+    joint = machine.joint(number)
     turns, velocity = joint.kind == "revolute", joint.sensor is not None and joint.sensor.measures == "velocity"
     place = "°" if turns else "mm"
     return ReadingUnits(
         factor=math.degrees(1.0) if turns else 1e3,
         unit=f"{place}/s" if velocity else place,
         place_unit=place,
-        drive_unit=drive_units(model.machine)[index],
+        drive_unit=drive_units(machine)[machine.modelled_joints.index(number)],
         torque_unit="N·m" if turns else "N",
         least=0.0 if joint.sensor is None or velocity else LEAST_COUNTS * resolution(joint.sensor),
         turns=turns,
