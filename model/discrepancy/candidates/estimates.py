@@ -43,7 +43,7 @@ def found_values(found: Fit, parameters: Sequence[Parameter], shift: Floats | fl
         known = np.isfinite(deviation) and point.tangents[k] @ point.tangents[k] > 0
         low = max(unknown.low, value - INTERVAL * deviation) if known else None
         high = min(unknown.high, value + INTERVAL * deviation) if known else None
-        values[p.name] = FoundValue(value=value, low=low, high=high, unit=p.unit)
+        values[p.name] = FoundValue.of(p, value, low, high)
     return values
 
 
@@ -90,9 +90,7 @@ def standard_deviations(
 def listed(found: CandidateFit) -> Candidate:
     """A candidate for the answer's list: estimates without intervals, because its derivatives are not those at its
     end."""
-    values = {}
-    for p in found.hypothesis.free:
-        values[p.name] = FoundValue(value=found.fit.point.value(p.name), low=None, high=None, unit=p.unit)
+    values = {p.name: FoundValue.of(p, found.fit.point.value(p.name)) for p in found.hypothesis.free}
     return Candidate(
         effect=found.hypothesis.name,
         joints=found.hypothesis.joints,

@@ -30,7 +30,7 @@ LOW = 0.15
 """Share of the largest drive below which the drive counts as low."""
 
 FindPattern = Callable[[Samples, Mapping[str, float]], Pattern | None]
-"""Finds a pattern in samples, given the effect's parameters by last name; None where the record cannot show it."""
+"""Finds a pattern in samples, given the effect's parameters by part; None where the record cannot show it."""
 
 
 def lags_alike(s: Samples, _: Mapping[str, float]) -> Pattern | None:

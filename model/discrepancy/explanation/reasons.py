@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import Candidate, FoundValue
-from model.discrepancy.explanation.effect_words import of_joint
 from model.discrepancy.explanation.patterns import GENERAL, PATTERNS, is_off
 from model.discrepancy.explanation.samples import Left, Motions, Samples, motions
 from model.discrepancy.grounds import ErrorFall, NamedEffect, Pattern, Reason
@@ -71,7 +70,7 @@ def clearest_pattern(
     effect: str, samples: Samples, parameters: Mapping[str, FoundValue], joint: int | None = None
 ) -> Pattern:
     """The first of an effect's patterns that is clear in a record, else the clearest."""
-    values = by_last_name(parameters, joint)
+    values = by_part(parameters.values(), joint)
     found = [p for find in PATTERNS.get(effect, GENERAL) if (p := find(samples, values)) is not None]
     if not found:
         return is_off(samples)
@@ -93,10 +92,10 @@ def without_effect(
         return result
 
 
-def by_last_name(parameters: Mapping[str, FoundValue], joint: int | None) -> dict[str, float]:
-    """Values by the last part of their names; those of one joint where several have them."""
-    own = {n: v for n, v in parameters.items() if joint is None or of_joint(n, joint)}
-    return {n.rpartition(".")[2]: v.value for n, v in (own or parameters).items()}
+def by_part(found: Collection[FoundValue], joint: int | None) -> dict[str, float]:
+    """Values by the part of the effect that they are; those of one joint where several have them."""
+    own = [v for v in found if joint is None or joint in v.joints]
+    return {v.part: v.value for v in own or found}
 
 
 def _gone(samples: Samples) -> float:

@@ -264,19 +264,18 @@ def _torque_reason(step: Step, reason: Reason) -> str:
     place = f"{joints_in_words(step.joints)}: " if step.joints else ""
     seen = shape_in_torques(step.effect or "", slides=reason.slides)
     several = len(step.joints) > 1
-    sizes = ", ".join(_torque_size(n, v, several=several, slides=reason.slides) for n, v in step.parameters.items())
+    sizes = ", ".join(_torque_size(v, several=several, slides=reason.slides) for v in step.parameters.values())
     if reason.removed is None:
         return f"{place}{seen} ({sizes})"
     return f"{place}{seen} ({sizes}); it takes {reason.removed:.0%} off the mean square on records not fitted to"
 
 
-def _torque_size(name: str, value: FoundValue, *, several: bool, slides: bool) -> str:
-    group, last = name.partition(".")[0], name.rpartition(".")[2]
-    on = f" of {group}" if several and "joint" in group else ""
+def _torque_size(value: FoundValue, *, several: bool, slides: bool) -> str:
+    on = f" of {joints_in_words(value.joints)}" if several and value.joints else ""
     unit = "" if value.unit == "1" else f" {value.unit}"
-    if last == "cycles":  # rad of phase per rad (m): cycles a turn, or 2π times those a metre
+    if value.part == "cycles":  # rad of phase per rad (m): cycles a turn, or 2π times those a metre
         unit = f" rad/m, {plain(value.value / (2 * math.pi), 3)} a metre" if slides else " a turn"
-    return f"{last}{on} {plain(value.value, 3)}{unit}"
+    return f"{value.part}{on} {plain(value.value, 3)}{unit}"
 
 
 def _taken_off(reason: Reason) -> str:

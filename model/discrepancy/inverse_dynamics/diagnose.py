@@ -242,9 +242,7 @@ class _Workflow:
 
     def _candidate(self, c: Fitted) -> Candidate:
         squares = holdout.mean_squares(self.case.stretches, c.fit.residual)
-        values = {
-            p.name: FoundValue(value=c.fit.values[p.name], low=None, high=None, unit=p.unit) for p in c.parameters
-        }
+        values = {p.name: FoundValue.of(p, c.fit.values[p.name]) for p in c.parameters}
         return Candidate(
             effect=c.effect,
             joints=c.joints,

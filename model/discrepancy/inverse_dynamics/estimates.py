@@ -30,10 +30,10 @@ def found_values(now: BalanceFit, parameters: Sequence[Parameter], data: Data) -
         value, deviation = now.values[p.name], deviations.get(p.name)
         typical = max(abs(value), p.deviation or 0.0)
         if deviation is None or not np.isfinite(deviation) or deviation > BOUNDED * typical:
-            result[p.name] = FoundValue(value=value, low=None, high=None, unit=p.unit)
+            result[p.name] = FoundValue.of(p, value)
             continue
         low, high = value - NORMAL_95 * deviation, value + NORMAL_95 * deviation
-        result[p.name] = FoundValue(value=value, low=max(low, p.low), high=min(high, p.high), unit=p.unit)
+        result[p.name] = FoundValue.of(p, value, max(low, p.low), min(high, p.high))
     return result
 
 

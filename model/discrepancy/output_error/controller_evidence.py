@@ -186,7 +186,9 @@ def proved_step(observation: Observation, finding: ControllerFinding) -> Step:
     """A step that a finding proves. Nothing is fitted: its evidence is the number of samples, its errors are zero."""
     part = "relative" if finding.effect == "wrong_gain" else "share"
     name = f"joint{finding.joint}.{finding.effect}.{part}"
-    value = FoundValue(value=finding.value, low=finding.low, high=finding.high, unit="1")
+    value = FoundValue(
+        value=finding.value, low=finding.low, high=finding.high, unit="1", part=part, joints=(finding.joint,)
+    )
     evidence = float(finding.samples)
     proof = Candidate(
         effect=finding.effect, joints=(finding.joint,), evidence=evidence, parameters={name: value}, refitted=False
