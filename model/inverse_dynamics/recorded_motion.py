@@ -12,9 +12,9 @@ from scipy.signal import butter, sosfiltfilt
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import Machine, NoController
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.inverse_dynamics.readings import Readings, readings_of
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 ORDER = 4

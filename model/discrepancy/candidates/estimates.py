@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from model.arrays import Floats
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import Candidate, FoundValue
 from model.discrepancy.output_error.candidate_fit import CandidateFit, Fit, price_of, says_no_more
@@ -16,8 +16,6 @@ from model.discrepancy.output_error.search import Point, descend
 from model.fitting.fit import INTERVAL
 from model.fitting.whitening import Whitener
 from model.machine_model.parameter import Parameter
-
-Floats = NDArray[np.float64]
 
 FEEDBACK_SHARE_FOR_INTERVALS = 0.9
 """Feedback share for the question how far noise has shifted an estimate: half as far from the record as the fits."""

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.discrepancy.candidates.library import SMALL, Hypothesis
 from model.discrepancy.output_error.observation import side_by_side, step_of_derivatives
 from model.discrepancy.output_error.search import Point
-
-Floats = NDArray[np.float64]
 
 LARGEST_STRETCH = 2.0
 """Largest factor by which a trial is scaled: beyond it, the response is no longer proportional."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import fft, ifft, next_fast_len
 
+from model.arrays import Floats
 from model.discrepancy.candidates.library import TONES, Hypothesis, tone
 from model.discrepancy.candidates.probing import Probe, Projection, projection
 from model.discrepancy.output_error.observation import DIFFERENCE, Observation
@@ -21,8 +22,6 @@ from model.discrepancy.output_error.search import Point
 from model.fitting.records import Record, resolution
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.model import Model
-
-Floats = NDArray[np.float64]
 
 RESPONSE = 1.5
 """Length of the impulse response, s: a simulation that is given most of the record returns slowly."""

@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, OfferedExperiment
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.discrepancy.candidates.decision import Decision
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import UNWRITTEN, DifferencePlace, NextExperiment, Verdict
@@ -30,7 +30,6 @@ from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.search import Point, converge
 from model.effects.names import effect_on
 
-Floats = NDArray[np.float64]
 Pair = tuple[int, int]
 
 LEAST = 3.0

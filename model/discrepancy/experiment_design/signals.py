@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import DaqError
 from daq.contracts.experiment import ExperimentSpec
+from model.arrays import Floats
 from model.design.information import imagined_trace
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.observation import Observation, Signals, observe
@@ -22,7 +22,6 @@ from model.discrepancy.output_error.search import Point
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 
-Floats = NDArray[np.float64]
 Planner = Callable[[ExperimentSpec], Floats]
 """Plans an experiment: set points (k, joints of the machine) in rad, one row a control period. It raises a DaqError
 (one line) for an experiment that may not be carried out. Given by the caller: planning belongs to `daq`."""

@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.discrepancy.explanation.samples import Samples
 from model.discrepancy.grounds import Pattern, PatternKind
 from model.discrepancy.localisation.phases import CREEPING_SPEED, TURNING
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 NEAR_CHANGE = 0.1

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.machine import NoController
+from model.arrays import Floats
 from model.discrepancy.localisation.phases import HOLD, AskedMotion
 from model.fitting.records import Record, Signal
 from model.machine_model.model import Model
@@ -17,7 +18,6 @@ from model.simulation.chain_of_model import gravity_loads
 from model.simulation.prepared import Options
 from model.simulation.simulate import Simulation, at_rows, simulate
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 

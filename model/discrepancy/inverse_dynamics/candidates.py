@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.machine import DcMotor, NoController
 from model import layout as at
+from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.case import Case
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.effects.effect import Effect
@@ -19,7 +19,6 @@ from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, levels_along
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
-Floats = NDArray[np.float64]
 Start = dict[str, float]
 
 UNSEEN = "damping"

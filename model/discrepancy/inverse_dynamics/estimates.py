@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.discrepancy.diagnosis import FoundValue, SignalError
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data
 from model.discrepancy.inverse_dynamics.likelihood import LONGEST_MEMORY
 from model.fitting.covariance import sandwich
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-
-Floats = NDArray[np.float64]
 
 BOUNDED = 3.0
 """Standard deviation of an estimate, in sizes of the parameter, above which the data do not bound it."""

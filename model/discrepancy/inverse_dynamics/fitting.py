@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.likelihood import (
     NoiseModel,
     Stretches,
@@ -18,7 +18,6 @@ from model.discrepancy.inverse_dynamics.likelihood import (
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics.torque_balance import TorqueBalance
 
-Floats = NDArray[np.float64]
 Slopes = dict[str, list[Floats]]
 """Derivatives (m, n) of the residual of every record, by parameter."""
 

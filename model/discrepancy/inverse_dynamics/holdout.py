@@ -8,14 +8,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data, fit
 from model.discrepancy.inverse_dynamics.likelihood import Stretches, stretches_of
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-
-Floats = NDArray[np.float64]
 
 FOLDS = 4
 """Blocks into which the fitted records are cut where none are held out; each is predicted from the others."""

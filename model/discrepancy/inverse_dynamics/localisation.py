@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.discrepancy.diagnosis import (
     UNWRITTEN,
     AgainstWhat,
@@ -23,8 +23,6 @@ from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.localisation.dependence import AGAINST, Quantities, dependence
 from model.discrepancy.localisation.statistics import Bins, correlation_of, significance_of_chi_square
 from model.inverse_dynamics.recorded_motion import RecordedMotion
-
-Floats = NDArray[np.float64]
 
 WINDOW = 0.5
 """Duration of one cell of the map, s."""

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.candidates import Start, Trial
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data, Slopes, prior_rows, stacked
 from model.inverse_dynamics.torque_balance import TorqueBalance
-
-Floats = NDArray[np.float64]
 
 NONLINEAR = frozenset(
     {

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.progress import Cancel, Progress, stop_if
+from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.candidates import Start, list_trials
 from model.discrepancy.inverse_dynamics.case import Case
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data, Slopes, fit
@@ -18,8 +18,6 @@ from model.discrepancy.inverse_dynamics.tolerances import free_unknown
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-
-Floats = NDArray[np.float64]
 
 SHORTLIST = 7
 """Most effects that are fitted after the probes."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from model.discrepancy.candidates.library import TONES, Hypothesis
@@ -23,8 +22,6 @@ from model.discrepancy.output_error.noise_model import AutoregressiveNoise, fit_
 from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.search import Point, converge, descend, point_at
 from model.fitting.unknowns import Unknown
-
-Floats = NDArray[np.float64]
 
 STEPS = 8
 """Steps of a search for a candidate's fit."""

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.discrepancy.diagnosis import RemainingShape, SignalError, Where
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.localisation.disagreement import locate
@@ -23,8 +23,6 @@ from model.discrepancy.output_error.search import Point
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS, THRESHOLDS, Thresholds
 from model.discrepancy.verdict import excess_removed, rises_too_much
 from model.machine_model.model import Model
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

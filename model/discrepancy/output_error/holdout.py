@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.discrepancy.diagnosis import SignalError
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.noise_floor import noise_floor
@@ -19,8 +19,6 @@ from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
-
-Floats = NDArray[np.float64]
 
 DISTURBANCE = "periodic_disturbance"
 BLOCK = 0.2

@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.thresholds import FEEDBACK_SHARE
 from model.fitting.fit import fit_problem
@@ -37,7 +37,6 @@ from model.simulation.period import OUT_READING, OUTPUTS
 from model.simulation.prepared import Options, Prepared, prepare
 from model.simulation.simulate import at_rows
 
-Floats = NDArray[np.float64]
 Signals = tuple[Floats, ...]
 """One array (m, n) a record."""
 State = tuple[Floats, list[Floats]]

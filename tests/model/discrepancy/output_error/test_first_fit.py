@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from model.arrays import Floats
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.diagnose import _fit_tolerances, _given_point
 from model.discrepancy.output_error.observation import Observation, Signals, observe
@@ -17,7 +16,6 @@ from model.discrepancy.output_error.search import Point
 from model.discrepancy.thresholds import FEEDBACK_SHARE
 from tests.model.fitting import imagined
 
-Floats = NDArray[np.float64]
 UNSTABLE = "the simulation does not stay finite: the loop is unstable"
 
 
