@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from model.discrepancy.candidates.library import hypotheses
-from model.discrepancy.candidates.probing import probe
-from model.discrepancy.output_error.candidate_fit import diverged_from_prior, judge, refit, restart, with_evidence
+from daq.contracts.errors import SpecError
+from model.arrays import Floats
+from model.discrepancy.candidates.library import Hypothesis, hypotheses
+from model.discrepancy.candidates.probing import Probe, probe
+from model.discrepancy.output_error.calibration import Calibration
+from model.discrepancy.output_error.candidate_fit import (
+    CandidateFit,
+    diverged_from_prior,
+    judge,
+    polish,
+    refit,
+    restart,
+    with_evidence,
+)
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.search import converge, point_at
 from tests.model.fitting import imagined
@@ -86,3 +98,28 @@ def test_a_delay_that_led_the_tolerance_parameters_to_instability_is_fitted_from
     assert fitted is not None
     assert fitted.fit.point.cost < 0.6 * before.point.cost
     assert fitted.fit.point.value("joint3.input_delay.time") > 0.7 * DELAY
+
+
+@dataclass(frozen=True)
+class Asked(Observation):
+    """An observation that notes the names of the unknowns by which it is differentiated, and then gives up."""
+
+    names: list[str] = field(default_factory=list)
+
+    def tangents(self, tried: Calibration, which: Sequence[int] | None = None) -> Floats:
+        self.names.extend(tried.unknowns[k].name for k in which or ())
+        raise SpecError("the simulation does not stay finite: the loop is unstable")
+
+
+def test_a_polished_fit_gets_new_derivatives_by_all_numbers_that_act_on_its_joints() -> None:
+    """A number that joint 2 shares with joint 1 is one of them, and so is one of the whole machine."""
+    shared = imagined.arm().with_effect("dead_zone", (1, 2), {"width": 0.1}, shared=True)
+    observation, given = observe(shared, [imagined.trace(shared, seconds=2.0)])
+    point = point_at(observation, given, np.zeros((len(given.unknowns), observation.samples)))
+    asked = Asked(observation.machine, observation.records, observation.deviations, observation.unit, ())
+    hypothesis = Hypothesis("stiction", (2,), given.model, (), (), proportional=True)
+    probed = Probe(hypothesis, 20.0, {}, np.zeros(len(given.values)), np.zeros_like(point.weighted))
+    found = CandidateFit(probed, judge(replace(point, observation=asked)), evidence=20.0)
+    assert polish(judge(point), found) is found, "its simulations fail"
+    assert {"joints1+2.dead_zone.width", "load.mass", "joint2.motor.resistance"} <= set(asked.names)
+    assert not any(name.startswith(("joint1.", "joint3.")) for name in asked.names)
