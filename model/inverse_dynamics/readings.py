@@ -1,5 +1,5 @@
-"""What a trace measures, how noisy it is, up to which frequency its accelerations can be trusted, and what its noise
-alone makes of a residual torque."""
+"""What a trace measures, how noisy it is, up to which frequency its accelerations can be trusted, and how much residual
+torque its noise alone causes."""
 
 from __future__ import annotations
 

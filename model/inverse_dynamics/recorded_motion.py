@@ -33,7 +33,7 @@ SHORTEST = 1.0
 TURNING_NOISE = 2.0
 """Speed within which friction changes direction, in standard deviations of the speed's noise."""
 RESOLVED = 5.0
-"""Speed from which a joint is known to move, in speeds within which friction changes direction."""
+"""Speed from which a joint is known to move, as a multiple of the speed within which friction changes direction."""
 REST_NOISE = 4.0
 """Speed below which a joint may be at rest, in standard deviations of the speed's noise."""
 REST_SHARE = 0.02

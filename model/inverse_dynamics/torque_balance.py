@@ -28,7 +28,7 @@ NOT_IN_TORQUES = {
     "lost_set_points": "acts before the drive that is recorded",
     "stiction": "shows in the moment of breaking away, which low-passed torques do not resolve",
 }
-"""Effects that leave no mark in low-passed torques of the recorded drive, and why. All others take part."""
+"""Effects that low-passed torques of the recorded drive do not show, and why. All others take part."""
 DIFFERENCE = 1e-3
 """Step of the finite differences, as a share of a parameter's natural size: torques are smooth or piecewise linear."""
 CONTACT_SHARE = 0.02

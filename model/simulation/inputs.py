@@ -19,9 +19,9 @@ REST_PERIODS = 25
 NEIGHBOURS = 1.5
 """Largest distance, in periods, of samples without a gap between them."""
 NEARLY = 1e-6
-"""Distance, in periods, that is only rounding."""
+"""Distance, in periods, that counts as rounding."""
 LARGEST_ANGLE = 20.0
-"""Largest angle, rad, that is taken as such; more than three turns of a joint are taken for degrees."""
+"""Largest plausible angle, rad; more than three turns of a joint are taken for degrees."""
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,9 @@ from model.fitting.whitening import Whitener
 from model.machine_model.parameter import Parameter
 
 FEEDBACK_SHARE_FOR_INTERVALS = 0.9
-"""Feedback share for the question how far noise has shifted an estimate: half as far from the record as the fits."""
+"""Feedback share with which the shift of an estimate by noise is measured: half as far from the record as the fits."""
 MOST_STEPS = 8
-"""Steps of the search that answers it."""
+"""Most steps of the search that measures it."""
 
 
 def found_values(found: Fit, parameters: Sequence[Parameter], shift: Floats | float = 0.0) -> dict[str, FoundValue]:
@@ -51,8 +51,8 @@ def shift_by_noise(point: Point, parameters: Sequence[Parameter]) -> Floats:
 
     Noise that passes a law with a corner or a limit does not average out: a dead zone looks narrower, friction near
     zero speed softer. As in the extrapolation of simulated noise (Cook and Stefanski 1994), the bias shows where there
-    is less noise. The remaining way to no noise is about as long again, and two deviations reach so far. All zero where
-    that fit does not stay finite.
+    is less noise. The distance that remains to no noise is about as long again, and two deviations cover it. All zero
+    where that fit does not stay finite.
     """
     nearer = point.observation.with_feedback_share(FEEDBACK_SHARE_FOR_INTERVALS)
     names = {p.name for p in parameters}
@@ -66,9 +66,9 @@ def shift_by_noise(point: Point, parameters: Sequence[Parameter]) -> Floats:
 def standard_deviations(
     precision: Floats, whiteners: Sequence[Whitener], tangents: Sequence[Sequence[Floats]]
 ) -> Floats:
-    """(p,) of estimates by least squares that take a residual for white noise of unit size: what that gives, or, where
-    it is more, what the residual's own covariance Σ gives, H⁻¹ (J Σ Jᵀ + P) H⁻¹ with H = J Jᵀ + P (White 1980). Never
-    less, because a fit takes slow noise out of its residual.
+    """(p,) of estimates by least squares that treat the residual as white noise of unit size: their own standard
+    deviations or, where larger, those that follow from the residual's covariance Σ, H⁻¹ (J Σ Jᵀ + P) H⁻¹ with H = J Jᵀ
+    + P (White 1980). They are never smaller, because a fit takes slow noise out of its residual.
 
     Args:
         precision: P, (p,) of the priors. whiteners: of each joint's residual.

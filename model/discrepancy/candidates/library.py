@@ -71,7 +71,7 @@ class Hypothesis:
 def hypotheses(
     model: Model, effects: Sequence[str] | None = None, joints: Sequence[int] | None = None
 ) -> tuple[Hypothesis, ...]:
-    """Every effect that the model could get, except those that a spectrum finds.
+    """Every effect that the model could take, except those that a spectrum finds.
 
     Raises SpecError for unknown names, and for joints that are not modelled.
 

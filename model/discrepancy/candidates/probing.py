@@ -1,4 +1,4 @@
-"""Probes: what every hypothesis could take off the residual once the tolerance parameters have moved too.
+"""Probes: how much of the residual every hypothesis could remove, with the tolerance parameters free to follow.
 
 A hypothesis is simulated at a few sizes, not differentiated where the effect is absent: backlash, a dead zone or a
 limit has no useful derivative there. The difference it makes is compared with the residual, after what the tolerance
@@ -171,7 +171,8 @@ def _simulated(
 
 
 def _from_here(point: Point, hypothesis: Hypothesis, trial: dict[str, float]) -> dict[str, float]:
-    """The trial; that of a parameter which the point has found already, with a prior, is as far from its value now."""
+    """The trial; where the point has already fitted a parameter under its prior, the trial is as far from that
+    value."""
     if not hypothesis.proportional:
         return trial
     held = {u.name: float(v) for u, v in zip(point.unknowns, point.values, strict=True)}

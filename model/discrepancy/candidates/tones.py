@@ -24,7 +24,7 @@ from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.model import Model
 
 RESPONSE = 1.5
-"""Length of the impulse response, s: a simulation that is given most of the record returns slowly."""
+"""Length of the impulse response, s: a simulation that is given most of the record decays slowly."""
 SHAPES = {"torque_ripple": "cycles", "periodic_disturbance": "frequency"}
 """The parameter of each effect that a spectrum finds."""
 TRIAL_RATES = {"torque_ripple": (23.0, 47.0), "periodic_disturbance": (0.7, 2.1, 4.3)}

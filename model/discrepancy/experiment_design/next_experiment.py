@@ -38,11 +38,11 @@ name."""
 SURE = 20.0
 """Margin of evidence below which an experiment is asked for although one effect was named."""
 MOST_RIVALS = 4
-"""Rivals that an experiment is chosen for: each one costs its simulations on every experiment."""
+"""Most rivals among which an experiment is to decide: each of them is simulated on every experiment."""
 SETTLING = 5
-"""Steps of each search that takes a rival's fit to its end."""
+"""Steps of each search that runs a rival's fit to convergence."""
 ENOUGH = 10.0
-"""Separation beyond which more is of no use, in deviations: a shorter experiment is better."""
+"""Separation beyond which a shorter experiment is better than more separation, in deviations."""
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,8 @@ def rivals_of(ranking: Ranking, decision: Decision) -> tuple[CandidateFit, ...]:
 
 
 def converge_rivals(rivals: Sequence[CandidateFit]) -> list[CandidateFit]:
-    """Rivals with their fits taken to the end, from derivatives computed there: a difference that a fit would still
-    take away separates nothing. A rival on the verge of instability has no derivatives and is left out."""
+    """Rivals with their fits run to convergence and new derivatives: a difference that a fit would still remove
+    separates nothing. A rival on the verge of instability has no derivatives and is left out."""
     found = []
     for rival in rivals[:MOST_RIVALS]:
         point = converge(rival.fit.point, SETTLING)
@@ -212,7 +212,8 @@ def _information(
 
 
 def _worth(separation: float, duration: float) -> tuple[bool, float]:
-    """Experiments that tell come first; of them the one with the most separation, up to enough, a second."""
+    """The rank of an experiment: those that separate come first, then the most separation (up to `ENOUGH`) per
+    second."""
     return separation >= LEAST, min(separation, ENOUGH) ** 2 / duration
 
 

@@ -12,7 +12,7 @@ from model.effects.library import effect as effect_of
 
 @dataclass(frozen=True)
 class EffectWords:
-    """What an effect is called, and the last name of the parameter that is its size, if there is one."""
+    """What an effect is called, and which part of it is its size, if one is."""
 
     called: str
     size: str | None

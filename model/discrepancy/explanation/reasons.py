@@ -1,4 +1,4 @@
-"""What a record shows of an effect, as data: the clearest pattern without it, and what it takes off."""
+"""What a record shows of an effect, as data: the clearest pattern without it, and how far the error falls with it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from model.fitting.records import Record, Signal, resolution
 from model.machine_model.model import Model
 
 CLEAR = 0.1
-"""Share of a residual from which a pattern is taken before those that come after it in an effect's list."""
+"""Share of a residual from which a pattern is preferred to those after it in an effect's list."""
 LEAST_COUNTS = 0.1
 """Counts of a joint's sensor; a smaller deviation is not written as a number."""
 
@@ -37,7 +37,7 @@ def reason(
     rival: Candidate | None = None,
     left: Left | None = None,
 ) -> Reason:
-    """What speaks for an effect: the pattern that a record shows without it, and what it takes off.
+    """What speaks for an effect: the pattern that a record shows without it, and how far the error falls with it.
 
     The pattern is that of measured − simulated where the simulation has everything but the effect: the numbers of the
     fitted model, with the effect taken out again. So neither the other parameters nor the effect hide it.
@@ -69,7 +69,7 @@ def reason(
 def clearest_pattern(
     effect: str, samples: Samples, parameters: Mapping[str, FoundValue], joint: int | None = None
 ) -> Pattern:
-    """The first of an effect's patterns that is clear in a record, else the clearest."""
+    """The first of an effect's patterns that is clear in a record; if none is, the clearest."""
     values = by_part(parameters.values(), joint)
     found = [p for find in PATTERNS.get(effect, GENERAL) if (p := find(samples, values)) is not None]
     if not found:

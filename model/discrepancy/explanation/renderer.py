@@ -1,4 +1,5 @@
-"""Makes the sentences of an answer from its data: the last step of a diagnosis, and the only place that words it.
+"""Makes the sentences of an answer from its data. This is the last step of a diagnosis, and the only one that writes
+prose.
 
 Whoever wants to know something of an answer reads its data; sentences are for people and are not read back.
 """

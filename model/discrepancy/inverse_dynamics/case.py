@@ -14,7 +14,7 @@ from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 
 FLOOR_SHARE = 0.3
-"""Share of the estimated noise below which no residual is believed to be: the estimate itself is rough."""
+"""Least deviation of a residual, as a share of the estimated noise: the estimate itself is rough."""
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,8 @@ CHANCES = 3
 SHOWN = 12
 """Most candidates that a step lists."""
 ABOVE_NOISE = 1.2
-"""Least mean square on held-out records, in those of noise, of a joint that counts for the share removed."""
+"""Least mean square of a joint on held-out records, relative to that of noise, with which it counts for the share
+removed."""
 
 
 def diagnose_torques(
@@ -163,7 +164,7 @@ class _Workflow:
         self.now = self._fit(self.model, chosen.fit.values)
 
     def _timing(self, found: Findings, chosen: Fitted) -> Fitted | None:
-        """A delay of less than a sample that explains what the chosen effect does.
+        """A delay of less than a sample that explains as much as the chosen effect.
 
         No record tells whether a recorded drive acted at its moment or until the next sample: such a delay is taken
         into the model, and is no effect.
@@ -266,7 +267,8 @@ class _Workflow:
                 self.notes.append(Note(kind="taken-out-again", values={"effect": step.effect, "step": index + 1}))
 
     def _as_last_fitted(self) -> tuple[Step, ...]:
-        """The steps with the parameters of the last fit: those of their own were biased by what was still missing."""
+        """The steps with the parameters of the last fit: a step's own values are biased by effects that were found
+        after it."""
         steps = []
         for step in self.steps:
             own = [self.model.parameter(name) for name in step.parameters] if step.adopted else []
@@ -278,7 +280,8 @@ class _Workflow:
         return tuple(steps)
 
     def _shares(self) -> Note:
-        """Residual as a share of the recorded torque, before and after: a figure that is usual in the literature."""
+        """Residual as a share of the recorded torque, before and after: the figure that the literature usually
+        gives."""
         held = self.case.held_out
         records = held or self.case.records
         before = holdout.relative_torque_error(self.begin.with_values(self.first), records)
@@ -294,7 +297,7 @@ class _Workflow:
         return signal_errors(self.model, before, after, self.case.noise)
 
     def answer(self, traces: list[str], held_out: list[str], cutoff: float) -> Diagnosis:
-        """The whole answer, but for the times it took."""
+        """The whole answer, except for the times that it took."""
         shapes = remaining_shapes(self.now, self.case)
         steps = self._as_last_fitted()
         adopted = [s for s in steps if s.adopted]

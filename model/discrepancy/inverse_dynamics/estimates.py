@@ -15,7 +15,7 @@ from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
 BOUNDED = 3.0
-"""Standard deviation of an estimate, in sizes of the parameter, above which the data do not bound it."""
+"""Standard deviation of an estimate, relative to the parameter's size, above which the data do not bound it."""
 NORMAL_95 = 1.959964
 """Half width of a 95 % interval of the normal distribution, in standard deviations."""
 

@@ -39,7 +39,7 @@ class Data:
 
 @dataclass(frozen=True)
 class BalanceFit:
-    """A structure of model with its unknowns at their best.
+    """A model whose unknowns have their best values.
 
     residual: per record (m, n). by_joint: −2 log likelihood (n,); prior: −2 log prior.
     """
@@ -62,7 +62,7 @@ class BalanceFit:
         return self.balance.slope(self.values, self.residual, unknown)
 
     def slopes(self) -> Slopes:
-        """Derivatives by every unknown, by name, to be used again."""
+        """Derivatives by every unknown, by name, for reuse in later fits."""
         return {u.name: self.slope(u) for u in self.unknowns}
 
 

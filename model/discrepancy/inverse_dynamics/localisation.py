@@ -29,7 +29,7 @@ WINDOW = 0.5
 LEAST = 0.3
 """Least deviation of a residual from which its correlation is taken, in deviations of noise."""
 FAST = 0.5
-"""Acceleration above which a joint starts to move or turns, as a share of its larger ones (95 % quantile)."""
+"""Acceleration above which a joint starts to move or turns back, as a share of its larger ones (95 % quantile)."""
 SLOW = 0.15
 """Speed below which a joint creeps, as a share of its larger ones (95 % quantile)."""
 SHAPE_SIGNIFICANCE = 6.0

@@ -71,7 +71,7 @@ class Prober:
         return padded - self.basis @ (self.basis.T @ padded)
 
     def _explained(self, columns: Floats, trial: Trial, start: Start, null: Start) -> tuple[float, Floats]:
-        """Fall of the squares and the amplitudes (as shares of the start's) that give it; none of a wrong sign."""
+        """Fall of the squares, and the amplitudes (as shares of the start's) that cause it; none has a wrong sign."""
         kept = np.linalg.norm(columns, axis=0) > 1e-9
         shares = np.zeros(columns.shape[1])
         while kept.any():

@@ -20,7 +20,7 @@ from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
 SHORTLIST = 7
-"""Most effects that are fitted after the probes."""
+"""Most effects that are fitted after probing."""
 ALIKE = 0.97
 """Correlation of the torques of two effects above which they count as the same."""
 JOINT_GAIN = 12.0
@@ -44,7 +44,7 @@ class Fitted:
         return self.effect != other.effect and alike
 
     def imitates(self, other: Fitted, before: BalanceFit) -> bool:
-        """Whether this effect gives the torque of the other one, with more parameters."""
+        """Whether this effect gives the same torque as the other one, with more parameters."""
         if len(self.parameters) <= len(other.parameters):
             return False
         own, theirs = (
@@ -125,7 +125,8 @@ def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, data: Data, probe
 
 
 def _weigh(found: Sequence[Fitted], now: BalanceFit, data: Data, places: int) -> list[Fitted]:
-    """The candidates with their evidence, best first; independent samples are counted in what the best one leaves."""
+    """The candidates with their evidence, best first; the residual of the best one decides how many samples are
+    independent."""
     if not found:
         return []
     best = min(found, key=lambda f: f.fit.criterion)

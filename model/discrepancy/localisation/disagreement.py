@@ -200,7 +200,7 @@ def locate(residuals: Residuals, traces: Sequence[Trace] = ()) -> Where:
     judged on fewer samples than noise of the sensor would be: significances are rather too small than too large.
 
     Where even the quieter half of a joint's windows exceeds the stated noise, by up to 1.5 times its variance, that
-    counts as the noise.
+    larger value counts as the noise.
 
     Args:
         traces: the same records as traces, where α(t) is wanted; needs the recorded drive (about 0.5 s).

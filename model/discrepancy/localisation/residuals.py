@@ -1,4 +1,4 @@
-"""What a model leaves of records: the subject of every question about where it disagrees."""
+"""The residuals that a model leaves of records, from which all of this package computes where it disagrees."""
 
 from __future__ import annotations
 

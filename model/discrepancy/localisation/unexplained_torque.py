@@ -35,15 +35,16 @@ ROUGHEST, SMOOTHEST = 1e-6, 1e6
 TRIALS = 16
 """Bisections between them."""
 LEAST_EXCESS = 1.1
-"""Least mean square of the weighted residual with anything to explain."""
+"""Mean square of the weighted residual below which there is nothing to explain."""
 LEAST_EXPLAINED = 0.05
-"""Share of the torque's variance below which a dependence is no shape."""
+"""Least share of the torque's variance that a dependence must explain to be reported."""
 LEAST_SIGNIFICANCE = 4.0
-"""Standard deviations of a dependence below which it is not shown."""
+"""Least significance, in standard deviations, of a dependence that is reported."""
 
 
 def remaining_shapes(residuals: Residuals) -> tuple[RemainingShape, ...]:
-    """What is left as torques in bins of time, position, speed, direction and drive; what explains most comes first.
+    """The remaining torque in bins of time, position, speed, direction and drive; the dependence that explains most
+    comes first.
 
     Empty where no joint is off by more than noise, or where what is left depends on none of these.
 
@@ -77,7 +78,7 @@ def remaining_shapes(residuals: Residuals) -> tuple[RemainingShape, ...]:
 
 
 def torque_of(residuals: Residuals) -> list[Floats]:
-    """Torque (m, n) per record, N·m or N, that leaves its residual, joint by joint."""
+    """Torque (m, n) per record, N·m or N, that would cause the residual, joint by joint."""
     columns = [_torques(residuals, j) for j in range(residuals.model.joint_count)]
     return [np.stack(own, axis=1) for own in zip(*columns, strict=True)]
 
@@ -127,7 +128,7 @@ def _impulse_response(residuals: Residuals, record: Record, j: int) -> Floats:
 
 
 def _sliding(speed: Floats) -> int:
-    """Period from which the joint slides on for `MEMORY` periods, as fast as it does anywhere."""
+    """Period at which the joint begins to slide for `MEMORY` periods, at the highest speed that it keeps up so long."""
     count = len(speed) - MEMORY
     if count <= 0:
         return 0

@@ -1,4 +1,4 @@
-"""One case: the traces of a diagnosis, and every question that is put to a point about them."""
+"""One case: the traces of a diagnosis, and what they say about a point: its errors, its refusal, where it disagrees."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Case:
     def refused(
         self, found: CandidateFit, current: Point, held: tuple[Signals, Signals], own: Sequence[SignalError]
     ) -> Refusal | None:
-        """Why an effect is not taken, if held-out traces speak against it.
+        """Why an effect is refused; None unless the held-out traces speak against it.
 
         Args:
             current: the point without it. held: residuals of these traces without and with it. own: their errors on its
@@ -102,8 +102,8 @@ class Case:
         return None
 
     def where(self, point: Point, *, moving: bool = True) -> Where:
-        """Where the point disagrees with the fitted traces. moving: also which parameters would have to move, which
-        takes most of the time."""
+        """Where the point disagrees with the fitted traces. moving: also find which parameters would have to vary with
+        time, which takes longest."""
         driven = tuple(t for t in self.traces if moving and t.drive is not None)
         return locate(self._residuals(point), driven)
 
@@ -152,6 +152,6 @@ def build_case(
 
 
 def errors_of_fit(point: Point) -> tuple[SignalError, ...]:
-    """Errors of every joint on the fitted traces as the fit itself sees them, with its share of the record."""
+    """Errors of every joint on the fitted traces as the fit itself sees them, with its own feedback share."""
     floor = noise_floor(point.observation, point)
     return signal_errors(point.observation, point.residuals, point.residuals, floor)

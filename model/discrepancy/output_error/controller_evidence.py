@@ -27,7 +27,7 @@ from model.machine_model.model import Model
 COUNTS_OF_ROUNDING = 1.5
 """Counts by which a recorded error may differ: set points are rounded to posture units, and those to counts."""
 LEAST_SHARE = 1e-3
-"""Share of wrong samples below which they may be an accident of the record's start."""
+"""Share of wrong samples below which they may be due to the start of the record."""
 LEAST_GAIN_DEVIATION = 0.01
 """Least relative deviation of a gain that is reported: rounding may explain a smaller one."""
 LEAST_POWER = 4.0
@@ -85,8 +85,8 @@ def settled_by_records(traces: Sequence[Trace], machine: Machine) -> tuple[str, 
 
 
 def with_findings(model: Model, findings: Sequence[ControllerFinding]) -> Model:
-    """The model with the gains that the records prove: in place of the gain error that it states for a joint, or as an
-    effect more. An error that several joints share is set for all of them.
+    """The model with the gains that the records prove: in place of the gain error that it states for a joint, or as a
+    further effect. An error that several joints share is set for all of them.
 
     Raises SpecError for a gain error beyond the bounds of the effect.
     """

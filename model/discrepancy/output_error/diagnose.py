@@ -126,7 +126,8 @@ def _fit_tolerances(given: Point) -> Point:
 
 
 def _fit_with_feedback(point: Point, observation: Observation) -> Point | None:
-    """Where a search from a point's values leads on an observation; None where no simulation there stays finite."""
+    """The point that a search on an observation reaches from another point's values; None if no simulation stays
+    finite."""
     try:
         begun = point.on(observation)
         return descend(begun, FIRST_STEPS) if begun.is_finite else None
@@ -135,7 +136,8 @@ def _fit_with_feedback(point: Point, observation: Observation) -> Point | None:
 
 
 def _add_effects(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> _Search:
-    """Steps until nothing significant is left, what is left cannot be named, or the most steps are done."""
+    """Adds effects until nothing significant is left, until what is left cannot be named, or until the limit of
+    steps."""
     width = 0.8 / case.options.most_steps
     for number in range(case.options.most_steps):
 
@@ -168,8 +170,7 @@ def _add_effect(case: Case, search: _Search, progress: Progress, cancel: Cancel)
 
 
 def _rank(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> tuple[Ranking, Fit]:
-    """The candidates, and the fit that they are compared with: the current one, or a better one that they have led
-    to."""
+    """The candidates, and the fit that they are compared with: the current one, or a better one found through them."""
     ranking = rank(case, search.current, progress, cancel, search.probes)
     better = improved_baseline(search.current, ranking.fitted[0]) if ranking.fitted else None
     if better is None:
@@ -178,7 +179,7 @@ def _rank(case: Case, search: _Search, progress: Progress, cancel: Cancel) -> tu
 
 
 def _answer(case: Case, found: _Search, proved: tuple[Step, ...], ask: Asker | None) -> Diagnosis:
-    """The answer that a search has come to, after what is withdrawn of it. It does not know the time that it took."""
+    """The answer of a finished search, with wrong steps withdrawn. The caller fills in the time that it took."""
     looked = None if found.added else case.where(found.current.point)
     left = _unexplained_joints(case, found, looked)
     answered = verdict((*proved, *found.steps), unexplained=bool(left))

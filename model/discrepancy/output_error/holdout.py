@@ -71,7 +71,8 @@ class HeldOut:
 
 
 def hold_out(model: Model, traces: Sequence[Trace]) -> HeldOut | None:
-    """The held-out traces, ready; None without any. Raises TraceError and SpecError as for the fitted ones."""
+    """The held-out traces, prepared for simulation; None if there are none. Raises TraceError and SpecError as for the
+    fitted ones."""
     if not traces:
         return None
     observation, given = observe(model, traces, FEEDBACK_SHARE_FOR_ERRORS)

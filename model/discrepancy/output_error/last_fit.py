@@ -1,4 +1,4 @@
-"""Steps with the values of the last fit: effects that were still missing at their time had biased them.
+"""Updates steps to the values of the last fit: a step's own values are biased by effects that were found after it.
 
 The sentences of an answer are made afterwards, so that they give the size of the last fit too. The pattern of a reason,
 and its errors, stay those of the step.

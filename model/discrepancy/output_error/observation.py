@@ -100,7 +100,7 @@ class Observation:
         return replace(self, prepared=tuple(replace(p, following=share) for p in self.prepared))
 
     def with_noise(self, noise: Sequence[Floats]) -> Observation:
-        """The same with simulations that are given no recorded readings, but noise (k, n), in counts, on their own."""
+        """The same, but simulations are given no recorded readings; each gets noise (k, n) of its own, in counts."""
         prepared = zip(self.prepared, noise, strict=True)
         return replace(self, prepared=tuple(replace(p, following=0.0, noise=own) for p, own in prepared))
 
@@ -232,7 +232,7 @@ def observe(
 
 
 def _as_given(unknown: Unknown, given: Mapping[str, float]) -> Unknown:
-    """The unknown; that of an effect in the given model is expected to have the value it has there."""
+    """The unknown; the prior mean of an effect's parameter is the value that it has in the given model."""
     return replace(unknown, expected=given[unknown.name]) if unknown.name in given else unknown
 
 
@@ -262,7 +262,7 @@ def _difference(tried: Calibration, index: int, seconds: float) -> float:
 
 
 def _loose_start(unknown: Unknown) -> Unknown:
-    """The unknown; that of an initial posture is free to be where the trace shows it."""
+    """The unknown; an initial posture gets a prior so wide that the trace decides it."""
     if unknown.kind is not Kind.INITIAL_POSITION or unknown.deviation is None:
         return unknown
     limit = 2 * LOOSE_START * unknown.deviation
@@ -270,7 +270,8 @@ def _loose_start(unknown: Unknown) -> Unknown:
 
 
 def _even_bend(unknown: Unknown, model: Model) -> Unknown:
-    """The unknown; the bends of a sound potentiometer get equal priors: nothing says that its curve is smooth."""
+    """The unknown; all bends of a sound potentiometer get the same prior, because nothing says that its curve is
+    smooth."""
     if not (unknown.nuisance and unknown.parameter.effect == "potentiometer_nonlinearity"):
         return unknown
     sensor = model.machine.joint(unknown.joints[0]).sensor
@@ -280,7 +281,7 @@ def _even_bend(unknown: Unknown, model: Model) -> Unknown:
 
 
 def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    """`work` of every item, in their order, `AT_ONCE` at a time: simulations hold no lock of Python's, so two fits take
+    """`work` of every item, in their order, `AT_ONCE` at a time: simulations release Python's lock, so two fits take
     little longer than one. Raises what the first item that fails raises."""
     with ThreadPoolExecutor(AT_ONCE) as threads:
         return list(threads.map(work, items))

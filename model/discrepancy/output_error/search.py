@@ -1,4 +1,4 @@
-"""Least squares with derivatives that are kept: what fits the tolerance parameters, alone and with a candidate.
+"""Least squares with kept derivatives. It fits the tolerance parameters, alone and together with a candidate.
 
 Derivatives take most of the time, and those by the tolerance parameters change little when an effect is added. So they
 are computed once and kept. Every simulation of a step, also of one that does not descend, corrects them along the step
