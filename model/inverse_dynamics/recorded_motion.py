@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import Machine, NoController
 from daq.contracts.trace import Trace
-from model.arrays import Floats
+from model.arrays import Floats, Mask
 from model.inverse_dynamics.readings import Readings, readings_of
-
-Mask = NDArray[np.bool_]
 
 ORDER = 4
 """Order of the Butterworth low-pass, which runs forwards and backwards."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model import layout as at
-from model.arrays import Floats
+from model.arrays import Floats, Mask
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
@@ -20,8 +20,6 @@ from model.machine_model.model import Model
 from model.machine_model.nominal import is_rod_arm
 from model.simulation.bodies import chain_body
 from model.simulation.own_table import own_table
-
-Mask = NDArray[np.bool_]
 
 NOT_IN_TORQUES = {
     "wrong_gain": "acts before the drive that is recorded",

@@ -9,11 +9,11 @@ import numpy as np
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
-from model.arrays import Floats
+from model.arrays import Floats, Mask
 from model.machine_model.model import Model
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.expected_deviation import expected_deviation
-from model.validation.measured_motion import Mask, Observation, observe
+from model.validation.measured_motion import Observation, observe
 from model.validation.noise_floor import noise_floor
 from model.validation.regressors import correlations, regressors
 from model.validation.variation import JointResidual, TimeDomain, Variation

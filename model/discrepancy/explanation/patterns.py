@@ -9,14 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from model.arrays import Floats
+from model.arrays import Floats, Mask
 from model.discrepancy.explanation.samples import Samples
 from model.discrepancy.grounds import Pattern, PatternKind
 from model.discrepancy.localisation.phases import CREEPING_SPEED, TURNING
-
-Mask = NDArray[np.bool_]
 
 NEAR_CHANGE = 0.1
 """Time around a change of speed that counts as the change, s."""

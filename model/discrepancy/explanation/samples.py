@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.machine import NoController
-from model.arrays import Floats
+from model.arrays import Floats, Mask
 from model.discrepancy.localisation.phases import HOLD, AskedMotion
 from model.fitting.records import Record, Signal
 from model.machine_model.model import Model
 from model.simulation.chain_of_model import gravity_loads
 from model.simulation.prepared import Options
 from model.simulation.simulate import Simulation, at_rows, simulate
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

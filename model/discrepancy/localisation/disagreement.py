@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
-from model.arrays import Floats
+from model.arrays import Floats, Integers
 from model.discrepancy.diagnosis import UNWRITTEN, Dependence, PhaseCell, Where, WorstPlace
 from model.discrepancy.localisation.dependence import AGAINST, dependence, quantities
 from model.discrepancy.localisation.phases import HOLD, PHASES
@@ -26,8 +25,6 @@ from model.discrepancy.localisation.statistics import (
 )
 from model.discrepancy.localisation.varying_parameters import moving_parameters
 from model.fitting.records import resolution
-
-Integers = NDArray[np.int64]
 
 WINDOW = 0.3
 """Duration of one cell of the map, s."""

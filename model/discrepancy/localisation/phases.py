@@ -7,14 +7,11 @@ from functools import cached_property
 from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.machine import Machine, NoController, Sensor
-from model.arrays import Floats
+from model.arrays import Floats, Integers
 from model.discrepancy.diagnosis import Phase
 from model.fitting.records import Record, resolution
-
-Integers = NDArray[np.int64]
 
 PHASES: tuple[Phase, ...] = get_args(Phase)
 """Phases in the order of their numbers: ramp start, steady ramp, reversal, creep, hold."""
