@@ -16,7 +16,7 @@ from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.unexplained_torque import remaining_shapes
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.candidate_fit import CandidateFit
-from model.discrepancy.output_error.holdout import HeldOut, signal_errors
+from model.discrepancy.output_error.holdout import HeldOut
 from model.discrepancy.output_error.noise_floor import noise_floor
 from model.discrepancy.output_error.observation import Observation, Signals
 from model.discrepancy.output_error.search import Point
@@ -68,7 +68,7 @@ class Case:
     def fitted_errors(self, before: Point, after: Point) -> tuple[SignalError, ...]:
         """Errors of every joint on the fitted traces."""
         old, new = (self.scoring.residuals(p) for p in (before, after))
-        return signal_errors(self.scoring, old, new, self.floor)
+        return self.scoring.errors(old, new, self.floor)
 
     def held_residuals(self, before: Point, after: Point) -> tuple[Signals, Signals]:
         """Residuals of the held-out traces; empty where there are none."""
@@ -76,7 +76,7 @@ class Case:
 
     def held_errors(self, before: Signals, after: Signals) -> tuple[SignalError, ...]:
         """Errors of every joint on the held-out traces; empty where there are none."""
-        return () if self.held is None else signal_errors(self.held.observation, before, after, self.floor_held)
+        return () if self.held is None else self.held.observation.errors(before, after, self.floor_held)
 
     def refused(
         self, found: CandidateFit, current: Point, held: tuple[Signals, Signals], own: Sequence[SignalError]
@@ -154,4 +154,4 @@ def build_case(
 def errors_of_fit(point: Point) -> tuple[SignalError, ...]:
     """Errors of every joint on the fitted traces as the fit itself sees them, with its own feedback share."""
     floor = noise_floor(point.observation, point)
-    return signal_errors(point.observation, point.residuals, point.residuals, floor)
+    return point.observation.errors(point.residuals, point.residuals, floor)

@@ -19,7 +19,6 @@ from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
 from model.discrepancy.grounds import ControllerProof
-from model.discrepancy.output_error.holdout import signal_errors
 from model.discrepancy.output_error.observation import Observation, Signals
 from model.drives.controller import POWER_MAX
 from model.machine_model.model import Model
@@ -201,7 +200,7 @@ def proved_step(observation: Observation, finding: ControllerFinding) -> Step:
         evidence=evidence,
         margin=evidence,
         candidates=(proof,),
-        rmse_fit=signal_errors(observation, quiet, quiet, observation.deviations),
+        rmse_fit=observation.errors(quiet, quiet, observation.deviations),
         where=Where(joint=finding.joint, phase=None, summary=UNWRITTEN, cells=(), dependences=()),
         reason=UNWRITTEN,
         proof=ControllerProof(samples=finding.samples, of=finding.of),

@@ -1,4 +1,4 @@
-"""The errors of a fit, on the fitted traces and on traces that were held out."""
+"""Held-out traces: what a fit leaves of them, with initial postures and phases of their own, and how far that rises."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.diagnosis import SignalError
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.noise_floor import noise_floor
 from model.discrepancy.output_error.observation import Observation, Signals, observe
@@ -77,20 +76,6 @@ def hold_out(model: Model, traces: Sequence[Trace]) -> HeldOut | None:
         return None
     observation, given = observe(model, traces, FEEDBACK_SHARE_FOR_ERRORS)
     return HeldOut(tuple(traces), observation, tuple(u for u in given.unknowns if u.kind is Kind.INITIAL_POSITION))
-
-
-def signal_errors(observation: Observation, before: Signals, after: Signals, floor: Floats) -> tuple[SignalError, ...]:
-    """Root mean square of every joint's residual before and after, beside the floor (n,) rad."""
-    found = []
-    for column, joint in enumerate(observation.machine.modelled_joints):
-        sizes = []
-        for signals in (before, after):
-            parts = [s[run, column] for s, r in zip(signals, observation.records, strict=True) for run in r.runs]
-            sizes.append(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
-        unit = "rad" if observation.machine.joint(joint).kind == "revolute" else "m"
-        least = float(floor[column])
-        found.append(SignalError(joint=joint, unit=unit, before=sizes[0], after=sizes[1], floor=least))
-    return tuple(found)
 
 
 def _record(observation: Observation, number: int) -> Observation:

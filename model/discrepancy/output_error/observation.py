@@ -22,6 +22,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
 from model.arrays import Floats
+from model.discrepancy.diagnosis import SignalError
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.thresholds import FEEDBACK_SHARE
 from model.fitting.fit import fit_problem
@@ -181,6 +182,19 @@ class Observation:
         if not np.isfinite(found).all():
             raise SpecError("the simulation does not stay finite: the loop is unstable")
         return found
+
+    def errors(self, before: Signals, after: Signals, floor: Floats) -> tuple[SignalError, ...]:
+        """Root mean square of every joint's residual before and after, beside the floor (n,) rad."""
+        found = []
+        for column, joint in enumerate(self.machine.modelled_joints):
+            sizes = []
+            for signals in (before, after):
+                parts = [s[run, column] for s, r in zip(signals, self.records, strict=True) for run in r.runs]
+                sizes.append(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))))
+            unit = "rad" if self.machine.joint(joint).kind == "revolute" else "m"
+            least = float(floor[column])
+            found.append(SignalError(joint=joint, unit=unit, before=sizes[0], after=sizes[1], floor=least))
+        return tuple(found)
 
     def weighted(self, signals: Sequence[Floats]) -> Floats:
         """Signals (…, m, n) in standard deviations of a reading, all compared samples in one row: (…, N)."""
