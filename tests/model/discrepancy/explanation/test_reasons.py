@@ -168,7 +168,7 @@ def test_a_reason_names_the_rival_and_the_other_joints(arm: Model) -> None:
     text = reason_text(step_with("coulomb_friction", (1, 2), found, speaks))
     assert "(and likewise joint " in text
     assert "Coulomb friction, 4 N·m (3.8 to 4.2)" in text
-    assert text.endswith("The next best, stiction on joints 1 and 2, has an evidence of 600, and this has 900.")
+    assert text.endswith("The next best, stiction on joints 1 and 2, has evidence of 600, and this has 900.")
 
 
 @pytest.fixture(scope="module")
@@ -186,7 +186,7 @@ def test_a_rival_that_has_come_to_more_is_said_as_such(friction: tuple[dict[str,
     """The fit that was ranked first came to less when it was completed."""
     text = reason_text(step_with("coulomb_friction", (2,), *friction, evidence=539.0, margin=-189.0))
     assert text.endswith(
-        "Its completed fit has an evidence of 539, less than the 728 of stiction on joint 2: these traces do not tell "
+        "Its completed fit has evidence of 539, less than the 728 of stiction on joint 2: these traces do not tell "
         "which of the two it is."
     )
 
@@ -288,7 +288,7 @@ def test_an_undecided_answer_lists_the_group_with_its_evidence(arm: Model) -> No
     )
     step = step_with("stiction", (2,), {}).model_copy(update={"group": group})
     assert answer(arm, verdict="ambiguous", steps=(step,)).summary == (
-        "Joint 2, after reversals: 2.1 ADC counts rms. These explain it, with evidences that differ by no more than 2: "
+        "Joint 2, after reversals: 2.1 ADC counts rms. These explain it, with evidence that differs by no more than 2: "
         "stiction on joint 2 (120), Coulomb friction on joint 2 (118)."
     )
 
@@ -301,9 +301,7 @@ def test_an_answer_with_nothing_significant_says_what_was_refused(arm: Model) ->
     assert found.steps[0].rejected_because == (
         "the error on the held-out traces rises: its sum of squares by 15 ± 7 variances of a reading"
     )
-    assert (
-        "stiction on joint 2 explains more of the fitted ones, with an evidence of 120, but the error" in found.summary
-    )
+    assert "stiction on joint 2 explains more of the fitted ones, with evidence of 120, but the error" in found.summary
 
 
 def test_several_reasons_and_what_is_left_are_sentences_one_after_the_other(
