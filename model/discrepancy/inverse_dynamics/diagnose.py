@@ -180,11 +180,11 @@ class _Workflow:
 
     def _predicted(self, before: BalanceFit, after: BalanceFit) -> tuple[Floats, Floats]:
         """Mean squares of both on records not fitted to: held-out ones, else blocks of the fitted ones."""
-        held, data = self.case.held_out, self.case.data
+        held = self.case.held_out
         if held:
             squares = [holdout.held_out_squares(f.balance.model, f.values, held) for f in (before, after)]
         else:
-            squares = [holdout.block_squares(f, data) for f in (before, after)]
+            squares = [holdout.block_squares(f) for f in (before, after)]
         return squares[0], squares[1]
 
     def _step(self, found: Findings, chosen: Fitted, before: Floats, after: Floats, removed: float) -> Step:
@@ -194,7 +194,7 @@ class _Workflow:
         rivals = [c for c in found.fitted if c.rivals(chosen) and not c.imitates(chosen, self.now)]
         near = [r for r in rivals if chosen.evidence - r.evidence < case.options.least_margin]
         group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.evidence)
-        values = found_values(chosen.fit, chosen.parameters, case.data)
+        values = found_values(chosen.fit, chosen.parameters)
         squares = [holdout.mean_squares(case.stretches, f.residual) for f in (self.now, chosen.fit)]
         return Step(
             effect=chosen.effect,
@@ -259,7 +259,7 @@ class _Workflow:
             without = self.model.without_effect(step.effect, step.joints or None)
             kept = {n: v for n, v in self.now.values.items() if n in without.by_name}
             smaller = self._fit(without, kept)
-            if evidence(smaller, self.now, self.case.data, self.now.noise.memory, len(step.parameters), 1) < 0:
+            if evidence(smaller, self.now, self.now.noise.memory, len(step.parameters), 1) < 0:
                 self.model, self.now = without.with_values(smaller.values), smaller
                 self.added -= set(step.parameters)
                 gone = {"adopted": False, "refusal": Refusal(kind="superfluous")}
@@ -272,7 +272,7 @@ class _Workflow:
         steps = []
         for step in self.steps:
             own = [self.model.parameter(name) for name in step.parameters] if step.adopted else []
-            last = found_values(self.now, own, self.case.data)
+            last = found_values(self.now, own)
             if not own:
                 steps.append(step)
                 continue

@@ -8,7 +8,7 @@ import numpy as np
 
 from model.arrays import Floats
 from model.discrepancy.diagnosis import FoundValue, SignalError
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.inverse_dynamics.likelihood import LONGEST_MEMORY
 from model.fitting.covariance import sandwich
 from model.machine_model.model import Model
@@ -20,9 +20,9 @@ NORMAL_95 = 1.959964
 """Half width of a 95 % interval of the normal distribution, in standard deviations."""
 
 
-def found_values(now: BalanceFit, parameters: Sequence[Parameter], data: Data) -> dict[str, FoundValue]:
+def found_values(now: BalanceFit, parameters: Sequence[Parameter]) -> dict[str, FoundValue]:
     """Estimates of an effect's parameters with 95 % intervals that hold for correlated residuals."""
-    deviations = _deviations(now, data)
+    deviations = _deviations(now)
     result = {}
     for p in parameters:
         value, deviation = now.values[p.name], deviations.get(p.name)
@@ -35,15 +35,15 @@ def found_values(now: BalanceFit, parameters: Sequence[Parameter], data: Data) -
     return result
 
 
-def _deviations(now: BalanceFit, data: Data) -> dict[str, float]:
+def _deviations(now: BalanceFit) -> dict[str, float]:
     """Standard deviations of the unknowns that change the residual at all, by name."""
     slopes = now.slopes()
     used = [u for u in now.unknowns if any(np.abs(s).max() > 0 for s in slopes[u.name])]
     scale = np.array([u.scale for u in used])
     scores, information = [], np.zeros((len(used), len(used)))
-    for j in range(len(data.floor)):
+    for j in range(len(now.data.floor)):
         size = now.noise.deviation[j]
-        for i, rows in data.stretches.by_joint[j]:
+        for i, rows in now.data.stretches.by_joint[j]:
             jacobian = np.stack([slopes[u.name][i][rows, j] for u in used], axis=1) * scale / size
             scores.append(jacobian * (now.residual[i][rows, j] / size)[:, None])
             information += jacobian.T @ jacobian

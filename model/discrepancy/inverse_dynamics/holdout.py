@@ -41,9 +41,9 @@ def held_out_squares(model: Model, values: Mapping[str, float], records: tuple[R
     return mean_squares(stretches_of(records), _residuals(model, values, records))
 
 
-def block_squares(now: BalanceFit, data: Data) -> Floats:
+def block_squares(now: BalanceFit) -> Floats:
     """Mean squares (n,) that a fit leaves on quarters of its own records, each predicted from the others."""
-    known = now.slopes()
+    known, data = now.slopes(), now.data
     whole: list[list[Floats]] = [[] for _ in range(len(data.floor))]
     for fold in range(FOLDS):
         inside = [_fold(len(r), fold) for r in now.residual]
