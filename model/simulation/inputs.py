@@ -35,7 +35,7 @@ class RunInputs:
         initial: (n, 2) position (rad) and speed (rad/s). first_drive: (n,) commanded volts before the first period.
         readings: (k, n) rad, NaN where the record has a gap.
         rows: (m,) position of each sample on the grid. gains: (n, GAINS).
-        has_set_points, has_drive: whether the record has them; what it has not is held at the reading, or at zero.
+        has_set_points, has_drive: whether the record has them; what it lacks is held at the reading, or at zero.
     """
 
     joints: tuple[int, ...]

@@ -1,4 +1,4 @@
-"""What candidates would show on an experiment that has not been made, and what could hide the difference.
+"""Predicts what candidates would show on an experiment that has not been made, and what could hide the difference.
 
 The tolerance parameters are known as well as the traces and their priors say; on the new experiment they may move as
 far as that allows, and its initial posture is unknown anew.
@@ -34,7 +34,7 @@ LOOSE = 1e-9
 
 @dataclass(frozen=True)
 class Imagined:
-    """An experiment as a diagnosis would see it.
+    """An imagined experiment, prepared as a diagnosis prepares a trace.
 
     starts: the unknowns of its initial posture, known within a reading or so. noise: of the readings, counts.
     """
