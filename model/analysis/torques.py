@@ -5,11 +5,11 @@ from __future__ import annotations
 from itertools import combinations_with_replacement
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.dynamics import recursive
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
@@ -18,7 +18,6 @@ from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from model.validation import differentiation
 
-Floats = NDArray[np.float64]
 Series = tuple[float, ...]
 
 

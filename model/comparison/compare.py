@@ -6,18 +6,16 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.fitting.records import Record, Signal, noise_floor, records_of, resolution
 from model.machine_model.model import Model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

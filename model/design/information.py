@@ -11,13 +11,13 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import NoController
 from daq.contracts.trace import Trace, TraceRecord
+from model.arrays import Floats
 from model.fitting.covariance import inverse
 from model.fitting.fit import INTERVAL, fit_problem
 from model.fitting.options import FitOptions
@@ -30,8 +30,6 @@ from model.fitting.whitening import white
 from model.machine_model.model import Model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
-
-Floats = NDArray[np.float64]
 
 Planner = Callable[[ExperimentSpec], Floats]
 """A function that gives the set points (k, joints of the machine) of an experiment in rad, one row per control period.

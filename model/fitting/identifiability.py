@@ -20,11 +20,11 @@ Verdict = Literal["known", "combination", "unknown"]
 KNOWN_SHARE = 0.5
 """Largest deviation, as a share of the natural size, that the data alone may leave of a parameter that is known."""
 LARGEST_DEVIATION = 30.0
-"""Largest deviation, in natural sizes, that is reported: over a larger distance the model is not linear."""
+"""Largest deviation that is reported, in natural sizes: over a larger distance the model is not linear."""
 STRONG_CORRELATION = 0.95
 """Correlation of estimates beyond which parameters belong to one group."""
 WEAKEST_PRIOR = 1e3
-"""Deviation, in natural sizes, of a prior so wide that it only keeps the arithmetic finite where data say nothing."""
+"""Deviation of a very wide prior, in natural sizes: it only keeps the arithmetic finite where the data say nothing."""
 
 
 class _Part(BaseModel):

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import NoController
+from model.arrays import Floats
 from model.design.information import InformationGain, ParameterGain
 from model.machine_model.model import Model
 from model.reports.figures import COLOURS, QUIET, drawn, panels, thinned
@@ -20,7 +20,6 @@ from model.reports.units import joint_unit, shown_unit
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 LITTLE = 0.9
 """Share of a width from which an interval counts as not having become narrower."""

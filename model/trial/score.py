@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict
 from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import Diagnosis, Step, Verdict
 from model.discrepancy.verdict import excess_removed as share_removed
+from model.machine_model.effect_parameters import effect_parameters
 from model.trial.conventions import true_parameters
 from model.trial.truth import Detectability, HiddenEffect, Kind, Truth, merged
 
@@ -249,13 +250,12 @@ def _covered(truth: Truth, answer: Diagnosis, machine: Machine) -> tuple[Covered
         if effect is None or not step.adopted:
             continue
         for joint in effect.joints or (None,):
-            label = None if joint is None else f"joint{joint}"
-            for name, value in true_parameters(effect, joint, truth, machine).items():
-                for key, stated in step.parameters.items():
-                    place, own, last = key.split(".")[0], key.split(".")[-2], key.split(".")[-1]
-                    fits = own == effect.known_as and last == name and label in (None, place)
-                    if fits and stated.low is not None and stated.high is not None:
-                        found[key] = Covered(
-                            parameter=key, value=stated.value, low=stated.low, high=stated.high, truth=value
-                        )
+            on = () if joint is None else (joint,)
+            names = {p.part: p.name for p in effect_parameters(machine, effect.known_as, on, shared=False)}
+            for part, value in true_parameters(effect, joint, truth, machine).items():
+                stated = step.parameters.get(names[part])
+                if stated is not None and stated.low is not None and stated.high is not None:
+                    found[names[part]] = Covered(
+                        parameter=names[part], value=stated.value, low=stated.low, high=stated.high, truth=value
+                    )
     return tuple(found.values())

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from model import layout as at
+from model.arrays import Floats
 from model.drives.amplifier import motor_volts
 from model.dynamics.compilation import compiled
 from model.dynamics.dual import DUAL_STEP
@@ -27,8 +28,6 @@ from model.simulation.own_torque import own_torque
 from model.simulation.period import extra_flags
 from model.simulation.specialised import AnyChain, ClosedForm, entry
 from model.validation.differentiation import smoothed
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,20 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
 from model import layout as at
+from model.arrays import Floats, Mask
 from model.dynamics.compilation import compiled
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
 from model.validation import differentiation as d
 from model.validation.acceleration_model import MeasuredMotion, speed_answers
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 NOISE_SHARE = 0.05
 """Largest noise of an acceleration, as a share of the acceleration; the smoothing is chosen by it."""

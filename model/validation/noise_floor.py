@@ -12,19 +12,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import DaqError
 from daq.contracts.machine import NoController
 from daq.contracts.trace import Trace
+from model.arrays import Floats
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.measured_motion import Observation, observe
-
-Floats = NDArray[np.float64]
 
 FEWEST, MOST = 12, 40
 """Least and largest number of replicas of a record."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from model.arrays import Floats
 from model.machine_model.model import Model
 from model.simulation.chain_of_model import gravity_loads
 from model.validation.measured_motion import Observation
 from model.validation.variation import Correlation
-
-Floats = NDArray[np.float64]
 
 FEWEST = 6
 """Least number of independent samples for a correlation."""

@@ -2498,6 +2498,9 @@ export interface components {
         /**
          * FoundValue
          * @description One parameter of an added effect: estimate and 95 % interval; no interval where the data do not bound it.
+         *
+         *     `part` says which number of the effect it is, `joints` to which joints it belongs (none: to the whole machine). Both
+         *     are empty in older answers.
          */
         FoundValue: {
             /** Value */
@@ -2508,6 +2511,16 @@ export interface components {
             high: number | null;
             /** Unit */
             unit: string;
+            /**
+             * Part
+             * @default
+             */
+            part?: string;
+            /**
+             * Joints
+             * @default []
+             */
+            joints?: number[];
         };
         /**
          * Friction
