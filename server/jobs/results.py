@@ -45,8 +45,8 @@ class Overlay(_Part):
 
 
 class FitData(FitResult):
-    """A fit, and the traces beside simulations of the models before and after it. `undetermined`: what the traces cannot
-    determine, a sentence each, with the parameters as people write them."""
+    """A fit, and the traces beside simulations of the models before and after it. `undetermined`: what the traces
+    cannot determine, a sentence each, with the parameters as people write them."""
 
     models: tuple[ModelAgreement, ...]
     signals: tuple[Overlay, ...]

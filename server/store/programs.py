@@ -51,9 +51,9 @@ class ProgramStore:
         """Saves a program under its own name; if that differs from `name`, the program `name` is renamed.
 
         `revision` is the one that was edited, None for a new program. Raises a 409 if somebody else has changed the
-        program meanwhile, if its new name is taken, or if there are as many as may be already; raises a 404 if the edited
-        program is gone. Saving an identical program again changes nothing, so a client that has lost the answer may
-        repeat its request.
+        program meanwhile, if its new name is taken, or if there are as many as allowed already; raises a 404 if the
+        edited program is gone. Saving an identical program again changes nothing, so a client that has lost the answer
+        may repeat its request.
         """
         content = program.model_dump(mode="json")
         with self._store.writing() as session:

@@ -2209,7 +2209,8 @@ export interface components {
         };
         /**
          * FitData
-         * @description A fit, and the traces beside simulations of the models before and after it.
+         * @description A fit, and the traces beside simulations of the models before and after it. `undetermined`: what the traces
+         *     cannot determine, a sentence each, with the parameters as people write them.
          */
         FitData: {
             /**
