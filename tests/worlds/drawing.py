@@ -152,7 +152,7 @@ def _friction(joint: Records, draw: Generator, kind: Kind, strongest: float, ine
 
 
 def _gains(joint: Records, draw: Generator, kind: Kind, period: float, supply: float, inertia: float) -> None:
-    """Poles of the joint alone, at its largest inertia; no gain makes more of a sensor's count than a drive can bear."""
+    """Poles of the joint alone, at its largest inertia; no gain makes too much of a count of the sensor."""
     p = joint[0]
     total = inertia + p["rotor"]
     if kind.drive == CURRENT:

@@ -62,8 +62,9 @@ class Motion:
 def simulate(
     bodies: Bodies, joints: Records, loop: Records, set_points: Floats, *, noise: Floats | None = None
 ) -> Motion:
-    """The rig under its loop from rest at the first set point; with `noise` (k, n; rad) readings and drives are rounded,
-    without it the loop is smooth.
+    """The rig under its loop from rest at the first set point.
+
+    With `noise` (k, n; rad) readings and drives are rounded, without it the loop is smooth.
     """
     rotors = tuple(float(j["rotor"]) if not j["flexible"] else 0.0 for j in joints)
     model = mujoco.MjModel.from_xml_string(mjcf(bodies, rotors))
@@ -144,7 +145,7 @@ def _rub(push: Floats, answer: Floats, level: Floats, switched: Any, rub: Floats
 
 
 @compiled
-def _run(
+def _run(  # noqa: PLR0912
     addresses: Any,
     views: Any,
     hinges: Any,
@@ -161,9 +162,11 @@ def _run(
     q, v, free, axis, anchor, places, masses = views
     n, h = q.size, loop.step
     steps = int(rounded(loop.period / h))
-    late = np.zeros(n, dtype=np.int64)
+    late, share = np.zeros(n, dtype=np.int64), np.zeros(n)
     for j in range(n):
-        late[j] = int(rounded((loop.delay + joints[j].extra_delay) / h))
+        lateness = (loop.delay + joints[j].extra_delay) / h
+        late[j] = int(rounded(lateness))
+        share[j] = late[j] + 0.5 - lateness  # of the half step before and after the position, in which a drive changes
     waits = late.max() // steps + 2
     memory = np.zeros((n, MEMORY))
     waiting = np.zeros((waits, n))
@@ -202,10 +205,10 @@ def _run(
             _SOLVE(model, data, answer.ctypes, unit.ctypes, np.int32(n))
             for j in range(n):
                 p = joints[j]
-                last = drive[j]
+                command = drive[j]
                 if now >= late[j] and (now - late[j]) % steps == 0:
                     drive[j] = waiting[(now - late[j]) // steps % waits, j]
-                command = 0.5 * (last + drive[j])
+                    command += share[j] * (drive[j] - command)
                 passed = command if p.current_rate > 0.0 else amplified(command, p)
                 side = motor_speed[j] if p.flexible != 0.0 else v[j]
                 current[j], driving = _motor_torque(passed, current[j], side, rise[j], p, h)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -129,17 +130,17 @@ def _sign(draw: Generator) -> float:
     return float(draw.choice([-1.0, 1.0]))
 
 
-_SIZES = {
+_SIZES: dict[str, Callable[[Size, Generator], dict[str, float]]] = {
     "viscous_friction": lambda s, d: {"viscous": s.torque / s.speed * _up(0.06, 0.2, d)},
     "coulomb_friction": lambda s, d: {"coulomb": s.torque * _up(0.06, 0.2, d)},
-    "load_dependent_friction": lambda s, d: {"load_share": _up(0.06, 0.2, d)},
+    "load_dependent_friction": lambda _, d: {"load_share": _up(0.06, 0.2, d)},
     "stribeck_friction": lambda s, d: {
         "stribeck": s.torque * _up(0.06, 0.2, d),
         "stribeck_speed": s.speed * _up(0.05, 0.3, d),
     },
     "stiction": lambda s, d: {"breakaway": s.torque * _up(0.06, 0.2, d)},
     "direction_dependent_friction": lambda s, d: {"direction": _sign(d) * s.torque * _up(0.05, 0.15, d)},
-    "motor_inductance": lambda s, d: {"electric_time": _up(0.003, 0.015, d)},
+    "motor_inductance": lambda _, d: {"electric_time": _up(0.003, 0.015, d)},
     "dead_zone": lambda s, d: {"dead_zone": s.peak_volts * _up(0.04, 0.15, d)},
     "supply_limit": lambda s, d: {"supply": s.peak_volts * float(d.uniform(0.6, 0.85))},
     "resistance_drift": lambda s, d: {
@@ -148,15 +149,15 @@ _SIZES = {
         "current": s.current,
         "duration": s.duration,
     },
-    WEAKENED_MAGNET: lambda s, d: {"weaker": float(d.uniform(0.15, 0.3))},
+    WEAKENED_MAGNET: lambda _, d: {"weaker": float(d.uniform(0.15, 0.3))},
     "torque_ripple": lambda s, d: {
         "ripple": s.torque * _up(0.03, 0.12, d),
         "ripple_cycles": float(d.integers(6, 25)),
         "ripple_phase": float(d.uniform(0, 2 * math.pi)),
     },
-    "gear_loss": lambda s, d: {"gear_loss": _up(0.1, 0.3, d)},
-    "backlash": lambda s, d: {"gap": _up(0.006, 0.03, d), "rate": _up(300.0, 700.0, d)},
-    "joint_compliance": lambda s, d: {"rate": _up(50.0, 110.0, d)},
+    "gear_loss": lambda _, d: {"gear_loss": _up(0.1, 0.3, d)},
+    "backlash": lambda _, d: {"gap": _up(0.006, 0.03, d), "rate": _up(300.0, 700.0, d)},
+    "joint_compliance": lambda _, d: {"rate": _up(50.0, 110.0, d)},
     "link_mass": lambda s, d: {"mass": s.mass * _up(0.25, 0.6, d)},
     "centre_of_mass": lambda s, d: {"shift": s.length * _sign(d) * _up(0.1, 0.25, d)},
     "spring_torque": lambda s, d: {
@@ -168,12 +169,12 @@ _SIZES = {
         "disturbance_frequency": _up(0.7, 4.0, d),
         "disturbance_phase": float(d.uniform(0, 2 * math.pi)),
     },
-    "potentiometer_gain": lambda s, d: {"sensor_gain": _sign(d) * _up(0.03, 0.08, d)},
-    "potentiometer_offset": lambda s, d: {"sensor_offset": _sign(d) * _up(0.03, 0.1, d)},
-    "potentiometer_nonlinearity": lambda s, d: {"bend": _sign(d) * _up(0.01, 0.04, d)},
-    "input_delay": lambda s, d: {"extra_delay": float(d.uniform(0.6, 2.5))},
-    "wrong_gain": lambda s, d: {"gain_error": _sign(d) * float(d.uniform(0.12, 0.3))},
-    "lost_set_points": lambda s, d: {"lost": float(d.uniform(0.3, 0.9))},
+    "potentiometer_gain": lambda _, d: {"sensor_gain": _sign(d) * _up(0.03, 0.08, d)},
+    "potentiometer_offset": lambda _, d: {"sensor_offset": _sign(d) * _up(0.03, 0.1, d)},
+    "potentiometer_nonlinearity": lambda _, d: {"bend": _sign(d) * _up(0.01, 0.04, d)},
+    "input_delay": lambda _, d: {"extra_delay": float(d.uniform(0.6, 2.5))},
+    "wrong_gain": lambda _, d: {"gain_error": _sign(d) * float(d.uniform(0.12, 0.3))},
+    "lost_set_points": lambda _, d: {"lost": float(d.uniform(0.3, 0.9))},
     "tight_spot": lambda s, d: {
         "tight": s.torque * _up(0.1, 0.3, d),
         "tight_at": float(d.uniform(-0.3, 0.3)),

@@ -113,6 +113,7 @@ def _joint(rig: Rig, j: int, stated: Stated) -> list[str]:
     friction = [f"viscous = {_off(p['viscous'], of.get('viscous'), 'N·m·s/rad', 'like others')}"]
     if p["coulomb"]:
         friction.append(f"coulomb = {_off(p['coulomb'], of.get('coulomb'), 'N·m', 'like others')}")
+    span = _exact(p["range"], "rad", "encoder")
     bits = round(math.log2(p["range"] / p["count"]))
     noise = f", noise = {_exact(rig.kind.noise, 'count', 'at rest')}" if rig.kind.noise else ""
     return [
@@ -120,8 +121,7 @@ def _joint(rig: Rig, j: int, stated: Stated) -> list[str]:
         f"link = {_link(rig, j, of)}",
         f"drive = {_drive(rig, j, of)}",
         f"friction = {{ {', '.join(friction)} }}",
-        f"sensor = {{ bits = {bits}, range = {_exact(p['range'], 'rad', 'encoder')}, "
-        f"at_zero = {_exact(p['at_zero'], 'rad', 'encoder')}{noise} }}",
+        f"sensor = {{ bits = {bits}, range = {span}, at_zero = {_exact(p['at_zero'], 'rad', 'encoder')}{noise} }}",
         "",
     ]
 

@@ -75,7 +75,7 @@ def _between_points(
     out, start, here = np.zeros_like(time), REST, 0.0
     while True:
         there = float(draw.uniform(-reach, reach))
-        there = there if abs(there - here) > 0.3 * reach else -math.copysign(0.8 * reach, here if here else there)
+        there = there if abs(there - here) > 0.3 * reach else -math.copysign(0.8 * reach, here or there)
         pace = speed * float(draw.uniform(0.25, 1.0))
         length = abs(there - here) / pace * (1.875 if smooth else 1.0)
         if start + length > duration - REST:

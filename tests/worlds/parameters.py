@@ -1,4 +1,4 @@
-"""The numbers of a true rig, as records that compiled code reads by name. SI units; joints in rad at the joint's side."""
+"""The numbers of a true rig, as records that compiled code reads by name. SI units; at the side of the joint."""
 
 from __future__ import annotations
 
@@ -62,18 +62,8 @@ _OUTSIDE = (
 _TRANSMISSION = ("flexible", "stiffness", "flexible_damping", "gap", "contact_law")
 _SENSOR = ("count", "range", "at_zero", "sensor_gain", "sensor_offset", "bend", "bend_law")
 _CONTROL = (
-    "p",
-    "i",
-    "d",
-    "inner_p",
-    "inner_i",
-    "gain_error",
-    "lost",
-    "extra_delay",
-    "limit",
-    "resolution",
-    "counts_to_volts",
-    "dac_scale",
+    *("p", "i", "d", "inner_p", "inner_i", "gain_error", "lost", "extra_delay"),
+    *("limit", "resolution", "counts_to_volts", "dac_scale"),
 )
 
 JOINT = np.dtype(
