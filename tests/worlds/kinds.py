@@ -63,9 +63,15 @@ TUNING: dict[str, Kind] = {
     "planar-pid": replace(_PLANAR, contacts=(SWITCH, BRISTLE), motions=("ramps", "via points")),
     "planar-board": replace(_PLANAR, controller=BOARD, rate=(50.0,), bits=(12,), motions=("ramps",)),
     "planar-torques": replace(
-        *(_PLANAR,),
-        **{"drive": CURRENT, "known_loop": False, "recorded": ("drive", "velocity"), "bits": (16,), "body": True},
-        **{"contacts": (TANH,), "motions": ("sines", "via points"), "rate": (250.0,)},
+        _PLANAR,
+        drive=CURRENT,
+        known_loop=False,
+        recorded=("drive", "velocity"),
+        bits=(16,),
+        body=True,
+        contacts=(TANH,),
+        motions=("sines", "via points"),
+        rate=(250.0,),
     ),
     "arm-rounded": replace(
         _ANTHROPOMORPHIC, rounding=0.004, limit=0.5, contacts=(TANH,), laws=(1,), noise=0.0, motions=("ramps",)
@@ -86,17 +92,30 @@ REPORTING: dict[str, Kind] = {
     ),
     "planar-coloured": replace(_PLANAR, coloured=0.8, noise=0.2, contacts=(TANH,), motions=("random steps", "sines")),
     "arm-current": replace(
-        *(_ANTHROPOMORPHIC,),
-        **{"drive": CURRENT, "rate": (250.0,), "bits": (16,), "contacts": (BRISTLE,), "motions": ("via points",)},
-        **{"recorded": ("drive",), "known_loop": False, "body": True},
+        _ANTHROPOMORPHIC,
+        drive=CURRENT,
+        rate=(250.0,),
+        bits=(16,),
+        contacts=(BRISTLE,),
+        motions=("via points",),
+        recorded=("drive",),
+        known_loop=False,
+        body=True,
     ),
     "six-volts": replace(
-        *(_ANTHROPOMORPHIC,), joints=6, bits=(14, 16), rounding=0.002, contacts=(SWITCH,), motions=("via points",)
+        _ANTHROPOMORPHIC, joints=6, bits=(14, 16), rounding=0.002, contacts=(SWITCH,), motions=("via points",)
     ),
     "six-torques": replace(
-        *(_ANTHROPOMORPHIC,),
-        **{"joints": 6, "drive": CURRENT, "rate": (1000.0,), "bits": (19,), "contacts": (TANH, BRISTLE)},
-        **{"recorded": ("drive", "velocity"), "known_loop": False, "body": True, "motions": ("sines",)},
+        _ANTHROPOMORPHIC,
+        joints=6,
+        drive=CURRENT,
+        rate=(1000.0,),
+        bits=(19,),
+        contacts=(TANH, BRISTLE),
+        recorded=("drive", "velocity"),
+        known_loop=False,
+        body=True,
+        motions=("sines",),
     ),
 }
 """Kinds that only a registered trial uses. None of them is looked at while anything is tuned."""

@@ -18,7 +18,7 @@ What this first version leaves out:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,13 +40,25 @@ EVALUATIONS = 6
 """Of sizes, at most, after the starts."""
 STARTS = (0.2, 0.6, 1.6)
 """Sizes to begin with, over one that is drawn as for a hidden effect."""
-SIGNED = ("direction", "sensor_gain", "sensor_offset", "bend", "spring", "shift", "gain_error", "load", "mass")
+SIGNED = (
+    "ripple",
+    "disturbance",
+    "direction",
+    "sensor_gain",
+    "sensor_offset",
+    "bend",
+    "spring",
+    "shift",
+    "gain_error",
+    "load",
+    "mass",
+)
 """Sizes that may have either sign."""
 SHIFTED = ("ripple_phase", "disturbance_phase", "spring_rest", "about_x", "about_y")
 """Sizes that are moved, not multiplied: by `MOVED` rad a unit."""
 MOVED = 0.5
-KEPT = ("current", "duration", "cooling_time", "rate")
-"""Sizes that are not refitted: little depends on them."""
+KEPT = ("current", "duration", "cooling_time")
+"""Sizes that are not refitted: little depends on them. Nor is the stiffness of a contact behind a gap."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +69,11 @@ class Rival:
     d_prime: float
 
 
-def sharpness(rig: Rig) -> list[Rival]:
-    """Rivals of the one effect that is hidden in a rig of one or two joints; empty for others."""
+def sharpness(rig: Rig, names: Collection[str] | None = None) -> list[Rival]:
+    """Rivals (all, or those of `names`) of the one effect hidden in a rig of one or two joints; empty for others."""
     if len(rig.hidden) != 1 or rig.kind.joints > 2:
         return []
-    return _Comparison(rig).rivals()
+    return _Comparison(rig).rivals(effects_of(rig) if names is None else names)
 
 
 class _Comparison:
@@ -79,18 +91,18 @@ class _Comparison:
         for tolerance in rig.tolerances:
             ends = [self._readings(*moved(rig, {tolerance: sign * 0.5 * tolerance.share})) for sign in (1.0, -1.0)]
             columns.append(ends[0] - ends[1])
-        self.answers = np.column_stack([*columns]) if columns else np.zeros((self.true.size, 0))
+        self.answers = np.column_stack(columns) if columns else np.zeros((self.true.size, 0))
         count = self.answers.shape[1]
         self.basis, self.triangle = np.linalg.qr(np.vstack([self.answers, np.eye(count)]))
 
-    def rivals(self) -> list[Rival]:
+    def rivals(self, names: Collection[str]) -> list[Rival]:
         hidden = self.rig.hidden[0]
         none = self._least(lambda _: self.sound, 0, ())
         own = 0.0
         if hidden.law != 0 and hidden.in_library:
             own = self._fitted(hidden.name, hidden.joint)
         found = [Rival("none", math.sqrt(none)), Rival("own", math.sqrt(own))]
-        for name in effects_of(self.rig):
+        for name in names:
             if name in OPEN or name == hidden.name:
                 continue
             places = joints_of(self.rig, name)
@@ -106,7 +118,7 @@ class _Comparison:
         _, size = drawn(self.sound, self.motion, name, joint, draw)
         if joint is not None and self.rig.hidden[0].name == name:
             size = {field: self.rig.hidden[0].sizes.get(field, value) for field, value in size.items()}
-        free = tuple(field for field in size if field not in KEPT)
+        free = tuple(field for field in size if field not in KEPT and not (field == "rate" and "gap" in size))
 
         def rival(factors: Floats) -> Rig:
             changed = dict(size)

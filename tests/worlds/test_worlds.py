@@ -14,9 +14,9 @@ from daq.contracts.machine import load_machine
 from daq.traces.reader import read_trace
 from tests.worlds.drawing import sound_rig
 from tests.worlds.folder import write_world
-from tests.worlds.hiding import OPEN, drawn, effects_of, hide, joints_of, tilted
+from tests.worlds.hiding import OPEN, effects_of, hide, joints_of, tilted
 from tests.worlds.kinds import KINDS, REPORTING, TUNING
-from tests.worlds.rig import Hidden
+from tests.worlds.lab import machine_text
 from tests.worlds.sharpness import sharpness
 from tests.worlds.world import hidden_rig, make_world
 
@@ -73,8 +73,6 @@ def test_the_product_reads_what_a_lab_has(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_what_a_lab_has_tells_no_truth(tmp_path: Path, kind: str) -> None:
     """Only the machine file's text is looked at here, which is the same whatever is hidden; no record of any kind."""
-    from tests.worlds.lab import machine_text
-
     rig = sound_rig(kind, KINDS[kind], 1)
     texts = {machine_text(rig)}
     for name in effects_of(rig):
@@ -158,9 +156,13 @@ def test_an_answer_about_a_sound_arm_is_a_false_alarm() -> None:
     assert score(truth("sound"), answered("nothing-significant")).alarm is False
 
 
-def test_sharpness_sees_a_plain_effect_and_not_one_of_no_size() -> None:
+def test_sharpness_sees_an_effect_of_some_size_and_none_of_hardly_any() -> None:
     rig = sound_rig("axis-current", KINDS["axis-current"], 1)
     assert sharpness(rig) == []
-    hidden = hide(rig, "coulomb_friction", 1, 0, {"coulomb": 0.2 * rig.strongest[0]})
-    assert isinstance(hidden.hidden[0], Hidden)
-    assert drawn is not None
+    rivals = ("viscous_friction", "load_dependent_friction")
+    for size, seen in ((0.2, True), (1e-5, False)):
+        hidden = hide(rig, "coulomb_friction", 1, 0, {"coulomb": size * rig.strongest[0]})
+        found = {rival.name: rival.d_prime for rival in sharpness(hidden, rivals)}
+        assert (found["none"] > 20.0) == seen
+        assert found["own"] == 0.0
+        assert all(found[name] <= found["none"] for name in rivals)
