@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import ast
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
 from benchmarks.worlds import score
-from daq.contracts.machine import load_machine
+from daq.contracts.machine import load_machine, parse_machine
 from daq.traces.reader import read_trace
+from model.dynamics import recursive
+from model.machine_model.model import base_model
+from model.simulation.chain_of_model import chain_of
+from tests.worlds.bodies import mjcf
 from tests.worlds.drawing import sound_rig
 from tests.worlds.folder import write_world
 from tests.worlds.hiding import OPEN, effects_of, hide, joints_of, tilted
@@ -43,6 +49,24 @@ def test_worlds_import_nothing_of_the_product() -> None:
         names = imports(path)
         assert all(name.startswith("tests.worlds") for name in names if name.startswith("tests")), path
         assert not {name.partition(".")[0] for name in names} & FORBIDDEN, path
+
+
+@pytest.mark.parametrize("kind", ["planar-pid", "planar-torques", "arm-rounded", "six-volts"])
+def test_the_file_stated_exactly_is_the_arm(kind: str) -> None:
+    """Accelerations of the worlds' bodies under random torques, and what the model of the file needs for them."""
+    rig = replace(sound_rig(kind, KINDS[kind], 2), tolerances=())
+    chain = chain_of(base_model(parse_machine(machine_text(rig))))
+    rotors = tuple(float(rotor) for rotor in rig.joints["rotor"])
+    model = mujoco.MjModel.from_xml_string(mjcf(rig.bodies, rotors))
+    data = mujoco.MjData(model)
+    draw = np.random.default_rng(1)
+    for _ in range(5):
+        data.qpos[:], data.qvel[:] = draw.uniform(-1, 1, (2, rig.kind.joints))
+        torques = draw.uniform(-1, 1, rig.kind.joints)
+        data.qfrc_applied[:] = torques
+        mujoco.mj_forward(model, data)
+        needed = recursive.inverse_dynamics(chain, np.array(data.qpos), np.array(data.qvel), np.array(data.qacc))
+        assert needed == pytest.approx(torques, abs=1e-5)
 
 
 def test_no_kind_is_for_tuning_and_for_reports() -> None:

@@ -22,6 +22,11 @@ CASE_OF_SEED = ("sound", "single", "single", "pair", "single", "open", "single",
 """The case of a seed by its last digit."""
 SETTLING = 1.5
 """s at rest before a record begins."""
+LARGEST_ERROR = 1.0
+"""rad between set point and angle that no lab would let pass."""
+ATTEMPTS = 12
+STIFFER = 1.25
+"""Factor of a gear's own frequency between attempts."""
 COLOURED_CORNER = 3.0
 """Hz of coloured noise."""
 TRAINING, HELD_OUT = "training", "held_out"
@@ -72,9 +77,21 @@ def hidden_rig(kind_name: str, seed: int, case: str | None = None, effect: str |
     for name in names:
         places = joints_of(rig, name)
         joint = places[int(draw.integers(len(places)))]
-        law, size = drawn(rig, motion, name, joint, draw)
-        rig = hide(rig, name, joint, law, size)
+        rig = _hidden(rig, motion, name, joint, draw)
     return rig
+
+
+def _hidden(rig: Rig, motion: Motion, name: str, joint: int | None, draw: Generator) -> Rig:
+    """The rig with an effect at a joint, drawn until the loop bears it; gears that give become stiffer each time."""
+    for attempt in range(ATTEMPTS):
+        law, size = drawn(rig, motion, name, joint, draw)
+        if "rate" in size:
+            size["rate"] *= STIFFER**attempt
+        made = hide(rig, name, joint, law, size)
+        runs = (simulate(made.bodies, made.joints, made.loop, wanted(rig, each)) for each in RECORDS)
+        if all(np.abs(run.set_point - run.angle).max() < LARGEST_ERROR for run in runs):
+            return made
+    raise ValueError(f"{rig.kind_name} {rig.seed}: its loop does not bear {name} on joint {joint}")
 
 
 def wanted(rig: Rig, name: str) -> Floats:
