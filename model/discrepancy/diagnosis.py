@@ -168,6 +168,8 @@ class Step(_Part):
     rmse_holdout: tuple[SignalError, ...] = ()
     excess_removed_holdout: float | None = None
     """Share of the held-out variance above the noise floor that the step removed."""
+    evidence_held_out: float | None = None
+    """2 ln of the ratio of the likelihoods of held-out traces with and without the effect; by inverse dynamics alone."""
     sum_lambda2_before: float | None = None
     sum_lambda2_after: float | None = None
     where: Where

@@ -133,9 +133,10 @@ class _Workflow:
         """Adopt the best candidate that holds. False when there is none."""
         options = self.case.options
         for chosen in found.fitted[:CHANCES]:
-            if chosen.evidence < options.least_evidence:
-                return False
-            if chosen.evidence < options.least_evidence + options.echo * self._collected(chosen.joints):
+            told = self._evidence_held_out(chosen)
+            if chosen.evidence <= 0 or chosen.evidence + told < options.least_evidence:
+                continue
+            if chosen.evidence + told < options.least_evidence + options.echo * self._collected(chosen.joints):
                 continue
             before, after = self._predicted(self.now, chosen.fit)
             fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (self.now, chosen.fit))
@@ -148,7 +149,7 @@ class _Workflow:
                 self._take(timing)
                 self.notes.append(_timing_note(timing, self.case.records))
                 return True
-            self.steps.append(self._step(found, chosen, before, after, removed))
+            self.steps.append(self._step(found, chosen, before, after, removed, told))
             if holds:
                 self._take(chosen)
                 return True
@@ -157,7 +158,13 @@ class _Workflow:
     def _collected(self, joints: tuple[int, ...]) -> float:
         """Evidence of the steps adopted so far on these joints, or on any for an effect of the whole machine."""
         near = (s for s in self.steps if s.adopted and (not joints or not s.joints or set(s.joints) & set(joints)))
-        return sum(s.evidence for s in near)
+        return sum(s.evidence + (s.evidence_held_out or 0.0) for s in near)
+
+    def _evidence_held_out(self, chosen: Fitted) -> float:
+        """What held-out records say for an effect, beside its evidence on the fitted ones; 0 where there are none."""
+        if not self.case.held_out:
+            return 0.0
+        return holdout.evidence(self.now, chosen.fit, self.case.held_out, self.case.data.floor)
 
     def _take(self, chosen: Fitted) -> None:
         self.added |= {p.name for p in chosen.parameters}
@@ -188,8 +195,11 @@ class _Workflow:
             squares = [holdout.block_squares(f, data) for f in (before, after)]
         return squares[0], squares[1]
 
-    def _step(self, found: Findings, chosen: Fitted, before: Floats, after: Floats, removed: float) -> Step:
-        """The step that the chosen effect is; before, after: mean squares (n,) on records not fitted to."""
+    def _step(
+        self, found: Findings, chosen: Fitted, before: Floats, after: Floats, removed: float, told: float
+    ) -> Step:
+        """The step that the chosen effect is; before, after: mean squares (n,) on records not fitted to, and `told`, the
+        evidence that held-out ones give."""
         case = self.case
         holds = removed >= case.options.least_share
         rivals = [c for c in found.fitted if c.rivals(chosen) and not c.imitates(chosen, self.now)]
@@ -202,6 +212,7 @@ class _Workflow:
             joints=chosen.joints,
             parameters=values,
             evidence=chosen.evidence,
+            evidence_held_out=told if case.held_out else None,
             margin=chosen.evidence - max([0.0, *(r.evidence for r in rivals)]),
             candidates=self._candidates(found),
             group=tuple(self._candidate(c) for c in group) if near else (),
