@@ -169,7 +169,7 @@ class Step(_Part):
     excess_removed_holdout: float | None = None
     """Share of the held-out variance above the noise floor that the step removed."""
     evidence_held_out: float | None = None
-    """2 ln of the ratio of the likelihoods of held-out traces with and without the effect; by inverse dynamics alone."""
+    """2 ln of the ratio of the likelihoods of held-out traces with and without the effect; in torques alone."""
     sum_lambda2_before: float | None = None
     sum_lambda2_after: float | None = None
     where: Where

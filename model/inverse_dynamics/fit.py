@@ -26,6 +26,7 @@ from model.fitting.unknowns import prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
 from model.inverse_dynamics.problem import TorqueProblem
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion
+from model.inverse_dynamics.recorded_sizes import recorded_sizes, with_recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
 
@@ -102,6 +103,8 @@ def fit_torques(
     unknowns = chosen_unknowns(model, options)
     progress(0.0, "low-passing the records")
     motions = [_driven_motion(model, trace, cutoff) for trace in (*traces, *held_out)]
+    asked_for = {n: p for n, p in recorded_sizes(model, motions[: len(traces)]).items() if n not in options.priors}
+    unknowns = with_recorded_sizes(unknowns, asked_for)
     problem = TorqueProblem(model, tuple(motions[: len(traces)]), unknowns, np.ones(model.joint_count))
     begin = np.array([u.start for u in unknowns])
     first = np.concatenate([e.residual for e in problem.evaluate(begin, derivatives=False)])

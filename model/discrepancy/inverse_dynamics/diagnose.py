@@ -28,6 +28,7 @@ from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.verdict import verdict
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples, recorded_motions
+from model.inverse_dynamics.recorded_sizes import recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
 
@@ -124,9 +125,11 @@ class _Workflow:
         self.progress(min(0.99, (len(self.steps) + fraction) / (whole + 1)), f"step {len(self.steps) + 1}: {text}")
 
     def _fit(self, model: Model, begin: dict[str, float] | None = None) -> BalanceFit:
-        own, _ = tolerances(self.begin)
+        records = self.case.records
+        own, _ = tolerances(self.begin, sizes=recorded_sizes(self.begin, records))
         known = {u.name for u in own}
-        found = tuple(u for u in tolerances(model, self.added)[0] if u.name not in known)
+        sizes = recorded_sizes(model, records)
+        found = tuple(u for u in tolerances(model, self.added, sizes)[0] if u.name not in known)
         return fit(TorqueBalance(model, self.case.records), (*own, *found), begin or {}, self.case.data)
 
     def _adopt(self, found: Findings) -> bool:
@@ -198,8 +201,8 @@ class _Workflow:
     def _step(
         self, found: Findings, chosen: Fitted, before: Floats, after: Floats, removed: float, told: float
     ) -> Step:
-        """The step that the chosen effect is; before, after: mean squares (n,) on records not fitted to, and `told`, the
-        evidence that held-out ones give."""
+        """The step that the chosen effect is; before, after: mean squares (n,) on records not fitted to, and the
+        evidence `told` by held-out ones."""
         case = self.case
         holds = removed >= case.options.least_share
         rivals = [c for c in found.fitted if c.rivals(chosen) and not c.imitates(chosen, self.now)]
