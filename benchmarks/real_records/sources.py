@@ -21,7 +21,7 @@ class Rig:
     """A machine with published records.
 
     origin: repository, commit, licence. folder: where its files lie below the data folder. fitted, held_out: names of
-    records. read: columns of each by name. effects: those that `daq fit` takes part with, and `expected`, those of which
+    records. read: columns of each by name. effects: those that `daq fit` adds, and `expected`, those of which
     a diagnosis should name one. constant: whether the reference has a constant torque, as friction by direction has.
     """
 
