@@ -22,14 +22,17 @@ NO_LIMIT = 1e9
 SENSOR_COUNTS = 4096
 DAC_COUNTS = 127
 PRESLIDING_COUNTS = 0.5
-"""Distance, in counts of the sensor, over which friction builds up: an assumption, below what the sensor resolves."""
+"""Distance, in counts of the sensor, over which friction builds up: an assumption, below the sensor's resolution."""
 
 
-def parameter(place: str, kind: Kind, part: str, quantity: Quantity, slot: int, low: float = -math.inf) -> Parameter:
+def parameter(
+    component: str, kind: Kind, part: str, quantity: Quantity, slot: int, low: float = -math.inf
+) -> Parameter:
     """A parameter of the whole machine from a number of its file; `low` bounds it where the file does not."""
     return Parameter(
-        name=f"{place}.{part}",
+        name=f"{component}.{part}",
         kind=kind,
+        component=component,
         part=part,
         unit=quantity.unit,
         value=quantity.value,
@@ -52,41 +55,41 @@ def base_parameters(machine: Machine) -> tuple[Parameter, ...]:
 
 
 def _of_joint(number: int, joint: Joint) -> Iterator[Parameter]:
-    found = (*_of_link(f"link{number}", joint), *_of_drive(f"joint{number}", joint.drive))
-    for place, kind, part, quantity, column, low in found:
-        yield replace(parameter(place, kind, part, quantity, at.slot(number, column), low), joints=(number,))
+    for component, kind, part, quantity, column, low in (*_of_link(joint), *_of_drive(joint.drive)):
+        own = parameter(component, kind, part, quantity, at.slot(number, column), low)
+        place = f"link{number}" if component == "link" else f"joint{number}.{component}"
+        yield replace(own, name=f"{place}.{part}", joints=(number,))
 
 
-def _of_link(place: str, joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
+def _of_link(joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
     """Arguments of `parameter`, with the joint's column in place of the slot."""
     geometry, link = joint.geometry, joint.link
     if geometry.a.value != 0.0:
-        yield place, Kind.GEOMETRY, "length", geometry.a, at.A, 0.0
+        yield "link", Kind.GEOMETRY, "length", geometry.a, at.A, 0.0
     if geometry.d.value != 0.0:
-        yield place, Kind.GEOMETRY, "offset", geometry.d, at.D, -math.inf
-    yield place, Kind.INERTIA, "mass", link.mass, at.MASS, 0.0
+        yield "link", Kind.GEOMETRY, "offset", geometry.d, at.D, -math.inf
+    yield "link", Kind.INERTIA, "mass", link.mass, at.MASS, 0.0
     if isinstance(link, Cylinder):
-        yield place, Kind.GEOMETRY, "radius", link.radius, at.RADIUS, 0.0
+        yield "link", Kind.GEOMETRY, "radius", link.radius, at.RADIUS, 0.0
     elif isinstance(link, Body):
         for axis, quantity in enumerate(link.centre):
-            yield place, Kind.INERTIA, f"centre_{'xyz'[axis]}", quantity, at.CENTRE_X + axis, -math.inf
+            yield "link", Kind.INERTIA, f"centre_{'xyz'[axis]}", quantity, at.CENTRE_X + axis, -math.inf
         for k, entry in enumerate(("xx", "yy", "zz", "xy", "xz", "yz")):
             low = 0.0 if k < 3 else -math.inf
-            yield place, Kind.INERTIA, f"inertia_{entry}", link.inertia[k], at.INERTIA_XX + k, low
+            yield "link", Kind.INERTIA, f"inertia_{entry}", link.inertia[k], at.INERTIA_XX + k, low
 
 
-def _of_drive(place: str, drive: DcMotor | PlainGain) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
+def _of_drive(drive: DcMotor | PlainGain) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
     """Arguments of `parameter`, with the joint's column in place of the slot."""
     if isinstance(drive, DcMotor):
-        motor = f"{place}.motor"
-        yield motor, Kind.DRIVE, "resistance", drive.resistance, at.RESISTANCE, 1e-6
-        yield motor, Kind.DRIVE, "torque_constant", drive.torque_constant, at.TORQUE_CONSTANT, 1e-9
-        yield motor, Kind.DRIVE, "back_emf_constant", drive.back_emf_constant, at.BACK_EMF, 0.0
-        yield motor, Kind.INERTIA, "rotor_inertia", drive.rotor_inertia, at.ROTOR_INERTIA, 0.0
+        yield "motor", Kind.DRIVE, "resistance", drive.resistance, at.RESISTANCE, 1e-6
+        yield "motor", Kind.DRIVE, "torque_constant", drive.torque_constant, at.TORQUE_CONSTANT, 1e-9
+        yield "motor", Kind.DRIVE, "back_emf_constant", drive.back_emf_constant, at.BACK_EMF, 0.0
+        yield "motor", Kind.INERTIA, "rotor_inertia", drive.rotor_inertia, at.ROTOR_INERTIA, 0.0
     else:
-        yield f"{place}.drive", Kind.DRIVE, "gain", drive.gain, at.TORQUE_CONSTANT, -math.inf
+        yield "drive", Kind.DRIVE, "gain", drive.gain, at.TORQUE_CONSTANT, -math.inf
         if drive.inertia is not None:
-            yield f"{place}.drive", Kind.INERTIA, "inertia", drive.inertia, at.ROTOR_INERTIA, 0.0
+            yield "drive", Kind.INERTIA, "inertia", drive.inertia, at.ROTOR_INERTIA, 0.0
 
 
 def nominal_vector(machine: Machine) -> NDArray[np.float64]:
@@ -195,7 +198,7 @@ def _radius(joint: Joint) -> float:
 
 
 def _transmission_inertia(machine: Machine, number: int) -> float:
-    """Rotor and link in series (kg·m²), the link at the least that it shows: its own bodies, folded."""
+    """Inertia of rotor and link in series (kg·m²), with the link's least inertia: its own bodies, the arm folded."""
     joint = machine.joint(number)
     link = joint.link
     own = link.mass.value

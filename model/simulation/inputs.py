@@ -19,9 +19,9 @@ REST_PERIODS = 25
 NEIGHBOURS = 1.5
 """Largest distance, in periods, of samples without a gap between them."""
 NEARLY = 1e-6
-"""Distance, in periods, that is only rounding."""
+"""Distance, in periods, that counts as rounding."""
 LARGEST_ANGLE = 20.0
-"""Largest angle, rad, that is taken as such; more than three turns of a joint are taken for degrees."""
+"""Largest plausible angle, rad; more than three turns of a joint are taken for degrees."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class RunInputs:
         initial: (n, 2) position (rad) and speed (rad/s). first_drive: (n,) commanded volts before the first period.
         readings: (k, n) rad, NaN where the record has a gap.
         rows: (m,) position of each sample on the grid. gains: (n, GAINS).
-        has_set_points, has_drive: whether the record has them; what it has not is held at the reading, or at zero.
+        has_set_points, has_drive: whether the record has them; what it lacks is held at the reading, or at zero.
     """
 
     joints: tuple[int, ...]
