@@ -20,6 +20,7 @@ VERDICTS = {
     "nothing-significant": "NOTHING SIGNIFICANT",
     "named": "NAMED",
     "ambiguous": "AMBIGUOUS",
+    "suspected": "SUSPECTED",
     "unknown-effect": "UNKNOWN EFFECT",
 }
 
@@ -51,6 +52,8 @@ def _headline(found: Diagnosis) -> str:
         return "; ".join(effect_on(s.effect or "", s.joints) for s in adopted)
     if found.verdict == "ambiguous" and found.steps and found.steps[-1].group:
         return "one of " + ", ".join(effect_on(c.effect, c.joints) for c in found.steps[-1].group)
+    if found.verdict == "suspected":
+        return found.summary.removeprefix("Suspected: ")
     if found.verdict == "nothing-significant":
         if any(s.effect is not None for s in found.steps):
             return "nothing that the held-out traces confirm"

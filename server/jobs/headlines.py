@@ -49,6 +49,8 @@ def of_diagnosis(found: Diagnosis) -> str:
         group = [_named(one) for one in found.steps[-1].group]
         more = "" if len(group) <= UNDECIDED_SHOWN else f" or {len(group) - UNDECIDED_SHOWN} more"
         return f"one of: {' or '.join(group[:UNDECIDED_SHOWN])}{more}"
+    if found.verdict == "suspected" and found.suspicion is not None:
+        return f"suspected: {placed(found.suspicion.effect, found.suspicion.joints)}"
     return "nothing significant" if found.verdict == "nothing-significant" else "an unknown effect"
 
 

@@ -12,7 +12,7 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, FoundValue, SignalError, Step
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, FoundValue, SignalError, Step, Suspicion
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import Note, Reason, Refusal
@@ -36,6 +36,11 @@ CHANCES = 3
 """Candidates of a step that may fail on records not fitted to before the search ends."""
 SHOWN = 12
 """Most candidates that a step lists."""
+SUSPECTED = 10.0
+"""Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
+and still short of what naming it takes."""
+ROUNDED = 5.0
+"""s to which the time that is still to be recorded is rounded up."""
 ABOVE_NOISE = 1.2
 """Least mean square of a joint on held-out records, relative to that of noise, with which it counts for the share
 removed."""
@@ -98,6 +103,7 @@ class _Workflow:
     steps: list[Step] = field(default_factory=list)
     tried: tuple[Candidate, ...] = ()
     notes: list[Note] = field(default_factory=list)
+    suspicion: Suspicion | None = None
 
     def __post_init__(self) -> None:
         self.begin = self.model
@@ -114,6 +120,7 @@ class _Workflow:
             found = search(self.model, self.now, self.case, self._report, self.cancel)
             if not self._adopt(found):
                 self.tried = self._candidates(found)
+                self.suspicion = self._suspect(found)
                 break
             self._report(0.9, "what is not needed any more")
             self._prune(done)
@@ -136,15 +143,12 @@ class _Workflow:
         options = self.case.options
         for chosen in found.fitted[:CHANCES]:
             told = self._evidence_held_out(chosen)
-            if chosen.evidence <= 0 or chosen.evidence + told < options.least_evidence:
+            if chosen.evidence <= 0 or chosen.evidence + told < self._needed(chosen):
                 continue
-            if chosen.evidence + told < options.least_evidence + options.echo * self._collected(chosen.joints):
+            if not self._is_beyond_noise(chosen):
                 continue
             before, after = self._predicted(self.now, chosen.fit)
-            fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (self.now, chosen.fit))
-            if not holdout.is_beyond_noise(fell, left, self.case.noise):
-                continue
-            removed = holdout.share_removed(fell, left, before, after)
+            removed = self._removed(chosen, before, after)
             holds = removed >= options.least_share
             timing = self._timing(found, chosen) if holds else None
             if timing is not None:
@@ -156,6 +160,41 @@ class _Workflow:
                 self._take(chosen)
                 return True
         return False
+
+    def _needed(self, chosen: Fitted) -> float:
+        """Evidence from which a candidate is named."""
+        return self.case.options.least_evidence + self.case.options.echo * self._collected(chosen.joints)
+
+    def _is_beyond_noise(self, chosen: Fitted) -> bool:
+        fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (self.now, chosen.fit))
+        return holdout.is_beyond_noise(fell, left, self.case.noise)
+
+    def _removed(self, chosen: Fitted, before: Floats, after: Floats) -> float:
+        """Share of the mean square that is gone on records not fitted to, from mean squares (n,) there."""
+        fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (self.now, chosen.fit))
+        return holdout.share_removed(fell, left, before, after)
+
+    def _suspect(self, found: Findings) -> Suspicion | None:
+        """The best candidate that was not named for want of evidence alone.
+
+        What speaks for it grows in proportion to the time recorded, and its cost hardly does.
+        """
+        for chosen in found.fitted[:CHANCES]:
+            total, needed = chosen.evidence + self._evidence_held_out(chosen), self._needed(chosen)
+            if chosen.evidence <= 0 or not SUSPECTED <= total < needed or not self._is_beyond_noise(chosen):
+                continue
+            if self._removed(chosen, *self._predicted(self.now, chosen.fit)) < self.case.options.least_share:
+                continue
+            recorded = sum(float(np.ptp(r.time)) for r in (*self.case.records, *self.case.held_out))
+            seconds = recorded * ((needed + chosen.cost) / (total + chosen.cost) - 1)
+            return Suspicion(
+                effect=chosen.effect,
+                joints=chosen.joints,
+                evidence=total,
+                needed=needed,
+                seconds=ROUNDED * float(np.ceil(seconds / ROUNDED)),
+            )
+        return None
 
     def _collected(self, joints: tuple[int, ...]) -> float:
         """Evidence of the steps adopted so far on these joints, or on any for an effect of the whole machine."""
@@ -323,7 +362,8 @@ class _Workflow:
             note="diagnosis",
         )
         return Diagnosis(
-            verdict=verdict(steps, unexplained=bool(shapes) and not adopted),
+            verdict=verdict(steps, unexplained=bool(shapes) and not adopted, suspected=self.suspicion is not None),
+            suspicion=None if adopted else self.suspicion,
             summary=UNWRITTEN,
             method="inverse-dynamics",
             steps=steps,

@@ -37,6 +37,8 @@ class Fitted:
     parameters: tuple[Parameter, ...]
     fit: BalanceFit
     evidence: float
+    cost: float = 0.0
+    """Cost of its parameters and of the places searched, which the evidence has paid."""
 
     def rivals(self, other: Fitted) -> bool:
         """Whether both explain torques of the same joints by different effects."""
@@ -131,14 +133,25 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
         return []
     best = min(found, key=lambda f: f.fit.criterion)
     memory = noise_model(now.data.stretches, best.fit.residual, now.data.floor).memory
-    weighed = [replace(f, evidence=evidence(now, f.fit, memory, len(f.parameters), places)) for f in found]
+    weighed = [
+        replace(
+            f,
+            evidence=evidence(now, f.fit, memory, len(f.parameters), places),
+            cost=_cost(now, memory, len(f.parameters), places),
+        )
+        for f in found
+    ]
     return sorted(weighed, key=lambda f: -f.evidence)
 
 
 def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
     """Fall of −2 log posterior from one fit to another, less the cost of its parameters and of the places searched."""
+    fell = float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
+    return fell + before.prior - after.prior - _cost(before, memory, parameters, places)
+
+
+def _cost(before: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
+    """k ln n for k parameters and n independent samples, and twice the logarithm of the places searched."""
     counts = np.array([sum(rows.stop - rows.start for _, rows in s) for s in before.data.stretches.by_joint])
     independent = max(float((counts / memory).sum()), 2.0)
-    fell = float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
-    cost = parameters * float(np.log(independent))
-    return fell + before.prior - after.prior - cost - 2 * float(np.log(max(places, 1)))
+    return parameters * float(np.log(independent)) + 2 * float(np.log(max(places, 1)))
