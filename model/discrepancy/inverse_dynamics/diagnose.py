@@ -29,6 +29,7 @@ from model.discrepancy.verdict import verdict
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples, recorded_motions
 from model.inverse_dynamics.recorded_sizes import recorded_sizes
+from model.inverse_dynamics.repeats import repeated_noise
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
 
@@ -70,10 +71,12 @@ def diagnose_torques(
     _refuse_unseen(chosen)
     cutoff = chosen.cutoff or choose_cutoff(traces, model.machine)
     progress(0.0, f"low-passing the records at {cutoff:g} Hz")
+    records = recorded_motions(traces, model.machine, cutoff)
+    repeats = repeated_noise(records, TorqueBalance(model, records).residual({}))
     case = Case(
-        recorded_motions(traces, model.machine, cutoff),
+        records,
         recorded_motions(held_out, model.machine, cutoff),
-        torque_noise(model, traces, cutoff),
+        np.maximum(torque_noise(model, traces, cutoff), repeats),
         chosen,
     )
     work = _Workflow(model, case, progress, cancel or Never())

@@ -15,6 +15,7 @@ from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, fit
 from model.discrepancy.inverse_dynamics.likelihood import noise_model
 from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
+from model.effects.library import effect as effect_of
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
@@ -46,8 +47,13 @@ class Fitted:
         return self.effect != other.effect and alike
 
     def imitates(self, other: Fitted, before: BalanceFit) -> bool:
-        """Whether this effect gives the same torque as the other one, with more parameters."""
-        if len(self.parameters) <= len(other.parameters):
+        """Whether this effect is a longer law of the same family that gives the torque of the other one.
+
+        Friction that falls with speed is Coulomb friction where it hardly falls: the shorter law is then its name. A
+        tilted base that gives the torque of friction by direction is another thing, whatever its parameters.
+        """
+        family, others = (effect_of(f.effect).shared_name.family for f in (self, other))
+        if len(self.parameters) <= len(other.parameters) or family != others:
             return False
         own, theirs = (
             np.concatenate([(a - b).ravel() for a, b in zip(f.fit.residual, before.residual, strict=True)])
