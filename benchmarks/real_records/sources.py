@@ -82,7 +82,7 @@ RIGS = (
         ("DATA_EMPS_PULSES",),
         _emps,
         "V",
-        "viscous,coulomb,direction_dependent_friction",
+        "coulomb,direction_dependent_friction",
         (("coulomb_friction",), ("direction_dependent_friction",)),
         constant=True,
     ),
@@ -96,7 +96,7 @@ RIGS = (
         ("down",),
         _dc_motor,
         "V",
-        "viscous,coulomb",
+        "coulomb",
         (("dead_zone", "coulomb_friction"),),
     ),
     Rig(
@@ -120,7 +120,7 @@ RIGS = (
         ("B", "C"),
         _kuka,
         "N·m",
-        "viscous,coulomb",
+        "coulomb",
         (("coulomb_friction", "viscous_friction", "gear_loss"),),
     ),
 )

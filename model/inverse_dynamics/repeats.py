@@ -28,7 +28,8 @@ FEWEST = 100
 
 def repeated_noise(records: Sequence[RecordedMotion], residual: Sequence[Floats]) -> Floats:
     """Standard deviation (n,), N·m or N, of what differs between passages of the same motion; 0 on a joint whose motion
-    does not recur. residual: (m, n) a record, at its compared samples."""
+    does not recur. A bound from above: passages are never quite alike. residual: (m, n) a record, at its compared
+    samples."""
     joints = records[0].moving.shape[1]
     return np.array([_of_joint(records, residual, j) for j in range(joints)])
 
