@@ -80,7 +80,8 @@ def judge(rig: Rig, data: Path, place: Path) -> list[Figure]:
     left = next(n["values"] for n in answer["notes_data"] if n["kind"] == "torque-left")
     columns = [[rig.read(data / rig.folder, n) for n in group] for group in (rig.fitted, rig.held_out)]
     linear, linear_fit = (
-        reference(rig.machine, columns[0], columns[1], at, constant=rig.constant) for at in (cutoff, fit["cutoff"])
+        reference(rig.machine, columns[0], columns[1], at, constant=rig.constant, springs=rig.springs)
+        for at in (cutoff, fit["cutoff"])
     )
     print(f"\n{rig.name}: {rig.origin}\n  {answer['verdict']}: {'; '.join(names(answer))}\n  {answer['summary']}")
     found = [*_named(rig, answer), *_shares(left, fit, linear, linear_fit), *_errors(answer, linear)]

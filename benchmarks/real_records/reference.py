@@ -46,11 +46,14 @@ def reference(
     cutoff: float,
     *,
     constant: bool,
+    springs: tuple[int, ...] = (),
 ) -> Reference:
-    """The linear fit. constant: whether every joint has a constant torque, too."""
+    """The linear fit. constant: whether every joint has a constant torque, too. springs: joints that also have one in
+    proportion to their position, beside a constant one."""
     document = tomllib.loads(machine.read_text("utf-8"))
     first, second = (
-        [_system(document, columns, cutoff, constant=constant) for columns in records] for records in (fitted, held_out)
+        [_system(document, columns, cutoff, constant=constant, springs=springs) for columns in records]
+        for records in (fitted, held_out)
     )
     A, b = np.concatenate([s[0] for s in first]), np.concatenate([s[1] for s in first])
     joints = b.shape[1]
@@ -72,7 +75,12 @@ def reference(
 
 
 def _system(
-    document: Mapping[str, Any], columns: Mapping[str, Floats], cutoff: float, *, constant: bool
+    document: Mapping[str, Any],
+    columns: Mapping[str, Floats],
+    cutoff: float,
+    *,
+    constant: bool,
+    springs: tuple[int, ...],
 ) -> tuple[Floats, Floats]:
     """Regressors (m, n, p) and torques (m, n) of one record."""
     joints = document["joints"]
@@ -95,6 +103,8 @@ def _system(
     parts = [_bodies(document, position, speed, acceleration)]
     own = [acceleration, speed, np.sign(speed), *([np.ones_like(speed)] if constant else [])]
     parts += [np.einsum("mj,jk->mjk", signal, np.eye(len(joints))) for signal in own]
+    sprung = np.eye(len(joints))[:, [j - 1 for j in springs]]
+    parts += [np.einsum("mj,jk->mjk", signal, sprung) for signal in (position, np.ones_like(position))]
     A = np.concatenate(parts, axis=2)
     kept = slice(
         round(EDGE / cutoff / period), -round(EDGE / cutoff / period), max(1, round(1 / (GRID * cutoff * period)))

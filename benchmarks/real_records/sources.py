@@ -23,6 +23,7 @@ class Rig:
     origin: repository, commit, licence. folder: where its files lie below the data folder. fitted, held_out: names of
     records. read: columns of each by name. effects: those that `daq fit` adds, and `expected`, those of which
     a diagnosis should name one. constant: whether the reference has a constant torque, as friction by direction has.
+    springs: joints on which the reference has a spring, at a rest that it finds.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Rig:
     effects: str
     expected: tuple[tuple[str, ...], ...]
     constant: bool = False
+    springs: tuple[int, ...] = ()
 
 
 def _emps(folder: Path, name: str) -> Columns:
@@ -121,7 +123,8 @@ RIGS = (
         _kuka,
         "N·m",
         "coulomb",
-        (("coulomb_friction", "viscous_friction", "gear_loss"),),
+        (("coulomb_friction", "viscous_friction", "gear_loss"), ("spring_torque on 2",)),
+        springs=(2,),
     ),
 )
 """Every rig. Two others never took part in any change of the method: see docs/benchmarks.md."""

@@ -144,6 +144,7 @@ class _Workflow:
     def _adopt(self, found: Findings) -> bool:
         """Adopt the best candidate that holds. False when there is none."""
         options = self.case.options
+        refused: list[Fitted] = []
         for chosen in found.fitted[:CHANCES]:
             told = self._evidence_held_out(chosen)
             if chosen.evidence <= 0 or chosen.evidence + told < self._needed(chosen):
@@ -158,10 +159,11 @@ class _Workflow:
                 self._take(timing)
                 self.notes.append(_timing_note(timing, self.case.records))
                 return True
-            self.steps.append(self._step(found, chosen, before, after, removed, told))
+            self.steps.append(self._step(found, chosen, (before, after), removed, told, refused))
             if holds:
                 self._take(chosen)
                 return True
+            refused.append(chosen)
         return False
 
     def _needed(self, chosen: Fitted) -> float:
@@ -240,13 +242,25 @@ class _Workflow:
         return squares[0], squares[1]
 
     def _step(
-        self, found: Findings, chosen: Fitted, before: Floats, after: Floats, removed: float, told: float
+        self,
+        found: Findings,
+        chosen: Fitted,
+        elsewhere: tuple[Floats, Floats],
+        removed: float,
+        told: float,
+        refused: Sequence[Fitted],
     ) -> Step:
-        """The step that the chosen effect is; before, after: mean squares (n,) on records not fitted to, and the
-        evidence `told` by held-out ones."""
+        """The step that the chosen effect is.
+
+        Args:
+            elsewhere: mean squares (n,) on records not fitted to, before and after. told: evidence that held-out ones
+                give. refused: candidates of this step that did not hold there; they are no rivals.
+        """
+        before, after = elsewhere
         case = self.case
         holds = removed >= case.options.least_share
-        rivals = [c for c in found.fitted if c.rivals(chosen) and not c.imitates(chosen, self.now)]
+        standing = [c for c in found.fitted if not any(c is one for one in refused)]
+        rivals = [c for c in standing if c.rivals(chosen) and not c.imitates(chosen, self.now)]
         near = [r for r in rivals if chosen.evidence - r.evidence < case.options.least_margin]
         group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.evidence)
         values = found_values(chosen.fit, chosen.parameters)
