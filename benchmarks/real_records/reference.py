@@ -20,8 +20,8 @@ Floats = NDArray[np.float64]
 
 WIDER = 3.0
 """Cutoff of the motion's low-pass, in cutoffs of the torques."""
-GRID = 10.0
-"""Samples that are compared a period of the cutoff."""
+GRID = 3.0
+"""Samples that are compared a period of the cutoff, as the product compares them: closer ones are not independent."""
 PADDED = 1.0
 """Seconds by which signals are mirrored at their ends."""
 LEAST = 0.01

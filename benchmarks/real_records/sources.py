@@ -122,7 +122,7 @@ RIGS = (
         ("B", "C"),
         _kuka,
         "N·m",
-        "coulomb",
+        "coulomb,spring_torque:2",
         (("coulomb_friction", "viscous_friction", "gear_loss"), ("spring_torque on 2",)),
         springs=(2,),
     ),

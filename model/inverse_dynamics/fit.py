@@ -32,6 +32,8 @@ from model.machine_model.model import Lineage, Model
 
 CUTOFF = 12.0
 """Default cutoff of the low-pass, Hz."""
+LEAST_LEFT = 1e-4
+"""Least residual that weighs the last round, as a share of the first: a record without noise leaves next to none."""
 LONGEST_MEMORY = 40
 """Samples over which the whitening of residual torques looks back, at most: a low-passed residual is correlated."""
 
@@ -112,6 +114,10 @@ def fit_torques(
 
     search = Search(options.robust, options.tolerance, options.most_evaluations or 60, report_search)
     found = solve(problem, [white(size) for size in _rms(first)], begin, cancel, search)
+    # again, weighed by what is left: by the residual of the given model, priors would count too much
+    left = np.concatenate([e.residual for e in problem.evaluate(found.values, derivatives=False)])
+    sizes = np.maximum(_rms(left), LEAST_LEFT * np.array(_rms(first)))
+    found = solve(problem, [white(float(size)) for size in sizes], found.values, cancel, search)
     parameters, report = _judge_parameters(problem, found.values, options)
     fitted = model.with_values({u.name: float(v) for u, v in zip(unknowns, found.values, strict=True)})
     errors = [_error(fitted, motion, held_out=k >= len(traces)) for k, motion in enumerate(motions)]
