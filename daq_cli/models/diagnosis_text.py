@@ -50,8 +50,8 @@ def _headline(found: Diagnosis) -> str:
     adopted = [s for s in found.steps if s.adopted and s.effect is not None]
     if found.verdict == "named" and adopted:
         return "; ".join(effect_on(s.effect or "", s.joints) for s in adopted)
-    if found.verdict == "ambiguous" and adopted:
-        return "; ".join(map(_name_or_group, adopted))
+    if found.verdict == "ambiguous" and found.steps:
+        return "; ".join(_name_or_group(s) for s in found.steps if s.adopted)
     if found.verdict == "suspected":
         return found.summary.removeprefix("Suspected: ")
     if found.verdict == "nothing-significant":
