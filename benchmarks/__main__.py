@@ -30,13 +30,14 @@ MAIN_JOB = (
 
 
 def benchmarks() -> dict[str, str]:
-    """Every benchmark (a module here that can be run) and its first line."""
+    """Every benchmark (a module or package here that can be run) and its first line."""
     found = {}
-    for path in sorted(FOLDER.glob("*.py")):
+    for path in sorted([*FOLDER.glob("*.py"), *FOLDER.glob("*/__main__.py")]):
+        name = path.stem if path.parent == FOLDER else path.parent.name
         source = path.read_text("utf-8")
-        if path.stem != "__main__" and '__name__ == "__main__"' in source:
-            found[path.stem] = (ast.get_docstring(ast.parse(source)) or "").partition("\n")[0]
-    return found
+        if name != "__main__" and '__name__ == "__main__"' in source:
+            found[name] = (ast.get_docstring(ast.parse(source)) or "").partition("\n")[0]
+    return dict(sorted(found.items()))
 
 
 def run(name: str, options: list[str], run_process: Callable[..., Any] = subprocess.run) -> int:

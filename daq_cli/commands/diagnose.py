@@ -63,8 +63,11 @@ def diagnose(
     ] = None,
     load: Annotated[float | None, typer.Option(min=0.0, help="Load that the arm carried, in kg.")] = None,
     most: Annotated[
-        int, typer.Option(min=1, max=10, help="Largest number of effects to add, one after the other.")
-    ] = 3,
+        int | None,
+        typer.Option(
+            min=1, max=10, help="Largest number of effects to add, one after the other (default: 3; of torques 8)."
+        ),
+    ] = None,
     out: Annotated[Path | None, OutOption] = None,
     report: ReportOption = None,
     folder: TraceFolderOption = None,
@@ -141,16 +144,16 @@ def _print_result(found: Diagnosis, out: Path | None, page: Path | None, *, as_j
         console().print(f"report: {page}")
 
 
-def _options(effects: str | None, joints: str | None, most: int) -> DiagnosisOptions:
+def _options(effects: str | None, joints: str | None, most: int | None) -> DiagnosisOptions:
     from daq.contracts.experiment import parse_joints
     from daq_cli.models.effect_choice import effect_names
     from model.discrepancy.options import DiagnosisOptions
 
-    return DiagnosisOptions(
-        effects=None if effects is None else effect_names(effects),
-        joints=None if joints is None else tuple(parse_joints(joints)),
-        most_steps=most,
-    )
+    names = None if effects is None else effect_names(effects)
+    chosen = None if joints is None else tuple(parse_joints(joints))
+    if most is None:
+        return DiagnosisOptions(effects=names, joints=chosen)
+    return DiagnosisOptions(effects=names, joints=chosen, most_steps=most)
 
 
 def _beginning(

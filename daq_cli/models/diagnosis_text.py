@@ -20,6 +20,7 @@ VERDICTS = {
     "nothing-significant": "NOTHING SIGNIFICANT",
     "named": "NAMED",
     "ambiguous": "AMBIGUOUS",
+    "suspected": "SUSPECTED",
     "unknown-effect": "UNKNOWN EFFECT",
 }
 
@@ -49,13 +50,21 @@ def _headline(found: Diagnosis) -> str:
     adopted = [s for s in found.steps if s.adopted and s.effect is not None]
     if found.verdict == "named" and adopted:
         return "; ".join(effect_on(s.effect or "", s.joints) for s in adopted)
-    if found.verdict == "ambiguous" and found.steps and found.steps[-1].group:
-        return "one of " + ", ".join(effect_on(c.effect, c.joints) for c in found.steps[-1].group)
+    if found.verdict == "ambiguous" and found.steps:
+        return "; ".join(_name_or_group(s) for s in found.steps if s.adopted)
+    if found.verdict == "suspected":
+        return found.summary.removeprefix("Suspected: ")
     if found.verdict == "nothing-significant":
         if any(s.effect is not None for s in found.steps):
             return "nothing that the held-out traces confirm"
         return "the model explains these traces within their noise and its tolerances"
     return "none of the known effects explains what is left"
+
+
+def _name_or_group(step: Step) -> str:
+    if step.group:
+        return "one of " + ", ".join(effect_on(c.effect, c.joints) for c in step.group)
+    return effect_on(step.effect or "", step.joints)
 
 
 def _step(step: Step, earlier: Sequence[Step]) -> list[str]:

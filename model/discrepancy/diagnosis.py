@@ -15,7 +15,7 @@ from model.machine_model.parameter import Parameter
 ANSWER_FORMAT = 1
 """Version of the answer; a reader refuses newer ones."""
 
-Verdict = Literal["nothing-significant", "named", "ambiguous", "unknown-effect"]
+Verdict = Literal["nothing-significant", "named", "ambiguous", "suspected", "unknown-effect"]
 Phase = Literal["ramp_start", "steady_ramp", "reversal", "creep", "hold"]
 AgainstWhat = Literal["time", "position", "speed", "direction", "drive"]
 UNWRITTEN = ""
@@ -180,6 +180,8 @@ class Step(_Part):
     rmse_holdout: tuple[SignalError, ...] = ()
     excess_removed_holdout: float | None = None
     """Share of the held-out variance above the noise floor that the step removed."""
+    evidence_held_out: float | None = None
+    """2 ln of the ratio of the likelihoods of held-out traces with and without the effect; in torques alone."""
     sum_lambda2_before: float | None = None
     sum_lambda2_after: float | None = None
     where: Where
@@ -221,6 +223,17 @@ class NextExperiment(_Part):
     differs_at: DifferencePlace | None = None
     information: float | None = None
     """nats that it would add on the arm's parameters, where there are no candidates to separate."""
+
+
+class Suspicion(_Part):
+    """An effect that more of the same motion would show or refute: its evidence, held-out records included, the
+    evidence `needed` to name it, and the `seconds` that are still to be recorded for that."""
+
+    effect: str
+    joints: tuple[int, ...]
+    evidence: float
+    needed: float
+    seconds: float
 
 
 class Acquired(_Part):
@@ -268,6 +281,8 @@ class Diagnosis(_Part):
     notes_data: tuple[Note, ...] = ()
     """The data of `notes`, in the same order; empty in older answers."""
     method: Method = "output-error"
+    suspicion: Suspicion | None = None
+    """Where the verdict is `suspected`; by inverse dynamics alone."""
     unexplained_joints: tuple[int, ...] = ()
     """Joints on which more is left than noise, where the verdict is `unknown-effect`."""
     worse_held_out: tuple[int, ...] = ()

@@ -17,14 +17,17 @@ SCATTER = 4.0
 """Standard deviations of an estimated variance, within which it may exceed its floor by chance."""
 
 
-def verdict(steps: Sequence[Step], *, unexplained: bool) -> Verdict:
+def verdict(steps: Sequence[Step], *, unexplained: bool, suspected: bool = False) -> Verdict:
     """The verdict of either method.
 
     Args:
         steps: all of them; only those that were adopted count. A group that held-out traces have refused is not one.
         unexplained: whether what is left speaks against the steps, or is there without any. By output error that is
             any joint above its line; by inverse dynamics a shape in the remaining torque, where no step was adopted.
+        suspected: whether an effect lacks nothing but evidence, and has some.
     """
+    if suspected and not any(s.adopted for s in steps):
+        return "suspected"
     if unexplained:
         return "unknown-effect"
     if any(s.adopted and s.group for s in steps):

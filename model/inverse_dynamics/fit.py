@@ -26,11 +26,14 @@ from model.fitting.unknowns import prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
 from model.inverse_dynamics.problem import TorqueProblem
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion
+from model.inverse_dynamics.recorded_sizes import recorded_sizes, with_recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
 
 CUTOFF = 12.0
 """Default cutoff of the low-pass, Hz."""
+LEAST_LEFT = 1e-4
+"""Least residual that weighs the last round, as a share of the first: a record without noise leaves next to none."""
 LONGEST_MEMORY = 40
 """Samples over which the whitening of residual torques looks back, at most: a low-passed residual is correlated."""
 
@@ -100,6 +103,8 @@ def fit_torques(
     unknowns = chosen_unknowns(model, options)
     progress(0.0, "low-passing the records")
     motions = [_driven_motion(model, trace, cutoff) for trace in (*traces, *held_out)]
+    asked_for = {n: p for n, p in recorded_sizes(model, motions[: len(traces)]).items() if n not in options.priors}
+    unknowns = with_recorded_sizes(unknowns, asked_for)
     problem = TorqueProblem(model, tuple(motions[: len(traces)]), unknowns, np.ones(model.joint_count))
     begin = np.array([u.start for u in unknowns])
     first = np.concatenate([e.residual for e in problem.evaluate(begin, derivatives=False)])
@@ -109,6 +114,10 @@ def fit_torques(
 
     search = Search(options.robust, options.tolerance, options.most_evaluations or 60, report_search)
     found = solve(problem, [white(size) for size in _rms(first)], begin, cancel, search)
+    # again, weighed by what is left: by the residual of the given model, priors would count too much
+    left = np.concatenate([e.residual for e in problem.evaluate(found.values, derivatives=False)])
+    sizes = np.maximum(_rms(left), LEAST_LEFT * np.array(_rms(first)))
+    found = solve(problem, [white(float(size)) for size in sizes], found.values, cancel, search)
     parameters, report = _judge_parameters(problem, found.values, options)
     fitted = model.with_values({u.name: float(v) for u, v in zip(unknowns, found.values, strict=True)})
     errors = [_error(fitted, motion, held_out=k >= len(traces)) for k, motion in enumerate(motions)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from daq.contracts.machine import Friction, Machine
@@ -14,12 +15,19 @@ from model.machine_model.parameter import Kind, Parameter
 
 
 def effect_parameters(
-    machine: Machine, name: str, joints: tuple[int, ...], shared: bool, beyond: int = 0
+    machine: Machine,
+    name: str,
+    joints: tuple[int, ...],
+    shared: bool,
+    beyond: int = 0,
+    scales: Mapping[int, JointScale] | None = None,
 ) -> tuple[Parameter, ...]:
     """Parameters of effect `name` on `joints`: one set per joint, or one set for all when `shared`.
 
-    `beyond` columns of a joint are taken by effects of the user's own that come before this one.
+    `beyond` columns of a joint are taken by effects of the user's own that come before this one. `scales`: natural
+    sizes of joints (from 1) that are known better than from the machine file.
     """
+    known_scales = scales or {}
     kind = effect(name)
     if kind.whole_machine:
         scale = joint_scale(machine, machine.modelled_joints[-1])
@@ -31,7 +39,7 @@ def effect_parameters(
     for group in [joints] if shared else [(j,) for j in joints]:
         place = f"joint{group[0]}" if len(group) == 1 else "joints" + "+".join(str(j) for j in group)
         first = machine.joint(group[0])
-        scale = joint_scale(machine, group[0])
+        scale = known_scales.get(group[0]) or joint_scale(machine, group[0])
         known = _known(first.friction, name, scale)
         for p in kind.parameters:
             own = _parameter(kind, p, scale, place)

@@ -25,6 +25,7 @@ VERDICTS = {
     "nothing-significant": "nothing significant: the model explains these traces within their noise",
     "named": "named",
     "ambiguous": "ambiguous: the data cannot tell several effects apart",
+    "suspected": "suspected: more of this motion would settle it",
     "unknown-effect": "an effect that is not among the known ones",
 }
 LABELS = ("before", "after")

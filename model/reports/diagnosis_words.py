@@ -57,6 +57,8 @@ def headline(found: Diagnosis) -> str:
     """The effects found, with joints and sizes; or that none was found, or none that is known."""
     if found.verdict == "nothing-significant":
         return "Nothing that the held-out traces confirm" if found.steps else "Nothing significant"
+    if found.verdict == "suspected":
+        return found.summary.removesuffix(".")
     findings = [_finding(s) for s in found.steps if s.adopted]
     if found.verdict == "unknown-effect":
         findings.append(NO_LAW)

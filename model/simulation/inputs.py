@@ -110,11 +110,9 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
 def _check_unit(trace: Trace, measured: Floats, machine: Machine) -> None:
     for k, joint in enumerate(machine.modelled_joints):
         largest = float(np.abs(measured[:, k]).max())
-        if (
-            machine.joint(joint).kind == "revolute"
-            and machine.joint(joint).sensor is not None
-            and largest > LARGEST_ANGLE
-        ):
+        sensor = machine.joint(joint).sensor
+        reads_angles = sensor is not None and sensor.measures == "position"  # a tachometer's shaft may turn for ever
+        if machine.joint(joint).kind == "revolute" and reads_angles and largest > LARGEST_ANGLE:
             raise TraceError(
                 f"trace {trace.record.trace_id}: joint {joint} reaches {largest:.4g} rad; degrees? "
                 f"angles must be in rad, up to {LARGEST_ANGLE:g}"

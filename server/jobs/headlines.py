@@ -45,11 +45,18 @@ def of_diagnosis(found: Diagnosis) -> str:
     """Says the verdict and the effects that it names."""
     if found.verdict == "named":
         return f"named: {'; '.join(_named(s) for s in found.steps if s.adopted)}"
-    if found.verdict == "ambiguous" and found.steps:
-        group = [_named(one) for one in found.steps[-1].group]
-        more = "" if len(group) <= UNDECIDED_SHOWN else f" or {len(group) - UNDECIDED_SHOWN} more"
-        return f"one of: {' or '.join(group[:UNDECIDED_SHOWN])}{more}"
+    if found.verdict == "ambiguous":
+        return "; ".join(_group(s) if s.group else _named(s) for s in found.steps if s.adopted)
+    if found.verdict == "suspected" and found.suspicion is not None:
+        return f"suspected: {placed(found.suspicion.effect, found.suspicion.joints)}"
     return "nothing significant" if found.verdict == "nothing-significant" else "an unknown effect"
+
+
+def _group(step: Step) -> str:
+    """The first members of a group, and how many more there are."""
+    names = [_named(one) for one in step.group]
+    more = "" if len(names) <= UNDECIDED_SHOWN else f" or {len(names) - UNDECIDED_SHOWN} more"
+    return f"one of: {' or '.join(names[:UNDECIDED_SHOWN])}{more}"
 
 
 def _named(one: Step | Candidate) -> str:

@@ -136,12 +136,25 @@ def summary(answer: Diagnosis) -> str:
     match answer.verdict:
         case "nothing-significant":
             return _nothing(next((s for s in answer.steps if not s.adopted), None))
+        case "suspected":
+            return _suspected(answer)
         case "unknown-effect":
             return _unknown(answer)
         case "named" | "ambiguous":
             parts = [_undecided(s.group, s.where) if s.group else reason_text(s) for s in adopted]
             rest = ["Something is left that none of the known effects explains."] if answer.remaining else []
             return " ".join([*parts, *rest])
+
+
+def _suspected(answer: Diagnosis) -> str:
+    """What is suspected, and how much more of the motion would settle it."""
+    found = answer.suspicion
+    if found is None:
+        return "Suspected: an effect that these traces do not show clearly."
+    return (
+        f"Suspected: {_called(found.effect, found.joints)}, evidence {found.evidence:.0f} of {found.needed:.0f}; "
+        f"{found.seconds:.0f} s more of this motion would settle it."
+    )
 
 
 def shape_words(shape: RemainingShape) -> str:

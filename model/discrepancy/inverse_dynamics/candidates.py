@@ -15,6 +15,7 @@ from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.effects.effect import Effect
 from model.effects.library import library
 from model.inverse_dynamics.recorded_motion import RESOLVED, RecordedMotion
+from model.inverse_dynamics.recorded_sizes import recorded_sizes
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, levels_along
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
@@ -133,7 +134,8 @@ def _trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceFit) ->
     """One effect on one joint, or of the whole machine."""
     wider = model.with_effect(name, joints)
     place = _Place(wider, joints[0] - 1 if joints else 0, now.balance.records, now.residual)
-    added = (p for p in wider.parameters if p.name not in model.by_name and p.part != UNSEEN)
+    sizes = recorded_sizes(wider, now.balance.records)
+    added = (sizes.get(p.name, p) for p in wider.parameters if p.name not in model.by_name and p.part != UNSEEN)
     own = tuple(_narrowed(p, place) for p in added)
     amplitudes = tuple(p.name for p in own if p.null is not None)
     return Trial(name, joints, wider, own, amplitudes, tuple(_starts(name, own, place)))

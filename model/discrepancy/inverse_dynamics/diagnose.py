@@ -12,7 +12,7 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, FoundValue, SignalError, Step
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, FoundValue, SignalError, Step, Suspicion
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import Note, Reason, Refusal
@@ -28,6 +28,8 @@ from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.verdict import verdict
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples, recorded_motions
+from model.inverse_dynamics.recorded_sizes import recorded_sizes
+from model.inverse_dynamics.repeats import repeated_noise
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Lineage, Model
 
@@ -35,6 +37,11 @@ CHANCES = 3
 """Candidates of a step that may fail on records not fitted to before the search ends."""
 SHOWN = 12
 """Most candidates that a step lists."""
+SUSPECTED = 10.0
+"""Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
+and still short of what naming it takes."""
+ROUNDED = 5.0
+"""s to which the time that is still to be recorded is rounded up."""
 ABOVE_NOISE = 1.2
 """Least mean square of a joint on held-out records, relative to that of noise, with which it counts for the share
 removed."""
@@ -64,10 +71,12 @@ def diagnose_torques(
     _refuse_unseen(chosen)
     cutoff = chosen.cutoff or choose_cutoff(traces, model.machine)
     progress(0.0, f"low-passing the records at {cutoff:g} Hz")
+    records = recorded_motions(traces, model.machine, cutoff)
+    repeats = repeated_noise(records, TorqueBalance(model, records).residual({}))
     case = Case(
-        recorded_motions(traces, model.machine, cutoff),
+        records,
         recorded_motions(held_out, model.machine, cutoff),
-        torque_noise(model, traces, cutoff),
+        np.maximum(torque_noise(model, traces, cutoff), repeats),
         chosen,
     )
     work = _Workflow(model, case, progress, cancel or Never())
@@ -97,6 +106,7 @@ class _Workflow:
     steps: list[Step] = field(default_factory=list)
     tried: tuple[Candidate, ...] = ()
     notes: list[Note] = field(default_factory=list)
+    suspicion: Suspicion | None = None
 
     def __post_init__(self) -> None:
         self.begin = self.model
@@ -113,6 +123,7 @@ class _Workflow:
             found = search(self.model, self.now, self.case, self._report, self.cancel)
             if not self._adopt(found):
                 self.tried = self._candidates(found)
+                self.suspicion = self._suspect(found)
                 break
             self._report(0.9, "what is not needed any more")
             self._prune(done)
@@ -123,40 +134,83 @@ class _Workflow:
         self.progress(min(0.99, (len(self.steps) + fraction) / (whole + 1)), f"step {len(self.steps) + 1}: {text}")
 
     def _fit(self, model: Model, begin: dict[str, float] | None = None) -> BalanceFit:
-        own, _ = tolerances(self.begin)
+        records = self.case.records
+        own, _ = tolerances(self.begin, sizes=recorded_sizes(self.begin, records))
         known = {u.name for u in own}
-        found = tuple(u for u in tolerances(model, self.added)[0] if u.name not in known)
+        sizes = recorded_sizes(model, records)
+        found = tuple(u for u in tolerances(model, self.added, sizes)[0] if u.name not in known)
         return fit(TorqueBalance(model, self.case.records), (*own, *found), begin or {}, self.case.data)
 
     def _adopt(self, found: Findings) -> bool:
         """Adopt the best candidate that holds. False when there is none."""
         options = self.case.options
+        refused: list[Fitted] = []
         for chosen in found.fitted[:CHANCES]:
-            if chosen.evidence < options.least_evidence:
-                return False
-            if chosen.evidence < options.least_evidence + options.echo * self._collected(chosen.joints):
+            told = self._evidence_held_out(chosen)
+            if chosen.evidence <= 0 or chosen.evidence + told < self._needed(chosen):
+                continue
+            if not self._is_beyond_noise(chosen):
                 continue
             before, after = self._predicted(self.now, chosen.fit)
-            fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (self.now, chosen.fit))
-            if not holdout.is_beyond_noise(fell, left, self.case.noise):
-                continue
-            removed = holdout.share_removed(fell, left, before, after)
+            removed = self._removed(chosen, before, after)
             holds = removed >= options.least_share
             timing = self._timing(found, chosen) if holds else None
             if timing is not None:
                 self._take(timing)
                 self.notes.append(_timing_note(timing, self.case.records))
                 return True
-            self.steps.append(self._step(found, chosen, before, after, removed))
+            self.steps.append(self._step(found, chosen, (before, after), removed, told, refused))
             if holds:
                 self._take(chosen)
                 return True
+            refused.append(chosen)
         return False
+
+    def _needed(self, chosen: Fitted) -> float:
+        """Evidence from which a candidate is named."""
+        return self.case.options.least_evidence + self.case.options.echo * self._collected(chosen.joints)
+
+    def _is_beyond_noise(self, chosen: Fitted) -> bool:
+        fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (self.now, chosen.fit))
+        return holdout.is_beyond_noise(fell, left, self.case.noise)
+
+    def _removed(self, chosen: Fitted, before: Floats, after: Floats) -> float:
+        """Share of the mean square that is gone on records not fitted to, from mean squares (n,) there."""
+        fell, left = (holdout.mean_squares(self.case.stretches, f.residual) for f in (self.now, chosen.fit))
+        return holdout.share_removed(fell, left, before, after)
+
+    def _suspect(self, found: Findings) -> Suspicion | None:
+        """The best candidate that was not named for want of evidence alone.
+
+        What speaks for it grows in proportion to the time recorded, and its cost hardly does.
+        """
+        for chosen in found.fitted[:CHANCES]:
+            total, needed = chosen.evidence + self._evidence_held_out(chosen), self._needed(chosen)
+            if chosen.evidence <= 0 or not SUSPECTED <= total < needed or not self._is_beyond_noise(chosen):
+                continue
+            if self._removed(chosen, *self._predicted(self.now, chosen.fit)) < self.case.options.least_share:
+                continue
+            recorded = sum(float(np.ptp(r.time)) for r in (*self.case.records, *self.case.held_out))
+            seconds = recorded * ((needed + chosen.cost) / (total + chosen.cost) - 1)
+            return Suspicion(
+                effect=chosen.effect,
+                joints=chosen.joints,
+                evidence=total,
+                needed=needed,
+                seconds=ROUNDED * float(np.ceil(seconds / ROUNDED)),
+            )
+        return None
 
     def _collected(self, joints: tuple[int, ...]) -> float:
         """Evidence of the steps adopted so far on these joints, or on any for an effect of the whole machine."""
         near = (s for s in self.steps if s.adopted and (not joints or not s.joints or set(s.joints) & set(joints)))
-        return sum(s.evidence for s in near)
+        return sum(s.evidence + (s.evidence_held_out or 0.0) for s in near)
+
+    def _evidence_held_out(self, chosen: Fitted) -> float:
+        """What held-out records say for an effect, beside its evidence on the fitted ones; 0 where there are none."""
+        if not self.case.held_out:
+            return 0.0
+        return holdout.evidence(self.now, chosen.fit, self.case.held_out)
 
     def _take(self, chosen: Fitted) -> None:
         self.added |= {p.name for p in chosen.parameters}
@@ -187,11 +241,26 @@ class _Workflow:
             squares = [holdout.block_squares(f) for f in (before, after)]
         return squares[0], squares[1]
 
-    def _step(self, found: Findings, chosen: Fitted, before: Floats, after: Floats, removed: float) -> Step:
-        """The step that the chosen effect is; before, after: mean squares (n,) on records not fitted to."""
+    def _step(
+        self,
+        found: Findings,
+        chosen: Fitted,
+        elsewhere: tuple[Floats, Floats],
+        removed: float,
+        told: float,
+        refused: Sequence[Fitted],
+    ) -> Step:
+        """The step that the chosen effect is.
+
+        Args:
+            elsewhere: mean squares (n,) on records not fitted to, before and after. told: evidence that held-out ones
+                give. refused: candidates of this step that did not hold there; they are no rivals.
+        """
+        before, after = elsewhere
         case = self.case
         holds = removed >= case.options.least_share
-        rivals = [c for c in found.fitted if c.rivals(chosen) and not c.imitates(chosen, self.now)]
+        standing = [c for c in found.fitted if not any(c is one for one in refused)]
+        rivals = [c for c in standing if c.rivals(chosen) and not c.imitates(chosen, self.now)]
         near = [r for r in rivals if chosen.evidence - r.evidence < case.options.least_margin]
         group = sorted({c.effect: c for c in reversed([chosen, *near])}.values(), key=lambda c: -c.evidence)
         values = found_values(chosen.fit, chosen.parameters)
@@ -201,6 +270,7 @@ class _Workflow:
             joints=chosen.joints,
             parameters=values,
             evidence=chosen.evidence,
+            evidence_held_out=told if case.held_out else None,
             margin=chosen.evidence - max([0.0, *(r.evidence for r in rivals)]),
             candidates=self._candidates(found),
             group=tuple(self._candidate(c) for c in group) if near else (),
@@ -309,7 +379,8 @@ class _Workflow:
             note="diagnosis",
         )
         return Diagnosis(
-            verdict=verdict(steps, unexplained=bool(shapes) and not adopted),
+            verdict=verdict(steps, unexplained=bool(shapes) and not adopted, suspected=self.suspicion is not None),
+            suspicion=None if adopted else self.suspicion,
             summary=UNWRITTEN,
             method="inverse-dynamics",
             steps=steps,

@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data, fit
-from model.discrepancy.inverse_dynamics.likelihood import Stretches, stretches_of
+from model.discrepancy.inverse_dynamics.likelihood import (
+    Stretches,
+    minus_twice_log_likelihood,
+    noise_model,
+    stretches_of,
+)
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
@@ -39,6 +44,19 @@ def _mean_squares(by_joint: Sequence[Sequence[Floats]]) -> Floats:
 def held_out_squares(model: Model, values: Mapping[str, float], records: tuple[RecordedMotion, ...]) -> Floats:
     """Mean squares (n,) of a fitted model on other records."""
     return mean_squares(stretches_of(records), _residuals(model, values, records))
+
+
+def evidence(before: BalanceFit, after: BalanceFit, records: tuple[RecordedMotion, ...]) -> float:
+    """Fall of −2 log likelihood of records that neither fit has seen; above 0 where the later fit predicts them better.
+
+    Nothing was fitted to these records, so parameters cost nothing here: by the chain rule of probability it adds to
+    the evidence of the fitted records. Independent samples are counted in what the later fit leaves.
+    """
+    stretches, floor = stretches_of(records), after.data.floor
+    first, last = (_residuals(f.balance.model, f.values, records) for f in (before, after))
+    memory = noise_model(stretches, last, floor).memory
+    fell = (minus_twice_log_likelihood(stretches, residual, memory, floor) for residual in (first, last))
+    return float(np.subtract(*fell).sum())
 
 
 def block_squares(now: BalanceFit) -> Floats:

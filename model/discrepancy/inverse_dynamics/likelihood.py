@@ -95,8 +95,9 @@ def noise_model(stretches: Stretches, residual: Sequence[Floats], floor: Floats)
     deviation, memory = floor.copy(), np.ones(joints)
     for j in range(joints):
         if pieces := stretches.of_joint(residual, j):
-            covariance = autocovariance(pieces, LONGEST_MEMORY)
-            deviation[j] = max(float(np.sqrt(covariance[0])), floor[j])
+            every = np.concatenate(pieces)
+            deviation[j] = max(float(np.sqrt(np.mean(every**2))), floor[j])
+            covariance = autocovariance([piece - every.mean() for piece in pieces], LONGEST_MEMORY)
             memory[j] = 1 + 2 * float(((covariance[1:] / max(covariance[0], 1e-300)) ** 2).sum())
     return NoiseModel(deviation, memory)
 

@@ -37,7 +37,9 @@ class TorqueOptions(BaseModel):
 
 
 def torque_options(options: DiagnosisOptions | TorqueOptions | None) -> TorqueOptions:
-    """The options of any diagnosis as options of this one."""
+    """Returns the options of any diagnosis as options of this one, whose own number of steps holds where none is given:
+    an arm of six joints has friction on each of them."""
     if isinstance(options, DiagnosisOptions):
-        return TorqueOptions(effects=options.effects, joints=options.joints, most_steps=options.most_steps)
+        given = {"most_steps": options.most_steps} if "most_steps" in options.model_fields_set else {}
+        return TorqueOptions(effects=options.effects, joints=options.joints, **given)
     return options or TorqueOptions()

@@ -15,12 +15,15 @@ from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, fit
 from model.discrepancy.inverse_dynamics.likelihood import noise_model
 from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
+from model.effects.library import effect as effect_of
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
 SHORTLIST = 7
 """Most effects that are fitted after probing."""
+LARGER_PART = 0.5
+"""Share of a joint's residual from which an effect that explains it is fitted, whatever it promises in evidence."""
 ALIKE = 0.97
 """Correlation of the torques of two effects above which they count as the same."""
 JOINT_GAIN = 12.0
@@ -37,6 +40,8 @@ class Fitted:
     parameters: tuple[Parameter, ...]
     fit: BalanceFit
     evidence: float
+    cost: float = 0.0
+    """Cost of its parameters and of the places searched, which the evidence has paid."""
 
     def rivals(self, other: Fitted) -> bool:
         """Whether both explain torques of the same joints by different effects."""
@@ -44,8 +49,13 @@ class Fitted:
         return self.effect != other.effect and alike
 
     def imitates(self, other: Fitted, before: BalanceFit) -> bool:
-        """Whether this effect gives the same torque as the other one, with more parameters."""
-        if len(self.parameters) <= len(other.parameters):
+        """Whether this effect is a longer law of the same family that gives the torque of the other one.
+
+        Friction that falls with speed is Coulomb friction where it hardly falls: the shorter law is then its name. A
+        tilted base that gives the torque of friction by direction is another thing, whatever its parameters.
+        """
+        family, others = (effect_of(f.effect).shared_name.family for f in (self, other))
+        if len(self.parameters) <= len(other.parameters) or family != others:
             return False
         own, theirs = (
             np.concatenate([(a - b).ravel() for a, b in zip(f.fit.residual, before.residual, strict=True)])
@@ -77,7 +87,7 @@ def search(model: Model, now: BalanceFit, case: Case, progress: Progress, cancel
         probes.append(prober.probe(trial))
     probes.sort(key=lambda p: -p.gain)
     found = []
-    for chosen in _shortlist(probes):
+    for chosen in _shortlist(probes, now):
         stop_if(cancel)
         progress(0.6, f"fitting {chosen[0].trial.effect.replace('_', ' ')}{_on(_joints(chosen))}")
         found.append(_fit_effect(fitted_model, now, slopes, chosen))
@@ -93,8 +103,13 @@ def _joints(probes: Sequence[Probe]) -> tuple[int, ...]:
     return tuple(sorted({j for p in probes for j in p.trial.joints}))
 
 
-def _shortlist(probes: Sequence[Probe]) -> list[list[Probe]]:
-    """For the most promising effects, the best joint alone, and all joints on which there is something to explain."""
+def _shortlist(probes: Sequence[Probe], now: BalanceFit) -> list[list[Probe]]:
+    """For the most promising effects, the best joint alone, and all joints on which there is something to explain; and
+    for every joint the effect that explains most of it, where that is the larger part.
+
+    On a joint whose residual is large and slow, few samples count as independent, and no effect promises much there as
+    long as it is not fitted.
+    """
     by_effect: dict[str, list[Probe]] = {}
     for probe in probes:
         if probe.gain > 0:
@@ -109,7 +124,19 @@ def _shortlist(probes: Sequence[Probe]) -> list[list[Probe]]:
         chosen.append([first])
         if len(several) > 1:
             chosen.append(sorted(several, key=lambda p: p.trial.joints))
+    listed = {(p.trial.effect, p.trial.joints) for own in chosen for p in own}
+    for joint, whole in zip(now.balance.model.machine.modelled_joints, _weighted_squares(now), strict=True):
+        largest = max((p for p in probes if p.trial.joints == (joint,)), key=lambda p: p.gain, default=None)
+        if largest is None or largest.gain <= LARGER_PART * whole:
+            continue
+        if (largest.trial.effect, largest.trial.joints) not in listed:
+            chosen.append([largest])
     return chosen
+
+
+def _weighted_squares(now: BalanceFit) -> list[float]:
+    """Sum of the weighted squares of every joint's residual: what a probe there can gain at most."""
+    return [float(left @ left) for left in now.noise.weighted(now.data.stretches, now.residual)]
 
 
 def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[Probe]) -> Fitted:
@@ -125,20 +152,32 @@ def _fit_effect(model: Model, now: BalanceFit, slopes: Slopes, probes: Sequence[
 
 
 def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted]:
-    """The candidates with their evidence, best first; the residual of the best one decides how many samples are
-    independent."""
+    """The candidates with their evidence, best first; on every joint the residual of the fit that leaves least there
+    decides how many samples are independent."""
     if not found:
         return []
-    best = min(found, key=lambda f: f.fit.criterion)
-    memory = noise_model(now.data.stretches, best.fit.residual, now.data.floor).memory
-    weighed = [replace(f, evidence=evidence(now, f.fit, memory, len(f.parameters), places)) for f in found]
+    models = [noise_model(now.data.stretches, f.fit.residual, now.data.floor) for f in found]
+    least = [min(range(len(found)), key=lambda k: found[k].fit.by_joint[j]) for j in range(len(now.by_joint))]
+    memory = np.array([models[k].memory[j] for j, k in enumerate(least)])
+    weighed = [
+        replace(
+            f,
+            evidence=evidence(now, f.fit, memory, len(f.parameters), places),
+            cost=_cost(now, memory, len(f.parameters), places),
+        )
+        for f in found
+    ]
     return sorted(weighed, key=lambda f: -f.evidence)
 
 
 def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
     """Fall of −2 log posterior from one fit to another, less the cost of its parameters and of the places searched."""
+    fell = float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
+    return fell + before.prior - after.prior - _cost(before, memory, parameters, places)
+
+
+def _cost(before: BalanceFit, memory: Floats, parameters: int, places: int) -> float:
+    """k ln n for k parameters and n independent samples, and twice the logarithm of the places searched."""
     counts = np.array([sum(rows.stop - rows.start for _, rows in s) for s in before.data.stretches.by_joint])
     independent = max(float((counts / memory).sum()), 2.0)
-    fell = float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
-    cost = parameters * float(np.log(independent))
-    return fell + before.prior - after.prior - cost - 2 * float(np.log(max(places, 1)))
+    return parameters * float(np.log(independent)) + 2 * float(np.log(max(places, 1)))

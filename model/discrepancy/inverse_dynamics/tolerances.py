@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Literal
 
 from model.fitting.unknowns import Unknown
@@ -21,13 +22,18 @@ DeviationSource = Literal["stated", "fitted-before", "free"]
 """Where deviations come from: the machine file; an assumption after an earlier fit; nowhere (nearly free)."""
 
 
-def tolerances(model: Model, added: frozenset[str] = frozenset()) -> tuple[tuple[Unknown, ...], DeviationSource]:
+def tolerances(
+    model: Model, added: frozenset[str] = frozenset(), sizes: Mapping[str, Parameter] | None = None
+) -> tuple[tuple[Unknown, ...], DeviationSource]:
     """Parameters that may be wrong, and where their deviations come from.
 
     Args:
         added: effects' parameters (full names) that the diagnosis itself put in; they have no prior.
+        sizes: effects' parameters by name, with deviations that follow from the records.
     """
-    own = [p for p in model.parameters if p.name not in added]
+    known = sizes or {}
+    every = [known.get(p.name, p) for p in model.parameters]
+    own = [p for p in every if p.name not in added]
     stated = [p for p in own if p.deviation is not None and p.effect is None and not p.sets_torque_scale]
     bodies = [p for p in own if p.kind is Kind.INERTIA and p.value != 0.0]
     machine: list[tuple[Parameter, float | None]]
@@ -42,7 +48,7 @@ def tolerances(model: Model, added: frozenset[str] = frozenset()) -> tuple[tuple
         machine = [(p, FREE_SHARE * abs(p.value)) for p in bodies]
         source = "free"
     effects = [(p, p.deviation) for p in own if p.effect is not None]
-    found = [free_unknown(p) for p in model.parameters if p.name in added]
+    found = [free_unknown(p) for p in every if p.name in added]
     return (*(_unknown(p, d) for p, d in (*machine, *effects)), *found), source
 
 

@@ -8,13 +8,14 @@ from pathlib import Path
 import pytest
 
 from daq_cli.models.diagnosis_text import WIDTH, answer_text
-from model.discrepancy.diagnosis import Diagnosis, DifferencePlace
+from model.discrepancy.diagnosis import Diagnosis, DifferencePlace, Suspicion
 from model.discrepancy.explanation.notes import on_stated_numbers
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import Note
 from model.discrepancy.options import DiagnosisOptions
 from model.fitting.unknowns import Unknown
 from model.machine_model.parameter import Kind, Parameter
+from model.reports.diagnosis_words import headline
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.models.conftest import write_csv
 from tests.model.discrepancy.answers import an_answer
@@ -47,6 +48,14 @@ def test_other_verdicts_are_said_as_what_they_are(answer: Diagnosis) -> None:
     assert "N·m that goes with" in " ".join(text.split())
     text = answer_text(answer.model_copy(update={"verdict": "nothing-significant", "steps": (), "remaining": ()}))
     assert text.startswith("NOTHING SIGNIFICANT  the model explains these traces")
+
+
+def test_a_suspicion_says_what_is_missing(answer: Diagnosis) -> None:
+    doubt = Suspicion(effect="coulomb_friction", joints=(1,), evidence=24.0, needed=30.0, seconds=20.0)
+    bare = answer.model_copy(update={"verdict": "suspected", "steps": (), "remaining": (), "suspicion": doubt})
+    said = "Coulomb friction on joint 1, evidence 24 of 30; 20 s more of this motion would settle it"
+    assert " ".join(answer_text(with_sentences(bare)).split()).startswith(f"SUSPECTED {said}")
+    assert headline(with_sentences(bare)) == f"Suspected: {said}"
 
 
 def test_numbers_far_from_what_is_stated_stand_right_under_the_verdict(answer: Diagnosis) -> None:

@@ -10,6 +10,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from model.comparison.compare import TraceSignals
+from model.discrepancy.diagnosis import Suspicion
 from model.discrepancy.thresholds import THRESHOLDS
 from model.effects.library import library
 from server.jobs import headlines
@@ -85,7 +86,12 @@ def test_headlines_name_what_was_found() -> None:
     assert told(undecided) == (
         "one of: Coulomb friction, joint 2 or stiction, joint 2 or Stribeck friction, joint 2 or 2 more"
     )
+    both = answer.model_copy(update={"verdict": "ambiguous", "steps": (undecided.steps[0], step)})
+    assert told(both).endswith(" or 2 more; Coulomb friction, joint 2")
     assert told(answer.model_copy(update={"verdict": "nothing-significant"})) == "nothing significant"
+    doubt = Suspicion(effect="backlash", joints=(1,), evidence=24.0, needed=30.0, seconds=20.0)
+    suspected = answer.model_copy(update={"verdict": "suspected", "steps": (), "suspicion": doubt})
+    assert told(suspected) == "suspected: backlash, joint 1"
     assert headlines.of_comparison(comparison).startswith("error before ")
     assert len(overlays(comparison)) == 2
 

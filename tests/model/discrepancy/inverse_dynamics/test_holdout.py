@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from daq.contracts.trace import Trace
+from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.holdout import held_out_squares
+from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motions
 from model.machine_model.model import Model, base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
@@ -50,3 +52,15 @@ def test_a_disturbance_does_not_vanish_from_a_record_that_does_not_show_it() -> 
     quiet = records(rigs.slide_trace(1, {}, duration=8.0))
     without = held_out_squares(base_model(rigs.slide_machine()), {}, quiet)
     assert held_out_squares(humming(3.0), {}, quiet)[0] > without[0] + 0.5 * 3.0**2 / 2
+
+
+def test_held_out_records_speak_for_an_effect_that_is_there_and_not_for_one_that_is_not() -> None:
+    told = {}
+    for coulomb in (6.0, 0.0):
+        traces = [rigs.slide_trace(seed, {"coulomb": coulomb}, duration=6.0) for seed in (1, 2)]
+        options = TorqueOptions(effects=("coulomb_friction",), least_evidence=-1e6, least_share=0.0)
+        found = diagnose_torques(base_model(rigs.slide_machine()), traces[:1], traces[1:], options)
+        told[coulomb] = found.steps[0].evidence_held_out if found.steps else None
+    assert told[6.0] is not None
+    assert told[6.0] > 100.0
+    assert told[0.0] is None or told[0.0] < 5.0

@@ -1,0 +1,59 @@
+"""Noise of a residual torque as repeated motion shows it: what differs where position, speed and acceleration recur.
+
+Whatever a model lacks, a torque that follows from the motion is the same when the motion comes again. What differs is
+noise, of the drive and of everything else that no model of the motion can know. The last bit of an encoder says nothing
+of that. (A difference of nearest neighbours, as in the gamma test of Stefánsson, Končar and Jones 1997.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from model.arrays import Floats
+from model.inverse_dynamics.recorded_motion import RecordedMotion
+
+APART = 1.0
+"""Least time between two passages, s: closer samples are the same passage."""
+NEIGHBOURS = 60
+"""Neighbours among which another passage is looked for."""
+ALIKE = 0.05
+"""Distance of two motions that count as the same, in standard deviations of position, speed and acceleration: one of
+all joints, as a root mean square. Over that distance, a torque that follows from the motion hardly changes."""
+FEWEST = 100
+"""Samples that must recur for their differences to be an estimate."""
+
+
+def repeated_noise(records: Sequence[RecordedMotion], residual: Sequence[Floats]) -> Floats:
+    """Standard deviation (n,), N·m or N, of what differs between passages of the same motion; 0 on a joint whose motion
+    does not recur. A bound from above: passages are never quite alike. residual: (m, n) a record, at its compared
+    samples."""
+    joints = records[0].moving.shape[1]
+    return np.array([_of_joint(records, residual, j) for j in range(joints)])
+
+
+def _of_joint(records: Sequence[RecordedMotion], residual: Sequence[Floats], joint: int) -> float:
+    moving = [r.moving[:, joint] for r in records]
+    state = np.concatenate([_state(r)[m] for r, m in zip(records, moving, strict=True)])
+    torque = np.concatenate([x[m, joint] for x, m in zip(residual, moving, strict=True)])
+    when = np.concatenate([1e6 * i + r.time[r.rows][m] for i, (r, m) in enumerate(zip(records, moving, strict=True))])
+    if len(state) < FEWEST:
+        return 0.0
+    state = state / np.maximum(state.std(axis=0), 1e-12) / np.sqrt(state.shape[1])
+    near = cKDTree(state).query(state, k=min(NEIGHBOURS, len(state)), distance_upper_bound=ALIKE)
+    distance, other = (np.asarray(one) for one in near)
+    apart = np.isfinite(distance)
+    apart[apart] = np.abs(when[other[apart]] - np.repeat(when, apart.sum(axis=1))) > APART
+    found = apart.any(axis=1)
+    if found.sum() < FEWEST:
+        return 0.0
+    nearest = other[found, apart[found].argmax(axis=1)]
+    return float(np.sqrt(0.5 * np.mean((torque[nearest] - torque[found]) ** 2)))
+
+
+def _state(record: RecordedMotion) -> Floats:
+    """Position, speed and acceleration of all joints (m, 3 n) at the compared samples."""
+    parts = [signal[record.rows] for signal in (record.position, record.speed, record.acceleration)]
+    return np.concatenate(parts, axis=1)

@@ -1,0 +1,90 @@
+"""No answer depends on the unit of the recorded drive; an offset and too short a record are told as what they are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from daq.contracts.machine import Machine, PlainGain
+from daq.contracts.trace import Trace
+from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
+from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.fitting.options import FitOptions
+from model.inverse_dynamics.fit import fit_torques
+from model.machine_model.model import base_model
+from tests.model.discrepancy.inverse_dynamics import rigs
+
+RUBBING = {"coulomb": 6.0, "viscous": 15.0}
+
+
+def in_unit(machine: Machine, factor: float) -> Machine:
+    """The machine whose drive is recorded in a unit that many times smaller."""
+    joints = []
+    for joint in machine.joints:
+        assert isinstance(joint.drive, PlainGain)
+        gain = joint.drive.gain.model_copy(update={"value": joint.drive.gain.value / factor, "unit": "N/unit"})
+        joints.append(joint.model_copy(update={"drive": joint.drive.model_copy(update={"gain": gain})}))
+    return machine.model_copy(update={"joints": tuple(joints)})
+
+
+def recorded(trace: Trace, factor: float) -> Trace:
+    assert trace.drive is not None
+    return replace(trace, drive=factor * trace.drive)
+
+
+def pushed(trace: Trace, force: float) -> Trace:
+    """The same record with a constant force that the drive has to bear."""
+    assert trace.drive is not None
+    return replace(trace, drive=trace.drive + force)
+
+
+def diagnosed(factor: float) -> Diagnosis:
+    fitted, held = (recorded(rigs.slide_trace(seed, RUBBING, duration=10.0), factor) for seed in (1, 2))
+    return diagnose_torques(base_model(in_unit(rigs.slide_machine(), factor)), [fitted], [held])
+
+
+def test_a_diagnosis_is_the_same_in_every_unit_of_the_drive() -> None:
+    usual, others = diagnosed(1.0), [diagnosed(factor) for factor in (1e-2, 1e3)]
+    assert usual.verdict == "named"
+    for other in others:
+        assert [(s.effect, s.joints) for s in other.steps] == [(s.effect, s.joints) for s in usual.steps]
+        for one, same in zip(usual.steps, other.steps, strict=True):
+            assert same.margin == pytest.approx(one.margin, rel=1e-3)
+            for name, value in one.parameters.items():
+                assert same.parameters[name].value == pytest.approx(value.value, rel=1e-4)
+
+
+def test_a_fit_of_torques_is_the_same_in_every_unit_of_the_drive() -> None:
+    sizes = []
+    for factor in (1.0, 1e-2, 1e3):
+        model = base_model(in_unit(rigs.slide_machine(), factor)).with_effect("coulomb_friction", (1,))
+        traces = [recorded(rigs.slide_trace(1, RUBBING, duration=10.0), factor)]
+        found = {p.name: p for p in fit_torques(model, traces, options=FitOptions()).parameters}
+        friction = found["joint1.coulomb_friction.torque"]
+        sizes.append((friction.model_value, friction.expected_deviation))
+    assert sizes[1:] == [pytest.approx(sizes[0], rel=1e-4)] * 2
+
+
+def test_friction_is_named_beside_a_constant_force_which_is_told_as_a_group() -> None:
+    """The force correlates over any distance: taken for noise, it would leave next to no independent samples."""
+    fitted, held = (pushed(rigs.slide_trace(seed, RUBBING, duration=10.0), 4.0) for seed in (1, 2))
+    found = diagnose_torques(base_model(rigs.slide_machine()), [fitted], [held])
+    adopted = [s for s in found.steps if s.adopted]
+    assert {"coulomb_friction"} <= {s.effect for s in adopted}
+    constant = next(s for s in adopted if s.effect != "coulomb_friction" and s.group)
+    assert {"base_tilt", "direction_dependent_friction"} <= {c.effect for c in constant.group}
+
+
+def test_an_effect_that_lacks_evidence_alone_is_suspected() -> None:
+    trace = rigs.slide_trace(1, {"coulomb": 6.0}, duration=4.0)
+    strict = TorqueOptions(least_evidence=2000.0, effects=("coulomb_friction", "payload"))
+    found = diagnose_torques(base_model(rigs.slide_machine()), [trace], options=strict)
+    assert found.verdict == "suspected", found.summary
+    assert found.suspicion is not None
+    assert found.suspicion.effect == "coulomb_friction"
+    assert found.suspicion.evidence < found.suspicion.needed == 2000.0
+    assert found.suspicion.seconds >= 5.0
+    assert found.summary.startswith("Suspected: Coulomb friction on joint 1, evidence ")
+    assert Diagnosis.model_validate_json(found.model_dump_json()) == found
