@@ -1749,7 +1749,7 @@ export interface components {
              * Verdict
              * @enum {string}
              */
-            verdict: "nothing-significant" | "named" | "ambiguous" | "unknown-effect";
+            verdict: "nothing-significant" | "named" | "ambiguous" | "suspected" | "unknown-effect";
             /** Summary */
             summary: string;
             /** Significant */
@@ -1812,6 +1812,7 @@ export interface components {
              * @enum {string}
              */
             method?: "output-error" | "inverse-dynamics";
+            suspicion?: components["schemas"]["Suspicion"] | null;
             /**
              * Unexplained Joints
              * @default []
@@ -1890,6 +1891,8 @@ export interface components {
             rmse_holdout?: components["schemas"]["SignalError"][];
             /** Excess Removed Holdout */
             excess_removed_holdout?: number | null;
+            /** Evidence Held Out */
+            evidence_held_out?: number | null;
             /** Sum Lambda2 Before */
             sum_lambda2_before?: number | null;
             /** Sum Lambda2 After */
@@ -4739,6 +4742,23 @@ export interface components {
         StoredProgram: {
             entry: components["schemas"]["ProgramEntry"];
             program: components["schemas"]["Program"];
+        };
+        /**
+         * Suspicion
+         * @description An effect that more of the same motion would show or refute: its evidence, held-out records included, the
+         *     evidence `needed` to name it, and the `seconds` that are still to be recorded for that.
+         */
+        Suspicion: {
+            /** Effect */
+            effect: string;
+            /** Joints */
+            joints: number[];
+            /** Evidence */
+            evidence: number;
+            /** Needed */
+            needed: number;
+            /** Seconds */
+            seconds: number;
         };
         /**
          * SystemStatus
