@@ -7,12 +7,13 @@ Every number carries its unit and its source, and says where it is an assumption
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
@@ -32,6 +33,17 @@ from daq.contracts.quantity import (
 from firmware_protocol.units import DriveScale, JointCalibration
 
 Unitful = Annotated[Quantity, Field()]
+
+
+def _positive(quantity: Quantity) -> Quantity:
+    if not quantity.value > 0.0:
+        raise ValueError(f"value {quantity.value} {quantity.unit} must be above 0")
+    return quantity
+
+
+Size = Annotated[Quantity, AfterValidator(_positive)]
+Sizes = Size | tuple[Size, ...]
+"""A number for all joints, or one a joint."""
 
 
 class _Part(BaseModel):
@@ -155,13 +167,35 @@ class BoardPid(_Part):
 
 class SampledPid(_Part):
     """PID in SI units, sampled: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) a joint. `velocity_gains` closes
-    an inner loop (cascade): the outer output is then a speed set point for it."""
+    an inner loop (cascade): the outer output is then a speed set point for it.
+
+    The output is in the unit of the recorded drive. It is rounded to `drive_resolution`, then limited to
+    ± `output_limit` ahead of the amplifier, whose dead zone and supply limit come after; at that limit the error is not
+    integrated further. Set points are rounded to `set_point_resolution` before use. `gain_error` is relative: the
+    output is 1 + `gain_error` times what the gains say. One number for all joints, or one a joint.
+    """
 
     kind: Literal["pid"]
     period: Second
     delay: Second
     gains: tuple[tuple[float, float, float], ...]
     velocity_gains: tuple[tuple[float, float, float], ...] | None = None
+    drive_resolution: Sizes | None = None
+    output_limit: Sizes | None = None
+    set_point_resolution: Sizes | None = None
+    gain_error: Annotated[Quantity, in_unit("1", above=-1.0)] | tuple[Plain, ...] | None = None
+
+
+def of_joint(sizes: Quantity | tuple[Quantity, ...] | None, joint: int) -> Quantity | None:
+    """The number of joint `joint` (from 1), where one is stated for all joints or one a joint."""
+    return sizes[joint - 1] if isinstance(sizes, tuple) else sizes
+
+
+DEVIATIONS_ARE_USED_OF = (
+    "lengths that are not 0, masses, centres, inertias, motor constants, gear ratio, supply and output limits, "
+    "friction, at_zero, gains and delay"
+)
+"""Numbers of a machine file whose deviation becomes a tolerance parameter."""
 
 
 class NoController(_Part):
@@ -197,7 +231,46 @@ class Machine(_Part):
             raise ValueError(f"rest_posture has {len(self.rest_posture)} values for {count} joints")
         if not isinstance(self.controller, NoController) and len(self.controller.gains) != count:
             raise ValueError(f"controller.gains has {len(self.controller.gains)} rows for {count} joints")
+        if isinstance(self.controller, SampledPid):
+            for name in ("drive_resolution", "output_limit", "set_point_resolution", "gain_error"):
+                stated = getattr(self.controller, name)
+                if isinstance(stated, tuple) and len(stated) != count:
+                    raise ValueError(f"controller.{name} has {len(stated)} numbers for {count} joints")
+            rows = self.controller.velocity_gains
+            if rows is not None and len(rows) != count:
+                raise ValueError(f"controller.velocity_gains has {len(rows)} rows for {count} joints")
+        for place, quantity in self._quantities():
+            if quantity.deviation is not None and not self._takes_deviation(place):
+                raise ValueError(f"{place}: no method can use a deviation here, but of {DEVIATIONS_ARE_USED_OF}")
         return self
+
+    def _quantities(self) -> Iterator[tuple[str, Quantity]]:
+        """Every number of the whole machine and of the modelled joints, with its place in the file."""
+        parts: list[tuple[str, object]] = [("controller", self.controller)]
+        parts += [(f"joints.{j}", self.joints[j - 1]) for j in self.modelled_joints]
+        while parts:
+            place, part = parts.pop(0)
+            if isinstance(part, Quantity):
+                yield place, part
+            elif isinstance(part, BaseModel):
+                parts += [(f"{place}.{name}", getattr(part, name)) for name in type(part).model_fields]
+            elif isinstance(part, tuple):
+                parts += [(f"{place}.{k + 1}", one) for k, one in enumerate(part)]
+
+    def _takes_deviation(self, place: str) -> bool:
+        """Whether a model has a parameter for the deviation of the number at a place."""
+        words = place.split(".")
+        if words[0] == "controller":
+            return words[1] in ("delay", "gain_error", "output_limit", "dac_counts_per_adc_count")
+        joint, part = self.joint(int(words[1])), words[2]
+        if part == "geometry":
+            return words[3] in ("a", "d") and getattr(joint.geometry, words[3]).value != 0.0
+        if part == "drive":
+            return words[3] not in ("inductance", "amplifier_gain", "dac_full_scale")
+        if part == "sensor":
+            slides = joint.kind == "prismatic" and joint.geometry.d.value != 0.0  # its zero is link's `d` itself
+            return words[3] == "at_zero" and not slides
+        return True
 
     def calibration(self, joint: int) -> JointCalibration:
         """Counts and posture units ↔ rad of joint `joint` (from 1). Raises SpecError when it has no sensor."""

@@ -10,7 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from daq.contracts.machine import BoardPid, Body, Cylinder, DcMotor, Joint, Machine, NoController, PlainGain, Rod
+from daq.contracts.machine import (
+    BoardPid,
+    Body,
+    Cylinder,
+    DcMotor,
+    Joint,
+    Machine,
+    NoController,
+    PlainGain,
+    Rod,
+    SampledPid,
+    of_joint,
+)
 from daq.contracts.quantity import Quantity
 from model import layout as at
 from model.effects.effect import JointScale
@@ -48,11 +60,42 @@ def base_parameters(machine: Machine) -> tuple[Parameter, ...]:
         found.append(parameter("load", Kind.INERTIA, "mass", machine.load, at.LOAD, 0.0))
     if not isinstance(machine.controller, NoController):
         found.append(parameter("controller", Kind.CONTROLLER, "delay", machine.controller.delay, at.DELAY, 0.0))
-    return tuple(found)
+    return (*found, *_of_controller(machine))
+
+
+def _of_controller(machine: Machine) -> Iterator[Parameter]:
+    """Gains and limit of the controller, where the file says how far off they may be."""
+    controller = machine.controller
+    for number in machine.modelled_joints:
+        place, joints = f"joint{number}.controller", (number,)
+        error = gain_error(machine, number)
+        if error is not None and error.deviation is not None:
+            slot = at.slot(number, at.GAIN_ERROR)
+            low = -0.95 if error.low is None else error.low
+            yield replace(parameter(place, Kind.CONTROLLER, "gain_error", error, slot, low), joints=joints)
+        limit = of_joint(controller.output_limit, number) if isinstance(controller, SampledPid) else None
+        if limit is not None and limit.deviation is not None:
+            slot = at.slot(number, at.OUTPUT_LIMIT)
+            yield replace(parameter(place, Kind.CONTROLLER, "output_limit", limit, slot, 0.0), joints=joints)
+
+
+def gain_error(machine: Machine, number: int) -> Quantity | None:
+    """Relative error of the controller's gains on a joint (from 1), as far as the file states one."""
+    controller = machine.controller
+    if isinstance(controller, SampledPid):
+        return of_joint(controller.gain_error, number)
+    if not isinstance(controller, BoardPid) or controller.dac_counts_per_adc_count.deviation is None:
+        return None
+    stated = controller.dac_counts_per_adc_count
+    sides = {s: getattr(stated, s) for s in ("low", "high")}
+    relative = {s: None if v is None else v / stated.value - 1.0 for s, v in sides.items()}
+    deviation = abs((stated.deviation or 0.0) / stated.value)
+    return stated.model_copy(update={"value": 0.0, "unit": "1", "deviation": deviation, **relative})
 
 
 def _of_joint(number: int, joint: Joint) -> Iterator[Parameter]:
-    found = (*_of_link(f"link{number}", joint), *_of_drive(f"joint{number}", joint.drive))
+    place = f"joint{number}"
+    found = (*_of_link(f"link{number}", joint), *_of_drive(place, joint.drive), *_of_sensor(place, joint))
     for place, kind, part, quantity, column, low in found:
         yield replace(parameter(place, kind, part, quantity, at.slot(number, column), low), joints=(number,))
 
@@ -75,6 +118,18 @@ def _of_link(place: str, joint: Joint) -> Iterator[tuple[str, Kind, str, Quantit
             yield place, Kind.INERTIA, f"inertia_{entry}", link.inertia[k], at.INERTIA_XX + k, low
 
 
+def _of_sensor(place: str, joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
+    """Arguments of `parameter`. A zero that is off turns (or shifts) the link against what its sensor shows."""
+    stated = None if joint.sensor is None else joint.sensor.at_zero
+    if stated is None or stated.deviation is None:
+        return
+    own, column = (joint.geometry.theta, at.THETA) if joint.kind == "revolute" else (joint.geometry.d, at.D)
+    shift = own.value - stated.value
+    moved = {s: None if (v := getattr(stated, s)) is None else v + shift for s in ("low", "high")}
+    zero = stated.model_copy(update={"value": own.value, **moved})
+    yield f"{place}.sensor", Kind.GEOMETRY, "zero", zero, column, -math.inf
+
+
 def _of_drive(place: str, drive: DcMotor | PlainGain) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
     """Arguments of `parameter`, with the joint's column in place of the slot."""
     if isinstance(drive, DcMotor):
@@ -83,6 +138,10 @@ def _of_drive(place: str, drive: DcMotor | PlainGain) -> Iterator[tuple[str, Kin
         yield motor, Kind.DRIVE, "torque_constant", drive.torque_constant, at.TORQUE_CONSTANT, 1e-9
         yield motor, Kind.DRIVE, "back_emf_constant", drive.back_emf_constant, at.BACK_EMF, 0.0
         yield motor, Kind.INERTIA, "rotor_inertia", drive.rotor_inertia, at.ROTOR_INERTIA, 0.0
+        if drive.gear_ratio.deviation is not None:
+            yield motor, Kind.DRIVE, "gear_ratio", drive.gear_ratio, at.GEAR, -math.inf
+        if drive.supply_limit is not None and drive.supply_limit.deviation is not None:
+            yield motor, Kind.DRIVE, "supply_limit", drive.supply_limit, at.SUPPLY, 0.0
     else:
         yield f"{place}.drive", Kind.DRIVE, "gain", drive.gain, at.TORQUE_CONSTANT, -math.inf
         if drive.inertia is not None:
@@ -120,6 +179,10 @@ def _fill_joint(row: NDArray[np.float64], machine: Machine, number: int) -> None
     row[at.STRIBECK_SPEED], row[at.COOLING_TIME], row[at.RIPPLE_CYCLES] = 1.0, 1.0, 1.0
     row[at.CONTACT_COMPLIANCE] = contact_compliance(scale)
     row[at.RANGE], row[at.RAD_PER_COUNT] = scale.range, 0.0
+    limit = of_joint(machine.controller.output_limit, number) if isinstance(machine.controller, SampledPid) else None
+    row[at.OUTPUT_LIMIT] = NO_LIMIT if limit is None else limit.value
+    error = gain_error(machine, number)
+    row[at.GAIN_ERROR] = 0.0 if error is None else error.value
     sensor = joint.sensor
     if sensor is not None:
         row[at.AT_ZERO] = sensor.at_zero.value

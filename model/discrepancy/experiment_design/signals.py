@@ -58,7 +58,8 @@ def imagine(model: Model, spec: ExperimentSpec, plan: Planner) -> Imagined | Non
         return None
     counts = observation.deviations / observation.unit
     drawn = np.random.default_rng(NOISE_SEED).standard_normal(observation.prepared[0].noise.shape)
-    return Imagined(observation, tuple(u for u in unknowns if u.trace is not None), (drawn * counts,))
+    own = observation.with_drive_as_input(False)  # nothing has been recorded yet
+    return Imagined(own, tuple(u for u in unknowns if u.trace is not None), (drawn * counts,))
 
 
 @dataclass(frozen=True)
@@ -91,9 +92,9 @@ class Prediction:
     def recorded(self) -> Prediction:
         """The same on the record that an arm like the point's model would leave. Not finite where its simulation is
         not."""
-        noisy = self.there.observation.with_noise(self.there.noise)
-        readings = noisy.shown(self.point.model, self.unknowns, self.values)
-        return replace(self, there=replace(self.there, observation=self.there.observation.with_readings(readings)))
+        own = self.there.observation.imagined(self.point.model, self.unknowns, self.values, self.there.noise)
+        observation = own.with_drive_as_input(self.point.observation.drive_is_input)
+        return replace(self, there=replace(self.there, observation=observation))
 
     def shown(self, values: Floats | None = None) -> Floats:
         """The simulation that is given the record, (N,) in deviations of a reading; at other values (p,) than the

@@ -1,6 +1,7 @@
 """Evidence from the recorded controller's own numbers, which needs no model of the arm.
 
 The board's record holds the set point that was sent, the position it read, the error it formed and the power it gave.
+Of a sampled PID the record holds no error; its drive tells it (`sampled_controller`).
 Up to rounding, the error must be set point − position and the power the gain times the error. A violation proves lost
 set points or a wrong gain by itself, and its absence excludes them.
 """
@@ -13,13 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.contracts.machine import BoardPid, Machine
+from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid, of_joint
 from daq.contracts.trace import Trace
 from model import layout as at
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
 from model.discrepancy.grounds import ControllerProof
 from model.discrepancy.output_error.holdout import signal_errors
 from model.discrepancy.output_error.observation import Observation, Signals
+from model.discrepancy.output_error.sampled_controller import controller_numbers, with_errors
 from model.drives.controller import POWER_MAX
 from model.machine_model.model import Model
 
@@ -59,8 +61,9 @@ def check_controller(
         model: its stated gain errors are what the power is compared with; None: the gains are as configured. A finding
             gives the whole error of a gain, the stated one included.
     """
-    if not isinstance(machine.controller, BoardPid):
+    if isinstance(machine.controller, NoController):
         return ()
+    traces = with_errors(traces, machine)
     found: list[ControllerFinding | None] = []
     for joint in machine.modelled_joints:
         stated = 0.0 if model is None else float(model.vector[at.slot(joint, at.GAIN_ERROR)])
@@ -74,8 +77,9 @@ def settled_by_records(traces: Sequence[Trace], machine: Machine) -> tuple[str, 
     An effect counts only where it could be checked on every modelled joint and every trace holds what that needs. A
     gain is one number for all traces, so its samples may come from any of them.
     """
-    if not traces or not isinstance(machine.controller, BoardPid):
+    if not traces or isinstance(machine.controller, NoController):
         return ()
+    traces = with_errors(traces, machine)
     joints = machine.modelled_joints
     checks = {
         "wrong_gain": all(_usable(traces, machine, joint) is not None for joint in joints),
@@ -194,7 +198,8 @@ def _wrong_gain(traces: Sequence[Trace], machine: Machine, joint: int, stated: f
     spread = float(np.mean((power - (1 + relative) * wanted) ** 2))
     # Equal errors are rounded alike: only different ones are independent.
     values, counts = np.unique(wanted, return_counts=True)
-    deviation = float(np.sqrt(max(spread, 1 / 12) * np.sum((counts * values) ** 2)) / squares)
+    least = _rounding(machine, joint) ** 2 / 12
+    deviation = float(np.sqrt(max(spread, least) * np.sum((counts * values) ** 2)) / squares)
     if abs(relative - stated) < max(LEAST_GAIN_DEVIATION * (1 + stated), 5 * deviation):
         return None
     half, used = 2 * deviation, len(wanted)
@@ -212,8 +217,11 @@ def _usable(traces: Sequence[Trace], machine: Machine, joint: int) -> tuple[Floa
 
 def _error_and_power(trace: Trace, machine: Machine, joint: int) -> tuple[Floats, Floats] | None:
     """The power that P alone would give, and the recorded one, in DAC counts, where neither is at its limit; None
-    where the trace does not hold them, or I or D act."""
+    where the trace does not hold them, or I or D act. Of a sampled PID, the drives, whatever acts."""
     controller, sensor = machine.controller, machine.joint(joint).sensor
+    if isinstance(controller, SampledPid):
+        numbers = controller_numbers(trace, machine, joint)
+        return None if numbers is None else (numbers.formed[numbers.free], numbers.drive[numbers.free])
     if not isinstance(controller, BoardPid) or sensor is None or trace.power_raw is None or trace.error is None:
         return None
     gains = (trace.record.gains or {}).get(joint, controller.gains[joint - 1])
@@ -225,6 +233,14 @@ def _error_and_power(trace: Trace, machine: Machine, joint: int) -> tuple[Floats
     power = trace.power_raw[:, column].astype(np.float64)
     free = (np.abs(power) < POWER_MAX - 1) & (np.abs(wanted) > LEAST_POWER)
     return wanted[free], power[free]
+
+
+def _rounding(machine: Machine, joint: int) -> float:
+    """Step of what the controller gives out: DAC counts, or the drive's unit; 0 where nothing is stated."""
+    if not isinstance(machine.controller, SampledPid):
+        return 1.0
+    stated = of_joint(machine.controller.drive_resolution, joint)
+    return 0.0 if stated is None else stated.value
 
 
 def _share_interval(count: int, of: int) -> tuple[float, float]:

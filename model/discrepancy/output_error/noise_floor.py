@@ -42,5 +42,4 @@ def _replica(observation: Observation, point: Point, rng: np.random.Generator) -
     """The same experiments on an arm that is the point's model, with random noise of the stated size."""
     scale = observation.deviations / observation.unit
     noise = [scale * rng.normal(size=p.noise.shape) for p in observation.prepared]
-    simulated = observation.with_noise(noise).shown(point.model, point.unknowns, point.values)
-    return observation.with_readings(simulated)
+    return observation.imagined(point.model, point.unknowns, point.values, noise)

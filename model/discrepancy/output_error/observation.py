@@ -11,6 +11,7 @@ closed loop.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -20,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
-from daq.contracts.machine import Machine
+from daq.contracts.machine import BoardPid, Machine, SampledPid
 from daq.contracts.trace import Trace
+from model import layout as at
 from model.discrepancy.thresholds import FEEDBACK_SHARE
 from model.fitting.fit import fit_problem
 from model.fitting.options import FitOptions
@@ -32,7 +34,7 @@ from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
 from model.simulation.batch import BatchRun
 from model.simulation.inputs import readings_on_grid
-from model.simulation.period import OUT_READING, OUTPUTS
+from model.simulation.period import OUT_DRIVE, OUT_READING, OUTPUTS
 from model.simulation.prepared import Options, Prepared, prepare
 from model.simulation.simulate import at_rows
 
@@ -97,28 +99,70 @@ class Observation:
         """The same with another share of the recorded readings that the simulated controller is given."""
         return replace(self, prepared=tuple(replace(p, following=share) for p in self.prepared))
 
-    def with_noise(self, noise: Sequence[Floats]) -> Observation:
-        """The same with simulations that are given no recorded readings, but noise (k, n), in counts, on their own."""
-        prepared = zip(self.prepared, noise, strict=True)
-        return replace(self, prepared=tuple(replace(p, following=0.0, noise=own) for p, own in prepared))
+    @property
+    def drive_is_input(self) -> bool:
+        """Whether the recorded drive is the input of the simulations."""
+        return all(p.settings[at.DRIVE_RECORDED] != 0 for p in self.prepared)
 
-    def with_readings(self, measured: Sequence[Floats]) -> Observation:
-        """The same records with other readings (m, n) rad in place of the measured ones, everywhere."""
-        records = tuple(replace(r, measured=own) for r, own in zip(self.records, measured, strict=True))
-        shown = [readings_on_grid(r.measured, r.inputs.rows, len(r.inputs)) for r in records]
-        prepared = tuple(replace(p, readings=own) for p, own in zip(self.prepared, shown, strict=True))
+    def with_drive_as_input(self, recorded: bool) -> Observation:
+        """The same with the recorded drive as the input of the simulations, or with the controller's own."""
+        prepared = tuple(p.with_setting(at.DRIVE_RECORDED, int(recorded)) for p in self.prepared)
+        return replace(self, prepared=prepared)
+
+    def imagined(
+        self, model: Model, unknowns: Sequence[Unknown], values: Floats, noise: Sequence[Floats]
+    ) -> Observation:
+        """The same experiments on an arm that is the model, in closed loop, with noise (k, n) of its readings, counts.
+
+        Readings and drives take the place of the recorded ones. Not finite where the simulation is not.
+        """
+        alone = tuple(
+            replace(p, following=0.0, noise=own)
+            .with_setting(at.DRIVE_RECORDED, 0)
+            .with_setting(at.QUANTISE, at.DRIVE_ROUNDED)
+            for p, own in zip(self.prepared, noise, strict=True)
+        )
+        vector, initials = self.state(model, unknowns, values)
+        outputs = replace(self, prepared=alone).outputs(model, vector[None], [i[None] for i in initials])
+        shown = [at_rows(out[0, OUT_READING], r.inputs.rows) for out, r in zip(outputs, self.records, strict=True)]
+        records = tuple(replace(r, measured=own) for r, own in zip(self.records, shown, strict=True))
+        prepared = tuple(
+            replace(
+                p,
+                readings=readings_on_grid(r.measured, r.inputs.rows, len(r.inputs)),
+                recorded=np.ascontiguousarray(out[0, OUT_DRIVE]),
+            )
+            for p, r, out in zip(self.prepared, records, outputs, strict=True)
+        )
         return replace(self, records=records, prepared=prepared)
 
     def readings(
         self, model: Model, vectors: Floats, initials: Sequence[Floats], longest_step: float = STEP
     ) -> list[Floats]:
-        """Simulated readings of p parameter sets, with noise where the simulation has some.
+        """Simulated readings of p parameter sets, per record (p, m, n), rad; NaN where a run diverged. Arguments as
+        `outputs`."""
+        found = []
+        outputs = self.outputs(model, vectors, initials, longest_step, (OUT_READING,))
+        for record, out in zip(self.records, outputs, strict=True):
+            found.append(np.stack([at_rows(one, record.inputs.rows) for one in out[:, 0]]))
+        return found
+
+    def outputs(
+        self,
+        model: Model,
+        vectors: Floats,
+        initials: Sequence[Floats],
+        longest_step: float = STEP,
+        columns: Sequence[int] = range(OUTPUTS),
+    ) -> list[Floats]:
+        """Simulations of p parameter sets, with noise where they have some.
 
         Args:
             vectors: (p, size). initials: per record (p, n, 2). longest_step: of the integration, s.
+            columns: which outputs.
 
         Returns:
-            per record (p, m, n), rad; NaN where a run diverged.
+            per record (p, columns, k, n), in the order of `model.simulation.period`; NaN where a run diverged.
         """
         longest = max(len(r.inputs) for r in self.records)
         count = len(self.records)
@@ -139,8 +183,7 @@ class Observation:
                 step /= 2
             for t, record in enumerate(self.records):
                 rows = slice(t * len(own), (t + 1) * len(own))
-                shown = out[rows, OUT_READING, : len(record.inputs)]
-                found[t].append(np.stack([at_rows(one, record.inputs.rows) for one in shown]))
+                found[t].append(out[rows][:, list(columns), : len(record.inputs)])
         return [np.concatenate(parts) for parts in found]
 
     def state(self, model: Model, unknowns: Sequence[Unknown], values: Floats) -> tuple[Floats, list[Floats]]:
@@ -235,11 +278,23 @@ def observe(
     )
     sensors = [model.machine.joint(j).sensor for j in model.machine.modelled_joints]
     unit = np.array([1.0 if s is None else s.range.value / 2**s.bits for s in sensors])
-    options = Options(quantise=False, following=feedback_share)
-    prepared = tuple(prepare(problem.model, r.inputs, options) for r in problem.records)
+    prepared = tuple(
+        prepare(
+            problem.model,
+            r.inputs,
+            Options(quantise=False, following=feedback_share, recorded_drive=_drive_is_input(model.machine, r)),
+        )
+        for r in problem.records
+    )
     given = {p.name: p.value for p in model.parameters if p.effect is not None}
     unknowns = tuple(_loose_start(_even_bend(_as_given(u, given), problem.model)) for u in problem.unknowns)
     return Observation(model.machine, problem.records, problem.floor, unit, prepared), problem.model, unknowns
+
+
+def _drive_is_input(machine: Machine, record: Record) -> bool:
+    """Whether the record says what moved the arm in every period: its drive, however the controller came to it."""
+    kind = {BoardPid: "board", SampledPid: "pid"}.get(type(machine.controller), "")
+    return kind in os.environ.get("EXACT", "pid") and record.inputs.drive_of_every_period
 
 
 def _as_given(unknown: Unknown, given: Mapping[str, float]) -> Unknown:
